@@ -22,13 +22,13 @@ from scipy.stats import binomtest
 from benchmarks.document import table
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate, Origin
-from campaign.identifying.method import Material
-from campaign.identifying.methods.frequency_response import METHOD
+from campaign.identify.method import Material
+from campaign.identify.methods.frequency_response import METHOD
 from campaign.physics.bench import Bench
+from tests.estimation.coverage import holds
+from tests.estimation.excited_rigs import THREE, excited_rig
 from tests.experiments.excited import by_lines, by_series, played, rate, true_dynamics
 from tests.experiments.laboratory import Done
-from tests.identification.coverage import holds
-from tests.identification.excited_rigs import THREE, excited_rig
 
 WIDE = {"signal": "multisine", "lowest": "0.5 Hz", "highest": "40 Hz", "period": "4 s"}
 SHARES = (0.1, 0.2)

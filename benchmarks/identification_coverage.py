@@ -1,7 +1,7 @@
 """How often intervals of `campaign identify` hold the truth, on rigs that nobody tuned them on.
 
 Run with `python -m benchmarks.identification_coverage [--rigs 100] [--whole 24] [--seed 4711]`.
-The rigs, half of them linear, are those of `tests.identification.blind_rigs`: simulated without
+The rigs, half of them linear, are those of `tests.estimation.blind_rigs`: simulated without
 this program, with encoders, tachometers, noise, delays, and friction of many kinds; truth is read
 when everything has been identified. Columns: how many intervals hold (with the 95 % interval of
 that share, Clopper and Pearson), how many have none, their median half-width. The table goes into
@@ -25,11 +25,11 @@ from scipy.stats import binomtest
 from benchmarks.document import DOCS, table
 from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Origin
-from campaign.identifying.method import Identified, Material
-from campaign.identifying.methods import inverse_dynamics, whole_model
+from campaign.identify.method import Identified, Material
+from campaign.identify.methods import inverse_dynamics, whole_model
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording
-from tests.identification.blind_rigs import RATE, BlindRig, blind_rigs
+from tests.estimation.blind_rigs import RATE, BlindRig, blind_rigs
 
 NAMES = (
     "inertia",

@@ -29,7 +29,7 @@ from campaign.experiments import experiments
 from campaign.experiments.preparing.axis_units import of_its_axis
 from campaign.experiments.shared.motion_series import kind_of
 from campaign.experiments.stabilization.hull_motion import SeriesMotion, ShipMotion
-from campaign.identifying.tables import systematic
+from campaign.identify.tables import systematic
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import facts_of

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
-from campaign.identification.stabilization_error import NO_SCATTER
+from campaign.estimation.stabilization_error import NO_SCATTER
 from campaign.result import Amount, Conclusion, Factor
 from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
 from campaign.units import convert

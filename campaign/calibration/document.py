@@ -14,8 +14,8 @@ from campaign.calibration.outcome import CalibrationOutcome
 from campaign.calibration.space import Parameter, Space
 from campaign.calibration.targets import Target, shortest
 from campaign.errors import CampaignError
-from campaign.identification.linear_uncertainty import strong
-from campaign.identification.multi_start import agreeing
+from campaign.estimation.linear_uncertainty import strong
+from campaign.estimation.multi_start import agreeing
 from campaign.protocol.bench_edit import with_known
 from campaign.protocol.files import Source
 from campaign.units import convert, split_quantity

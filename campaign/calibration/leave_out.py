@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from campaign.calibration.objective import Simulation
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import Target
-from campaign.identification.multi_start import Display, Settings, fit_from
-from campaign.identification.objective import Objective
+from campaign.estimation.multi_start import Display, Settings, fit_from
+from campaign.estimation.objective import Objective
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from campaign.calibration.leave_out import LeftOut, leave_one_out
 from campaign.calibration.objective import Evaluation, Simulation
 from campaign.calibration.problem import CalibrationProblem
+from campaign.estimation.linear_uncertainty import Uncertainty
+from campaign.estimation.multi_start import Display, Settings, Start, search
+from campaign.estimation.objective import Objective
 from campaign.experiments.interface import Experiment
-from campaign.identification.linear_uncertainty import Uncertainty
-from campaign.identification.multi_start import Display, Settings, Start, search
-from campaign.identification.objective import Objective
 from campaign.protocol.calibration import CalibrationOptions
 
 Array = NDArray[np.float64]

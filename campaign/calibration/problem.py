@@ -15,7 +15,7 @@ from campaign.calibration.targets import (
     weight_of,
 )
 from campaign.errors import Problem, ProtocolError, UsageError
-from campaign.identification.unknowns import Unknown
+from campaign.estimation.unknowns import Unknown
 from campaign.physics.bench import Bench
 from campaign.physics.known import number_at
 from campaign.protocol import Protocol

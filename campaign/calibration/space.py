@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.identification.unknowns import Unknown, values_at
+from campaign.estimation.unknowns import Unknown, values_at
 from campaign.protocol.schema import replaced
 from campaign.units import Quantity, convert
 

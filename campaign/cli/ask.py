@@ -13,8 +13,8 @@ from pathlib import Path
 from campaign.backends.interface import BackendKind
 from campaign.cli.output import print_note
 from campaign.errors import CampaignError, ExitCode, UsageError
-from campaign.execution.attendance import UNATTENDED, Attendance, wait_unless
 from campaign.execution.display import Shown, clock
+from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unless
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.protocol import PlannedTest

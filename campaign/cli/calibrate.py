@@ -20,8 +20,8 @@ from campaign.calibration.targets import shortest
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.cli.prepare import find_protocol
 from campaign.errors import ExitCode, UsageError
+from campaign.estimation.multi_start import Display, Progress, agreeing
 from campaign.experiments import experiments
-from campaign.identification.multi_start import Display, Progress, agreeing
 from campaign.interrupts import unwinding
 from campaign.physics.complete import PURPOSES
 from campaign.protocol import Protocol, load_protocol

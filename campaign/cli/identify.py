@@ -17,12 +17,12 @@ from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
-from campaign.identifying import methods
-from campaign.identifying.bench_document import bench_text, keys_by_method, nothing_to_write
-from campaign.identifying.identification import Identification, Section, identify
-from campaign.identifying.material import Chosen, choose
-from campaign.identifying.page import next_measurement, refuse_foreign, write_identification
-from campaign.identifying.tables import changes_table, told, words
+from campaign.identify import methods
+from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
+from campaign.identify.identification import Identification, Section, identify
+from campaign.identify.material import Chosen, choose
+from campaign.identify.page import next_measurement, refuse_foreign, write_identification
+from campaign.identify.tables import changes_table, told, words
 from campaign.interrupts import unwinding
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit

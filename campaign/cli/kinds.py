@@ -15,7 +15,7 @@ from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.export import exports
-from campaign.identifying import methods
+from campaign.identify import methods
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods

@@ -16,9 +16,9 @@ from campaign.archive.layout.journal import (
     TrialFinished,
     TrialsFollowed,
 )
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.layout.record import plain
 from campaign.archive.layout.signature_file import has_signature, signature_path
-from campaign.archive.layout.story import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_json, print_line, print_table

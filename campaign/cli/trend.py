@@ -13,7 +13,7 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
-from campaign.identifying import methods
+from campaign.identify import methods
 from campaign.interrupts import unwinding
 from campaign.resources import templates_folder
 from campaign.trending.page import write_trends

@@ -19,7 +19,7 @@ from campaign.comparing.draws import SIMULATION
 from campaign.comparing.pairing import PairedTest
 from campaign.comparing.words import display_unit
 from campaign.estimate import Estimate, Origin
-from campaign.identification.difference import BOUNDS, Difference, difference_of
+from campaign.estimation.difference import BOUNDS, Difference, difference_of
 from campaign.reason import NONE, Reason
 from campaign.result import Value
 

@@ -10,7 +10,7 @@ from campaign.comparing.judging import Pair, Verdict
 from campaign.comparing.overlays import Letters
 from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
-from campaign.identification.difference import in_unit
+from campaign.estimation.difference import in_unit
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER, Look
 from campaign.text import pretty_unit

@@ -14,7 +14,7 @@ from campaign.comparing.draws import common_draws
 from campaign.comparing.judging import Pair, Verdict
 from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
-from campaign.identification.difference import BOUNDS, in_unit
+from campaign.estimation.difference import BOUNDS, in_unit
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import interval, pretty_unit
 

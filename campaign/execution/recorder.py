@@ -29,7 +29,7 @@ from campaign.execution.judging import (
     undefined,
     wrong_time,
 )
-from campaign.execution.pace import Pace
+from campaign.execution.sample_latency import Pace
 from campaign.execution.supervision import Subscriber, Supervision, TrialStop
 from campaign.execution.writer import TrialWriter
 from campaign.physics.limit_watch import LimitWatch

@@ -17,8 +17,8 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
-from campaign.execution.attendance import UNATTENDED, Attendance
 from campaign.execution.executors import process_executor, thread_executor
+from campaign.execution.operator_prompts import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
 from campaign.execution.safety import Ended, safe_afterwards, unsafe_first

@@ -13,10 +13,10 @@ from queue import Empty, SimpleQueue
 from campaign.archive.layout.journal import Entry
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import Executed
-from campaign.execution.attendance import Attendance, SetUp
 from campaign.execution.batches import Batches
 from campaign.execution.decisions import Responses, Rests
 from campaign.execution.executors import BatchExecutor, WorkerLostError
+from campaign.execution.operator_prompts import Attendance, SetUp
 from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe

@@ -17,6 +17,8 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.relative_rate import STOP_FACTOR
+from campaign.estimation.sampled import at_sample, bracketed, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
@@ -31,8 +33,6 @@ from campaign.experiments.shared.friction_models import (
     simulated,
 )
 from campaign.experiments.shared.model_clauses import Rows, amount_of, at_ends, each_model
-from campaign.identification.relative_rate import STOP_FACTOR
-from campaign.identification.sampled import at_sample, bracketed, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (

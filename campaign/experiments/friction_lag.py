@@ -16,6 +16,9 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import of_repeats, shifted_by
+from campaign.estimation.sampled import LOST, SAMPLES, drop_interval_if_deterministic
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
@@ -29,9 +32,6 @@ from campaign.experiments.shared.friction_models import (
     simulated,
 )
 from campaign.experiments.shared.model_clauses import Rows, at_ends, each_model, without_rounding
-from campaign.identification.gate import admitted
-from campaign.identification.intervals import of_repeats, shifted_by
-from campaign.identification.sampled import LOST, SAMPLES, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
@@ -165,7 +165,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     scales = torque, torque, torque * options.amplitude
     each = zip(METRICS.items(), np.array(shapes).T, errors, scales, strict=True)
     return simulated(
-        where_it_scatters(_mean(name, values, unit, float(error)), scale)
+        drop_interval_if_deterministic(_mean(name, values, unit, float(error)), scale)
         for (name, unit), values, error, scale in each
     )
 

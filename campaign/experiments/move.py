@@ -10,12 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from campaign.channels import RELATIVE_ANGLE
+from campaign.estimation.intervals import of_series, shifted_by
+from campaign.estimation.sampled import shifted
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.model_clauses import MOST, Rows, amount_of, setting_of
-from campaign.identification.intervals import of_series, shifted_by
-from campaign.identification.sampled import shifted
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Cell, Column, Conclusion, Result, Table

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared import fitting_ramps
@@ -23,7 +24,6 @@ from campaign.experiments.shared.captions import amount, listed, sentence, trial
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import Place, in_models, places
 from campaign.experiments.shared.model_clauses import Rows, amount_of, at_ends, each_model
-from campaign.identification.intervals import shifted_by
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause

@@ -14,6 +14,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import of_repeats
+from campaign.estimation.scatter import relative_scatter
+from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
+from campaign.estimation.velocity_map import doubts
 from campaign.experiments.friction_map import fitting
 from campaign.experiments.friction_map.conclusions import repeatability_conclusions
 from campaign.experiments.friction_map.fits import fit_map
@@ -37,10 +41,6 @@ from campaign.experiments.interface import Experiment, TestData, TrialData, benc
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts
-from campaign.identification.intervals import of_repeats
-from campaign.identification.scatter import relative_scatter
-from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
-from campaign.identification.velocity_map import doubts
 from campaign.reason import Cause
 from campaign.result import (
     Array,

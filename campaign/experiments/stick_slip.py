@@ -15,6 +15,8 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import of_repeats, shifted_by
+from campaign.estimation.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
@@ -29,8 +31,6 @@ from campaign.experiments.shared.friction_models import (
     simulated,
 )
 from campaign.experiments.shared.model_clauses import Rows, amount_of, each_model
-from campaign.identification.intervals import of_repeats, shifted_by
-from campaign.identification.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause

@@ -16,6 +16,8 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import of_series
+from campaign.estimation.sampled import drop_interval_if_deterministic, largest
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
@@ -29,8 +31,6 @@ from campaign.experiments.shared.friction_models import (
     simulated,
 )
 from campaign.experiments.shared.model_clauses import MOST, Rows, amount_of, each_model
-from campaign.identification.intervals import of_series
-from campaign.identification.sampled import largest, where_it_scatters
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
@@ -120,7 +120,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
         of_series("rate", cut[LOAD_RATE], "rad/s"),
         of_series("friction_torque", cut[FRICTION_TORQUE], "N m"),
     )
-    return simulated(where_it_scatters(each, abs(each.value)) for each in found)
+    return simulated(drop_interval_if_deterministic(each, abs(each.value)) for each in found)
 
 
 @dataclass(frozen=True)

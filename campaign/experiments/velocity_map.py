@@ -13,7 +13,7 @@ from campaign.experiments.friction_map.choice import STAGE
 from campaign.experiments.friction_map.conclusions import map_conclusions
 from campaign.experiments.friction_map.figures import example_figure, fit_figure, map_figure
 from campaign.experiments.friction_map.fits import fit_map
-from campaign.experiments.friction_map.found import stretches_found
+from campaign.experiments.friction_map.map_fit import stretches_found
 from campaign.experiments.friction_map.pilot import PilotedMapOptions, settled_enough, trials
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.runs import (

@@ -26,7 +26,7 @@ ONE_DRAW = Cause("too few draws", "it takes two draws or more")
 DRAWS_ALIKE = Cause("draws alike", "all {draws} draws are alike")
 
 
-def but_for_seed(conditions: Mapping[str, Value]) -> dict[str, Value]:
+def without_seed(conditions: Mapping[str, Value]) -> dict[str, Value]:
     """What findings of several draws have in common."""
     return {name: value for name, value in conditions.items() if name != SEED}
 
@@ -63,7 +63,7 @@ def together(findings: Sequence[Finding], seeds: Collection[Value] = ()) -> Find
         told = Estimate.without_interval(
             first.quantity, value, first.unit, reason, origin=Origin.NOT_DETERMINED
         )
-    return Finding.of(told, but_for_seed(first.conditions), recomputed=first.recomputed)
+    return Finding.of(told, without_seed(first.conditions), recomputed=first.recomputed)
 
 
 def spread(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from campaign.estimate import Estimate, Origin
 from campaign.published.attempts import in_vain
-from campaign.published.draws import SEED, but_for_seed, place_in, together
+from campaign.published.draws import SEED, place_in, together, without_seed
 from campaign.published.evidence import Evidence, same, speaks_to, with_cells
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.status import Status, status_of
@@ -213,7 +213,7 @@ def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterat
         places: dict[str, list[Finding]] = {}
         for finding in test.findings:
             if speaks_to(finding, cell, test.known):
-                place = canonical_json(but_for_seed(finding.conditions))
+                place = canonical_json(without_seed(finding.conditions))
                 places.setdefault(place, []).append(finding)
         for findings in places.values():
             lines = [_line(cell, test, [finding], problems) for finding in findings]

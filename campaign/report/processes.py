@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from campaign import processes
 from campaign.archive import RunReader
-from campaign.archive.reading.heaps import known_heaps, told_of_heaps
+from campaign.archive.reading.global_heap_check import known_heaps, told_of_heaps
 from campaign.trial import Tree
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.identification.difference import in_unit
-from campaign.identification.intervals import LEVEL
+from campaign.estimation.difference import in_unit
+from campaign.estimation.intervals import LEVEL
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.trending.covariates import Covariate
 from campaign.trending.trends import Followed, Trends, Verdict

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from campaign.errors import UsageError
 from campaign.experiments.interface import bench_of
-from campaign.identifying.identification import Section, fitted_again, identify
-from campaign.identifying.material import Chosen
-from campaign.identifying.method import Method
+from campaign.identify.identification import Section, fitted_again, identify
+from campaign.identify.material import Chosen
+from campaign.identify.method import Method
 from campaign.plugins import Kinds
 from campaign.trending.members import Member
 from campaign.trending.series import TWIN, Point, Series, add_point, made

@@ -21,10 +21,10 @@ from campaign.comparing.doubts import DERIVED, FOLLOWS, WRONG_MODEL
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.words import condition_words, display_unit, name_here
 from campaign.estimate import Estimate, Origin
-from campaign.identification.contrast import is_student
-from campaign.identification.difference import BOUNDS, in_unit
-from campaign.identification.intervals import LEVEL, student
-from campaign.identification.trends.own_errors import moderated
+from campaign.estimation.contrast import is_student
+from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.intervals import LEVEL, student
+from campaign.estimation.trends.own_errors import moderated
 from campaign.reason import NONE, Cause, Reason
 from campaign.result import Finding, Value
 from campaign.trending.members import LEAST, Member

@@ -17,12 +17,12 @@ from campaign.channels import TEMPERATURE
 from campaign.comparing.circumstances import Change as Circumstance
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL
+from campaign.estimation.trends.changes import Change, Jump, change, jumps_of
+from campaign.estimation.trends.family import RATE, adjusted, detectable, level_of
+from campaign.estimation.trends.scatter import Mixture
 from campaign.experiments.interface import Experiment
-from campaign.identification.intervals import LEVEL
-from campaign.identification.trends.changes import Change, Jump, change, jumps_of
-from campaign.identification.trends.family import RATE, adjusted, detectable, level_of
-from campaign.identification.trends.scatter import Mixture
-from campaign.identifying.method import Method
+from campaign.identify.method import Method
 from campaign.plugins import Kinds
 from campaign.reason import NONE, Cause, Reason
 from campaign.trending.covariates import (

@@ -19,8 +19,8 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.recording import ChannelInfo, Ending, Outcome
 from campaign.report.build import build_report
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Result, Table
-from tests.identification.rigs import random_rigs
-from tests.identifying import conftest as rig_files
+from tests.estimation.rigs import random_rigs
+from tests.identify import conftest as rig_files
 from tests.report import made_up
 
 WORD = "W" * 10_000

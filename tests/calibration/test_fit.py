@@ -13,9 +13,9 @@ from campaign.calibration.objective import Simulation
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.cli.calibrate import _rows
 from campaign.errors import UsageError
+from campaign.estimation.multi_start import Progress
+from campaign.estimation.unknowns import shares_of
 from campaign.experiments import experiments
-from campaign.identification.multi_start import Progress
-from campaign.identification.unknowns import shares_of
 
 from .laboratory import FREQUENCIES, INERTIA, PROTOCOL, VISCOUS, error, problem, table, write
 

@@ -13,7 +13,7 @@ import pytest
 from campaign.calibration.known_values import known_entries
 from campaign.calibration.objective import Evaluation
 from campaign.calibration.outcome import CalibrationOutcome
-from campaign.identification.linear_uncertainty import Uncertainty
+from campaign.estimation.linear_uncertainty import Uncertainty
 
 from .laboratory import problem, write
 

@@ -7,7 +7,7 @@ import pytest
 from campaign.access.analysis import AnalysedTest
 from campaign.comparing.doubts import WRONG_MODEL, doubt
 from campaign.estimate import Origin
-from campaign.identification.intervals import with_error
+from campaign.estimation.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause
 from campaign.result import Finding

@@ -14,8 +14,8 @@ from campaign.comparing.pairing import pair_tests
 from campaign.comparing.tables import change_of
 from campaign.comparing.words import condition_words
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import with_error
 from campaign.experiments.interface import TestData
-from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.recording import Ending, Outcome
 from campaign.result import Finding, Result

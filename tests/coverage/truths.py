@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.estimation.stribeck import fit_stribeck, stribeck
 from campaign.experiments import experiments
 from campaign.experiments.friction_map.fits import MapFits, fit_map
 from campaign.experiments.friction_map.points import points_of, steady
-from campaign.identification.stribeck import fit_stribeck, stribeck
 from campaign.physics.bench import Bench
 from campaign.physics.complete import complete, control_rate
 from campaign.physics.lanes import Lane

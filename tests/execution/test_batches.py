@@ -11,8 +11,8 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
-from campaign.execution.attendance import Attendance, SimulatedOperator
 from campaign.execution.batches import LOOK_AHEAD, Batches
+from campaign.execution.operator_prompts import Attendance, SimulatedOperator
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan

@@ -18,8 +18,8 @@ import campaign
 from campaign.access.analysis import analyse_run
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.storage import CHUNK
-from campaign.archive.layout.story import read_lines
 from campaign.archive.verifying.verification import verify_run
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import LOAD_RATE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from campaign.errors import ExitCode
-from campaign.execution.attendance import Attendance, SimulatedOperator, wait_unless
+from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch

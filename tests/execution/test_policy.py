@@ -9,7 +9,7 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
-from campaign.execution.attendance import Attendance, SimulatedOperator, wait_unless
+from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan

@@ -14,7 +14,7 @@ import pytest
 from campaign.archive.layout.followed import trials_in
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
-from campaign.execution.attendance import Attendance, SimulatedOperator
+from campaign.execution.operator_prompts import Attendance, SimulatedOperator
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan

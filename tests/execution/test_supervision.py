@@ -17,10 +17,10 @@ from campaign.backends.calls import HEARTBEAT, Heartbeat
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
-from campaign.execution.pace import Pace
 from campaign.execution.progress import Progress
 from campaign.execution.recorder import LATE, SupervisingRecorder
 from campaign.execution.runner import run_plan
+from campaign.execution.sample_latency import Pace
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Patience, SilenceWatch, Supervision, TrialStop
 from campaign.recording import (

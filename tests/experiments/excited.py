@@ -9,8 +9,8 @@ from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
 from campaign.physics.bench import Bench
 from campaign.recording import Outcome
+from tests.estimation.excited_rigs import THREE
 from tests.experiments.laboratory import Done, analyse, execute, trials
-from tests.identification.excited_rigs import THREE
 
 SERIES = {"signal": "fourier", "period": "4 s", "periods": 2, "search": 20}
 LINES = {"signal": "multisine", "lowest": "1 Hz", "highest": "30 Hz", "period": "2 s"}

@@ -11,13 +11,14 @@ import pytest
 
 from campaign.channels import GYRO_RATE
 from campaign.estimate import Estimate, Kind, Systematic
+from campaign.estimation.intervals import with_error
 from campaign.experiments import experiments
 from campaign.experiments.breakaway.experiment import default_positions
 from campaign.experiments.breakaway.figures import DOTS, _what_shows
 from campaign.experiments.breakaway.means import _between, mean
-from campaign.identification.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.result import Result
+from tests.estimation.coverage import holds, rejected
 from tests.experiments.laboratory import (
     MADE_UP,
     Done,
@@ -28,7 +29,6 @@ from tests.experiments.laboratory import (
     table,
     trials,
 )
-from tests.identification.coverage import holds, rejected
 from tests.physics.benches import SIMULINK, bench
 
 PLATFORM = SIMULINK.with_name("platform.toml")

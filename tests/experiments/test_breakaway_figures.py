@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from campaign.estimate import Systematic
+from campaign.estimation.intervals import with_error
 from campaign.experiments.breakaway.figures import position_figure
 from campaign.experiments.breakaway.means import Ramps
-from campaign.identification.intervals import with_error
 from tests.experiments.laboratory import execute, trials
 from tests.experiments.test_breakaway import TWO, platform
 

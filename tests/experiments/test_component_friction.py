@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from campaign.estimation.readings import WITHIN_A_COUNT
 from campaign.experiments.interface import bench_of
-from campaign.identification.readings import WITHIN_A_COUNT
 from campaign.result import Result
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
 from tests.physics.benches import RATIO, bench

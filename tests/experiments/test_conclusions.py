@@ -12,6 +12,7 @@ import pytest
 
 from campaign.access.sentences import remarks, sentence
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.stabilization_error import NO_SCATTER, OF_ONE_TRIAL, quotient
 from campaign.experiments import experiments
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.force_rate import force_rate_conclusions
@@ -30,7 +31,6 @@ from campaign.experiments.shared.conclusion_parts import (
 )
 from campaign.experiments.shared.friction_models import Place
 from campaign.experiments.stabilization.conclusions import stabilization_conclusions
-from campaign.identification.stabilization_error import NO_SCATTER, OF_ONE_TRIAL, quotient
 from campaign.protocol import load_protocol, make_plan
 from campaign.result import Amount, Conclusion, Factor, Finding, Result
 from campaign.units import Quantity

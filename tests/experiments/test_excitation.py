@@ -12,13 +12,13 @@ import pytest
 
 from campaign.archive import ArchivedTrial
 from campaign.backends.serial import SerialBackend, SerialOptions
+from campaign.estimation.gate import UNPHYSICAL
 from campaign.experiments import experiments
 from campaign.experiments.excitation.account import dynamics_of, motion_of
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import Experiment
-from campaign.identification.gate import UNPHYSICAL
-from campaign.identifying.methods.frequency_response import METHOD as FREQUENCY_RESPONSE
-from campaign.identifying.methods.inverse_dynamics import METHOD as INVERSE_DYNAMICS
+from campaign.identify.methods.frequency_response import METHOD as FREQUENCY_RESPONSE
+from campaign.identify.methods.inverse_dynamics import METHOD as INVERSE_DYNAMICS
 from campaign.physics.bench import Bench
 from campaign.physics.limits import motion
 from campaign.protocol import check_limits, load_protocol, make_plan

@@ -10,9 +10,9 @@ from collections import defaultdict
 import pytest
 
 from campaign.estimate import Estimate
+from tests.estimation.coverage import holds, rejected
+from tests.estimation.excited_rigs import THREE
 from tests.experiments.excited import by_lines, by_series, true_dynamics
-from tests.identification.coverage import holds, rejected
-from tests.identification.excited_rigs import THREE
 
 SEEDS = range(1, 5)
 

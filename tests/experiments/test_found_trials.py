@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import lsim, lti
 
 from campaign.estimate import Window
+from campaign.estimation.step_response import NOT_SETTLED, step_characteristics
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response.experiment import _point
-from campaign.identification.step_response import NOT_SETTLED, step_characteristics
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Result
 from campaign.trial import Offered, Trial

@@ -14,6 +14,7 @@ from campaign.experiments.frequency_response.experiment import EXPERIMENT, _poin
 from campaign.physics.limits import margins
 from campaign.recording import Recording
 from campaign.result import Figure, Result
+from tests.estimation.coverage import holds
 from tests.experiments.laboratory import (
     analyse,
     execute,
@@ -23,7 +24,6 @@ from tests.experiments.laboratory import (
     table_of_estimates,
     trials,
 )
-from tests.identification.coverage import holds
 from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, RATIO, L, R, bench
 
 KIND = "frequency_response"

@@ -14,12 +14,12 @@ from scipy.integrate import solve_ivp
 
 from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Systematic
+from campaign.estimation.sampled import ALIKE, LOST
 from campaign.execution.measuring import checked
 from campaign.experiments import experiments
 from campaign.experiments.model_output.experiment import NO_REVERSAL
 from campaign.experiments.shared.friction_models import with_model
 from campaign.experiments.stick_slip import TOO_FEW_SLIPS
-from campaign.identification.sampled import ALIKE, LOST
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import Result

@@ -12,6 +12,9 @@ import pytest
 from campaign.channels import LOAD_RATE
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import SPANS_DECADES
+from campaign.estimation.presliding import Presliding
+from campaign.estimation.presliding_curve import Interface
 from campaign.experiments import experiments
 from campaign.experiments.breakaway import experiment as breakaway
 from campaign.experiments.interface import (
@@ -22,9 +25,6 @@ from campaign.experiments.interface import (
     result_of,
 )
 from campaign.experiments.preparing.unusable import NOT_MEASURED
-from campaign.identification.intervals import SPANS_DECADES
-from campaign.identification.presliding import Presliding
-from campaign.identification.presliding_curve import Interface
 from campaign.result import Column, Finding, Result, Table
 from tests.experiments.laboratory import Done, analyse, execute, finding, trials
 from tests.experiments.test_breakaway import TWO, load_only

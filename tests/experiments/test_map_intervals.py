@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import TOO_WIDE
+from campaign.estimation.velocity_map import direction_estimates, fit_direction
 from campaign.experiments.friction_map.figures import falls
 from campaign.experiments.friction_map.fits import MapFits, fit_map
 from campaign.experiments.friction_map.points import MapPoint, map_points, measure
 from campaign.experiments.friction_map.tables import fitted_torque
 from campaign.experiments.interface import bench_of
-from campaign.identification.gate import TOO_WIDE
-from campaign.identification.velocity_map import direction_estimates, fit_direction
 from campaign.physics.bench import Bench
 from campaign.result import Table
+from tests.estimation.coverage import holds, rejected
 from tests.experiments.laboratory import Done, analyse, execute, table_of_estimates, trials
-from tests.identification.coverage import holds, rejected
 from tests.physics.benches import SIMULINK
 
 SPEEDS = [f"{v:.6g} deg/s" for v in np.geomspace(0.05, 65.0, 16)]

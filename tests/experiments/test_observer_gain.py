@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.estimation.sine_amplitude import amplitude
+from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.observer_gain.experiment import EXPERIMENT, ObserverGainOptions
 from campaign.experiments.observer_gain.metrics import TOO_FEW, Gain, Rejection, measured_corner
-from campaign.identification.sine_amplitude import amplitude
-from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.recording import Ending, Outcome
 from tests.experiments.laboratory import analyse, execute, finding, table, trials
 from tests.physics.benches import bench

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from campaign.estimation.refinement import MOST
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response.experiment import (
     EXPERIMENT,
@@ -16,7 +17,6 @@ from campaign.experiments.frequency_response.experiment import (
     _request,
 )
 from campaign.experiments.interface import TestData, options_of
-from campaign.identification.refinement import MOST
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import samples_of
 from campaign.trial import Trial

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.estimation.threshold import Threshold
 from campaign.experiments.sensitivity.experiment import EXPERIMENT, SensitivityOptions
 from campaign.experiments.sensitivity.results import RANK, Response, judge, ranking
-from campaign.identification.threshold import Threshold
 from campaign.recording import Channel, Recording
 from tests.experiments.laboratory import (
     MADE_UP,

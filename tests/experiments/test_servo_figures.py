@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from campaign.estimation.servo import characteristics
 from campaign.experiments.frequency_response.figures import closed_loop_figures
 from campaign.experiments.frequency_response.marks import SIDE_BY_SIDE, place_names, servo_figure
 from campaign.experiments.frequency_response.tables import Sweep
-from campaign.identification.servo import characteristics
 from campaign.result import Figure, Mark, Panel
-from tests.identification.loops import closed, response
+from tests.estimation.loops import closed, response
 
 GAIN, DELAY = 2 * np.pi * 6.0, 2e-3
 """Of L = K exp(-s T) / s: crosses 0 dB at K, and -180 deg where w T is a quarter turn."""

@@ -19,8 +19,8 @@ from campaign.protocol.bench_file import load_bench
 from campaign.recording import MemoryRecorder
 from campaign.result import Result
 from campaign.trial import Trial
+from tests.estimation.coverage import holds, rejected
 from tests.experiments.laboratory import Done, analyse, finding, trials
-from tests.identification.coverage import holds, rejected
 
 KIND = "frequency_response"
 NEAR_3_DB = (5.0, 5.4, 5.8, 6.2, 6.5, 6.8, 7.1, 7.4, 7.7, 8.0, 8.4)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import with_error
 from campaign.experiments.stabilization.experiment import EXPERIMENT, StabilizationOptions
 from campaign.experiments.stabilization.identified_compensations import (
     beside_conclusions,
     beside_rows,
 )
-from campaign.identification.intervals import with_error
 from campaign.result import Factor
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials
 from tests.physics.benches import bench

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Window
+from campaign.estimation.sampled import LOST
+from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.stabilization.experiment import EXPERIMENT, OF_A_RECORD
-from campaign.identification.sampled import LOST
-from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.physics.bench import Bench
 from campaign.reason import NONE
 from campaign.trial import Trial
+from tests.estimation.coverage import holds, rejected
 from tests.experiments.laboratory import (
     Done,
     analyse,
@@ -29,7 +30,6 @@ from tests.experiments.laboratory import (
     table_of_estimates,
     trials,
 )
-from tests.identification.coverage import holds, rejected
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
 METHODS = [{"compensation": name} for name in ("none", "static", "lugre", "observer")]

@@ -8,12 +8,12 @@ import tomllib
 import pytest
 
 from campaign.axis_kind import sides_in, speaking_of
+from campaign.estimation.steadiness import NOT_REACHED, STICK_SLIP, drifting
 from campaign.experiments.friction_map.fits import fit_map
 from campaign.experiments.friction_map.fitting import velocity_map
 from campaign.experiments.friction_map.points import MapPoint, points_of, steady
 from campaign.experiments.friction_map.runs import VelocityMapOptions
 from campaign.experiments.shared.rig import Rig
-from campaign.identification.steadiness import NOT_REACHED, STICK_SLIP, drifting
 from campaign.physics.bench import Bench
 from tests.experiments.laboratory import Tree, analyse, execute, finding, trials
 from tests.physics.benches import SIMULINK, bench

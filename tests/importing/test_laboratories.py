@@ -23,7 +23,7 @@ EXCITED = {"inertia", "coulomb positive", "coulomb negative"}
 """What each of these motions asks for; viscous friction of some is small beside the others."""
 EVERY_METHOD = {"linear motor", "joint"}
 """Identified by every method, as the docs begin; the others by one that all of them suffice for, as
-what methods make of a motion is tried in tests/identifying."""
+what methods make of a motion is tried in tests/identify."""
 
 
 def campaign(*words: str) -> None:

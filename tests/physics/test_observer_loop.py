@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.identification.sine_amplitude import amplitude
+from campaign.estimation.sine_amplitude import amplitude
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.signals import Sine

@@ -16,7 +16,7 @@ from campaign.published.provenance import Place, Provenance
 from campaign.published.scoreboard import Line, score, to_csv
 from campaign.published.values import read_published
 from campaign.result import Finding
-from tests.identification.coverage import rejected
+from tests.estimation.coverage import rejected
 
 T2 = 4.302653  # Student's t with 2 degrees of freedom, 97.5 %: any table
 PUBLISHED = read_published(

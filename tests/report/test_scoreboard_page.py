@@ -17,8 +17,8 @@ from campaign.access.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.estimate import Estimate
+from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.interface import Experiment
-from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.scoreboard import Line, score
 from campaign.published.verdicts import reproduced

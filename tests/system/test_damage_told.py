@@ -18,7 +18,7 @@ import pytest
 import campaign
 from campaign.archive import ArchivedTrial, RunWriter, find_run, open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.story import read_lines
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_one_line
 from campaign.archive.reading.sound_samples import readable, without_damaged

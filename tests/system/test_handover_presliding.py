@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from campaign.archive import open_run
-from tests.identification.bristle_plants import Interface, Truth
+from tests.estimation.bristle_plants import Interface, Truth
 from tests.system.user import campaign, write
 
 PLANT = Truth(2.0, 1.0, (Interface(5000.0, 60.0, 8.0, 6.0, 0.01),))

@@ -20,8 +20,8 @@ from campaign.errors import DEBUG, PRECEDENCE, CampaignError, ExitCode, NoResult
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.identifying import methods
-from campaign.identifying.method import Identified, Material, Method
+from campaign.identify import methods
+from campaign.identify.method import Identified, Material, Method
 from campaign.options import Options
 from campaign.result import Finding, Result
 from tests.execution.test_measuring import numbered, run
@@ -58,7 +58,7 @@ def damaged(reader: RunReader, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
     """As if something of the run that no analysis reads were damaged."""
     found = replace(open_run(reader.path), damaged=(Damage("journal.jsonl:3", "a line is lost"),))
     with monkeypatch.context() as patch:
-        for module in ("campaign.cli.report", "campaign.identifying.material"):
+        for module in ("campaign.cli.report", "campaign.identify.material"):
             patch.setattr(f"{module}.open_run", lambda path: found)
         yield
 

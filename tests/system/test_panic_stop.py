@@ -22,7 +22,7 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.story import read_lines
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.cli.stop import stop_bench
 from campaign.errors import ExitCode
 from campaign.wire.codes import Kind

@@ -20,8 +20,8 @@ from typer.testing import CliRunner
 import campaign
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.journal import Decision
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.results import results_path
-from campaign.archive.layout.story import read_lines
 from campaign.archive.reading.results_file import read_results
 from campaign.cli.bench_commands import app
 from campaign.errors import ArchiveError, CampaignError

@@ -12,7 +12,7 @@ import pytest
 from campaign.cli import trend as command
 from campaign.cli.trend import trend_of_archives
 from campaign.errors import ExitCode, UsageError
-from campaign.identifying import methods
+from campaign.identify import methods
 
 
 @pytest.fixture

@@ -11,13 +11,13 @@ from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
+from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.run_folder import (
     PLAN,
     parse_plan,
     read_header,
     read_text,
 )
-from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.measured import measured_in, with_metrics

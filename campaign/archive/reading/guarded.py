@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from campaign.archive.layout.files import why
 from campaign.archive.layout.storage import CHECKSUM, LARGEST_CHUNK, SAMPLE
-from campaign.archive.reading.heaps import heaps_are_sound
+from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
 
 Array = NDArray[np.float64]

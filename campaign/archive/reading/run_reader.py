@@ -12,7 +12,7 @@ from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
-from campaign.archive.layout.story import Lines, read_lines
+from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.recording import SafeState

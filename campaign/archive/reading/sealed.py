@@ -16,10 +16,10 @@ from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
+from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
 from campaign.archive.layout.run_folder import parse_plan
 from campaign.archive.layout.storage import storable
-from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading import guarded
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList

@@ -8,8 +8,8 @@ from pathlib import Path
 from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.run_folder import read_header
-from campaign.archive.layout.story import read_lines
 from campaign.errors import ArchiveError
 
 

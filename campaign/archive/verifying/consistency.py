@@ -12,7 +12,7 @@ from campaign.archive.layout.followed import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader
 from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
-from campaign.archive.layout.story import Lines
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError

@@ -20,9 +20,9 @@ from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import PART, sha256_of
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.record import Trees, TrialRecord, series_of
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
-from campaign.archive.layout.story import Lines, read_lines
 from campaign.archive.reading import guarded
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.folder import open_folder

@@ -22,7 +22,7 @@ from campaign.archive.layout.journal import (
 )
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.measured import measured_in, with_metrics
-from campaign.archive.writing.beginning import make_folder
+from campaign.archive.writing.new_run_folder import make_folder
 from campaign.archive.writing.resuming import reopen
 from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.trial_writer import TrialWriter

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.shared.conclusion_parts import (
     Part,
     Parts,
@@ -21,7 +22,6 @@ from campaign.experiments.shared.conclusion_parts import (
     shown_by,
     varied,
 )
-from campaign.identification.stabilization_error import OF_ONE_TRIAL
 from campaign.result import Amount, Conclusion, Factor, Finding, Value
 
 TORQUE, STIFFNESS, AT_REST = "breakaway_torque", "bristle_stiffness", "stiffness_at_rest"

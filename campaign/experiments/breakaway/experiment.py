@@ -15,6 +15,17 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Origin, Window
+from campaign.estimation.breakaway_torque import breakaway_torque
+from campaign.estimation.found_excitation import found_ramp
+from campaign.estimation.presliding import Presliding, damping_by_ratio, fit_presliding
+from campaign.estimation.relative_rate import (
+    LONGEST,
+    RelativeRate,
+    made_of_counts,
+    resolved_rate,
+    slides_from,
+    stop_rate,
+)
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
 from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
@@ -28,17 +39,6 @@ from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.found_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
-from campaign.identification.breakaway_torque import breakaway_torque
-from campaign.identification.found_excitation import found_ramp
-from campaign.identification.presliding import Presliding, damping_by_ratio, fit_presliding
-from campaign.identification.relative_rate import (
-    LONGEST,
-    RelativeRate,
-    made_of_counts,
-    resolved_rate,
-    slides_from,
-    stop_rate,
-)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of

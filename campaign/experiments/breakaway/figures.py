@@ -10,10 +10,10 @@ import numpy as np
 
 from campaign.axis_kind import is_linear
 from campaign.estimate import Estimate
+from campaign.estimation.presliding import Presliding
+from campaign.estimation.presliding_curve import presliding_torque
 from campaign.experiments.breakaway.means import Ramps
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
-from campaign.identification.presliding import Presliding
-from campaign.identification.presliding_curve import presliding_torque
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, Value
 
 TORQUE = Axis("Drive torque", "N m", "N m")

@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.interface import TrialData
-from campaign.experiments.shared.systematic import shared_parts
-from campaign.identification.gate import admitted
-from campaign.identification.intervals import (
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import (
     difference,
     shifted_by,
     student,
     welch,
     with_error,
 )
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.systematic import shared_parts
 from campaign.reason import NONE
 from campaign.result import Value
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.breakaway_torque import STILL_RISING
+from campaign.estimation.presliding import NOT_RESOLVED, WINDOW
 from campaign.experiments.breakaway.means import MEASURED, Ramps
 from campaign.experiments.interface import bench_of
-from campaign.identification.breakaway_torque import STILL_RISING
-from campaign.identification.presliding import NOT_RESOLVED, WINDOW
 from campaign.units import angle_here, rate_here
 
 FEW_COUNTS = 10.0

@@ -17,20 +17,20 @@ from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.breakaway_torque import breakaway_torque
+from campaign.estimation.intervals import shifted_by
+from campaign.estimation.readings import (
+    RESOLUTION,
+    deviation_of_readings,
+    mean_of_readings,
+)
+from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.experiments.component_friction.conclusions import component_conclusions
 from campaign.experiments.component_friction.figures import Shown, component_figure
 from campaign.experiments.component_friction.sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
-from campaign.identification.breakaway_torque import breakaway_torque
-from campaign.identification.intervals import shifted_by
-from campaign.identification.readings import (
-    RESOLUTION,
-    deviation_of_readings,
-    mean_of_readings,
-)
-from campaign.identification.relative_rate import STOP_FACTOR
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import inertia_of

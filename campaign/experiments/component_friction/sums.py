@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from campaign.estimate import Estimate, Systematic
-from campaign.identification.intervals import welch, with_error
-from campaign.identification.readings import RESOLUTION
+from campaign.estimation.intervals import welch, with_error
+from campaign.estimation.readings import RESOLUTION
 from campaign.reason import NONE
 
 

@@ -10,18 +10,13 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
-from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.shared.common import OF_RECORDING
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.excitation_design.fourier import STILL
-from campaign.identification.frequency.best_linear import BestLinear, best_linear
-from campaign.identification.frequency.measured import MeasuredResponse
-from campaign.identification.frequency.welch import Record, welch_response
-from campaign.identification.gate import admitted_together
-from campaign.identification.inverse.coefficients import coefficients
-from campaign.identification.inverse.motion import (
+from campaign.estimation.excitation_design.fourier import STILL
+from campaign.estimation.frequency.best_linear import BestLinear, best_linear
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.welch import Record, welch_response
+from campaign.estimation.gate import admitted_together
+from campaign.estimation.inverse.coefficients import coefficients
+from campaign.estimation.inverse.motion import (
     REGRESSION_RATE,
     Filtering,
     Motion,
@@ -29,9 +24,14 @@ from campaign.identification.inverse.motion import (
     first_kept,
     motion_of_position,
 )
-from campaign.identification.inverse.regression import Regression
-from campaign.identification.inverse.rows import all_rows, moving, rows
-from campaign.identification.inverse.terms import TERMS, Term
+from campaign.estimation.inverse.regression import Regression
+from campaign.estimation.inverse.rows import all_rows, moving, rows
+from campaign.estimation.inverse.terms import TERMS, Term
+from campaign.experiments.excitation.options import ExcitationOptions
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.common import OF_RECORDING
+from campaign.experiments.shared.imported_scale import with_scale
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.physics.limits import motion as asked_of
 from campaign.recording import Recording
 from campaign.result import Array

@@ -12,19 +12,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.shared.multisine import MOST_LINES, PER_LINE
-from campaign.experiments.shared.rig import MOST, Rig
-from campaign.identification.excitation_design.fourier import (
+from campaign.estimation.excitation_design.fourier import (
     FourierSeries,
     Room,
     best_series,
     condition,
 )
-from campaign.identification.excitation_design.multisines import crest_factor, odd_multisine, peak
-from campaign.identification.excitation_design.noise import band_noise
-from campaign.identification.excitation_design.sweep import chirp
-from campaign.identification.frequency.multisine import OddGrid, odd_grid
+from campaign.estimation.excitation_design.multisines import crest_factor, odd_multisine, peak
+from campaign.estimation.excitation_design.noise import band_noise
+from campaign.estimation.excitation_design.sweep import chirp
+from campaign.estimation.frequency.multisine import OddGrid, odd_grid
+from campaign.experiments.excitation.options import ExcitationOptions
+from campaign.experiments.shared.multisine import MOST_LINES, PER_LINE
+from campaign.experiments.shared.rig import MOST, Rig
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate
 from campaign.physics.limits import worst_friction

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.experiments.excitation.account import (
     dynamics_of,
     metrics_of,
@@ -41,7 +42,6 @@ from campaign.experiments.shared.common import conditions, failures_note, groupe
 from campaign.experiments.shared.conclusion_parts import Settings, conclusion
 from campaign.experiments.shared.fitting import NO_ROOM, PEAK, usual
 from campaign.experiments.shared.rig import MOST, Rig
-from campaign.identification.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.physics.bench import Bench
 from campaign.result import Conclusion, Figure, Finding, Result, Table
 from campaign.trial import Task, TrialRequest

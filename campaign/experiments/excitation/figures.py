@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from campaign.channels import DRIVE_TORQUE
+from campaign.estimation.frequency.best_linear import BestLinear
+from campaign.estimation.frequency.distortion import Level
 from campaign.experiments.excitation.account import (
     Dynamics,
     Response,
@@ -19,8 +21,6 @@ from campaign.experiments.excitation.account import (
 )
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.captions import setting, trials_of
-from campaign.identification.frequency.best_linear import BestLinear
-from campaign.identification.frequency.distortion import Level
 from campaign.result import Array, Axis, Curve, Figure, Panel, Style
 from campaign.signals import MultiSine
 

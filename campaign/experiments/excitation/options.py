@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
+from campaign.estimation.excitation_design.sweep import Law
 from campaign.experiments.shared.motion_series import read_table
-from campaign.identification.excitation_design.sweep import Law
 from campaign.options import Options, TextFile
 from campaign.signals import Array, Polyline
 from campaign.units import (

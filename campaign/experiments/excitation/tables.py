@@ -9,12 +9,12 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
+from campaign.estimation.frequency.best_linear import BestLinear
+from campaign.estimation.frequency.distortion import total
+from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.excitation.account import Dynamics
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.shared.common import OF_RECORDING
-from campaign.identification.frequency.best_linear import BestLinear
-from campaign.identification.frequency.distortion import total
-from campaign.identification.inverse.terms import TERMS
 from campaign.physics.complete import limits_of
 from campaign.result import Cell, Column, Table
 

@@ -17,6 +17,12 @@ from pydantic import Field
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.frequency_response import Response, make_response
+from campaign.estimation.intervals import with_error
+from campaign.estimation.refinement import MOST as MOST_REFINED
+from campaign.estimation.refinement import PHASE_SHARE, refinement
+from campaign.estimation.servo import characteristics
+from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.frequency_response.conclusions import (
     closed_loop_conclusions,
     open_loop_conclusions,
@@ -63,12 +69,6 @@ from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.found_trials import sine_response
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
-from campaign.identification.frequency_response import Response, make_response
-from campaign.identification.intervals import with_error
-from campaign.identification.refinement import MOST as MOST_REFINED
-from campaign.identification.refinement import PHASE_SHARE, refinement
-from campaign.identification.servo import characteristics
-from campaign.identification.sine_point import SinePoint, sine_point
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaign.estimation.continuation import DECIBEL, Continuation
+from campaign.estimation.frequency_response import Response, open_loop
+from campaign.estimation.servo import ServoCharacteristics
 from campaign.experiments.frequency_response.marks import bandwidths, margins
-from campaign.identification.continuation import DECIBEL, Continuation
-from campaign.identification.frequency_response import Response, open_loop
-from campaign.identification.servo import ServoCharacteristics
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")

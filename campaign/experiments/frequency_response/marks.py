@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.frequency_response import Response
+from campaign.estimation.servo import Crossing, ServoCharacteristics
 from campaign.experiments.frequency_response.tables import QUANTITIES, Sweep, method
 from campaign.experiments.shared.common import short_label
 from campaign.experiments.shared.pointing_error import ends
-from campaign.identification.frequency_response import Response
-from campaign.identification.servo import Crossing, ServoCharacteristics
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 LABELLED = 4

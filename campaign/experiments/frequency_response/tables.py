@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.elastic_mode import elastic_mode
+from campaign.estimation.frequency_response import Response
+from campaign.estimation.servo import Crossing, ServoCharacteristics, change
 from campaign.experiments.interface import TrialData
-from campaign.identification.elastic_mode import elastic_mode
-from campaign.identification.frequency_response import Response
-from campaign.identification.servo import Crossing, ServoCharacteristics, change
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.signals import Sine

@@ -9,6 +9,9 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.friction_memory import memory_angle
+from campaign.estimation.map_design import curves_around, telling_speeds
+from campaign.estimation.stribeck import PARAMETERS
 from campaign.experiments.friction_map.fits import MapFits, fit_map
 from campaign.experiments.friction_map.pilot import (
     REVERSAL,
@@ -33,9 +36,6 @@ from campaign.experiments.friction_map.runs import (
 )
 from campaign.experiments.interface import Stage, TestData, TrialData
 from campaign.experiments.shared.rig import Rig
-from campaign.identification.friction_memory import memory_angle
-from campaign.identification.map_design import curves_around, telling_speeds
-from campaign.identification.stribeck import PARAMETERS
 from campaign.physics.bench import Bench
 from campaign.trial import TrialRequest
 from campaign.units import angle_here, in_words

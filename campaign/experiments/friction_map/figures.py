@@ -9,14 +9,14 @@ from functools import partial
 import numpy as np
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
+from campaign.estimation.intervals import student
+from campaign.estimation.stribeck import UNITS, stribeck
+from campaign.estimation.velocity_map import DirectionFit, band
 from campaign.experiments.friction_map.fits import MapFits
 from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
 from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
-from campaign.identification.intervals import student
-from campaign.identification.stribeck import UNITS, stribeck
-from campaign.identification.velocity_map import DirectionFit, band
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 RATE = Axis("Rate", "rad/s", "deg/s")

@@ -8,14 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.experiments.friction_map.points import MapPoint
-from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
-from campaign.identification.both_directions import fitted_nominal
-from campaign.identification.ripple import Ripple, ripple_of_points, window_noise
-from campaign.identification.sampled import where_it_scatters
-from campaign.identification.stribeck import PARAMETERS, fit_stribeck
-from campaign.identification.velocity_map import (
+from campaign.estimation.both_directions import fitted_nominal
+from campaign.estimation.ripple import Ripple, ripple_of_points, window_noise
+from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.stribeck import PARAMETERS, fit_stribeck
+from campaign.estimation.velocity_map import (
     DirectionFit,
     Model,
     fit_direction,
@@ -23,6 +20,9 @@ from campaign.identification.velocity_map import (
     passed,
     shifts,
 )
+from campaign.experiments.friction_map.points import MapPoint
+from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
 from campaign.result import Array
 
@@ -81,7 +81,7 @@ class MapFits:
         return shifts(self.fits[direction].fits[model], self.shift[direction])
 
     def _shifted(self, told: Estimate, effects: Mapping[str, float]) -> Estimate:
-        told = where_it_scatters(told, abs(told.value), DIGITS)
+        told = drop_interval_if_deterministic(told, abs(told.value), DIGITS)
         if not told.has_interval:
             return told
         if told.name in TORQUES:

@@ -10,17 +10,17 @@ import numpy as np
 from campaign.axis_kind import unit_here
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
-from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
-from campaign.experiments.interface import TrialData, bench_of, metrics
-from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
-from campaign.identification.ripple import (
+from campaign.estimation.ripple import (
     FASTEST,
     Harmonic,
     dominant_periods,
     harmonic,
 )
-from campaign.identification.steadiness import TOO_FEW_COUNTS, drifting
-from campaign.identification.steady_sliding import SteadySliding, steady_sliding
+from campaign.estimation.steadiness import TOO_FEW_COUNTS, drifting
+from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
+from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
+from campaign.experiments.interface import TrialData, bench_of, metrics
+from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording

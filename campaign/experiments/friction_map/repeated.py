@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL, student
+from campaign.estimation.stribeck import SYMBOLS, UNITS
 from campaign.experiments.friction_map.figures import OWN_TORQUE, SPEED, point_bars
 from campaign.experiments.friction_map.fits import MapFits
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.captions import amount, listed
-from campaign.identification.intervals import LEVEL, student
-from campaign.identification.stribeck import SYMBOLS, UNITS
 from campaign.result import Array, Axis, Curve, Figure, Panel
 
 ASIDE = 0.1

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.both_directions import correlation
+from campaign.estimation.intervals import with_error
+from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
+from campaign.estimation.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.experiments.friction_map.fits import DIGITS, MapFits
 from campaign.experiments.friction_map.points import MapPoint, told_periods
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.both_directions import correlation
-from campaign.identification.intervals import with_error
-from campaign.identification.sampled import where_it_scatters
-from campaign.identification.stribeck import PARAMETERS, SYMBOLS, UNITS
-from campaign.identification.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.units import angle_here
@@ -77,13 +77,13 @@ def _point_row(point: MapPoint) -> dict[str, Cell]:
         clean = replace(told, systematic=torque.systematic)
     return {
         "speed": point.speed,
-        "rate": where_it_scatters(point.rate, abs(point.rate.value), DIGITS),
-        "torque": where_it_scatters(torque, abs(torque.value), DIGITS),
+        "rate": drop_interval_if_deterministic(point.rate, abs(point.rate.value), DIGITS),
+        "torque": drop_interval_if_deterministic(torque, abs(torque.value), DIGITS),
         "spread": point.spread,
         "window": point.window,
         "rule": point.rule,
         "ripple": point.ripple,
-        "without_ripple": where_it_scatters(clean, abs(clean.value), DIGITS),
+        "without_ripple": drop_interval_if_deterministic(clean, abs(clean.value), DIGITS),
     }
 
 

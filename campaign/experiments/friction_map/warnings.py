@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from campaign.estimation.extrapolated import FAR, FEWEST_BELOW
+from campaign.estimation.ripple import FASTEST, LEAST_PERIODS
+from campaign.estimation.stribeck import PARAMETERS
 from campaign.experiments.friction_map.runs import (
     Run,
     VelocityMapOptions,
@@ -16,9 +19,6 @@ from campaign.experiments.friction_map.runs import (
     speed_range,
 )
 from campaign.experiments.shared.rig import Rig
-from campaign.identification.extrapolated import FAR, FEWEST_BELOW
-from campaign.identification.ripple import FASTEST, LEAST_PERIODS
-from campaign.identification.stribeck import PARAMETERS
 from campaign.physics.bench import Bench
 from campaign.physics.true_values import stribeck_parameters
 from campaign.units import angle_here, rate_here

@@ -16,6 +16,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.sampled import LOST, at_sample, bracketed, named, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.model_output.conclusions import model_output_conclusions
 from campaign.experiments.model_output.figures import (
@@ -40,7 +41,6 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.identification.sampled import LOST, at_sample, bracketed, named, peak
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause

@@ -9,17 +9,17 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD
 from campaign.estimate import Estimate
-from campaign.experiments.interface import TrialData, bench_of
-from campaign.experiments.shared.common import conditions
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.identification.friction_line import (
+from campaign.estimation.friction_line import (
     FrictionLine,
     friction_line,
     in_order_of_time,
     mean_of_stretches,
 )
-from campaign.identification.gate import admitted
-from campaign.identification.intervals import difference, shifted_by
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import difference, shifted_by
+from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.common import conditions
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.reason import Cause
 from campaign.result import Value
 

@@ -22,6 +22,8 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.estimate import Estimate
+from campaign.estimation.steady_sliding import steady_sliding
+from campaign.estimation.steady_stretches import FEWEST, SHORTEST_TIME, steady_stretches
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.motion.account import account_of
 from campaign.experiments.motion.conclusions import motion_conclusions
@@ -33,8 +35,6 @@ from campaign.experiments.motion.tables import (
     summary_table,
 )
 from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
-from campaign.identification.steady_sliding import steady_sliding
-from campaign.identification.steady_stretches import FEWEST, SHORTEST_TIME, steady_stretches
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.recording import Recording

@@ -19,6 +19,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.experiments.interface import Chosen, Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_gain.conclusions import observer_conclusions
 from campaign.experiments.observer_gain.figures import (
@@ -42,7 +43,6 @@ from campaign.experiments.shared.choices import Choices, nice, share
 from campaign.experiments.shared.common import with_changes
 from campaign.experiments.shared.pointing_error import windows_of
 from campaign.experiments.shared.rig import MOST
-from campaign.identification.intervals import LEVEL, shifted_by
 from campaign.options import Options
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench

@@ -9,11 +9,11 @@ import numpy as np
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL
+from campaign.estimation.sine_amplitude import amplitude
+from campaign.estimation.stabilization_error import over_blocks, over_trials
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.shared.pointing_error import error_of, found, measured_part, of_each
-from campaign.identification.intervals import LEVEL
-from campaign.identification.sine_amplitude import amplitude
-from campaign.identification.stabilization_error import over_blocks, over_trials
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, control_rate

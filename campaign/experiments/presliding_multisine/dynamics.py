@@ -9,16 +9,16 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import shifted_by
+from campaign.estimation.presliding import damping_by_ratio
+from campaign.estimation.presliding_dynamics.driven_torque import Driven, driven_torques
+from campaign.estimation.presliding_dynamics.plant import Appendage
+from campaign.estimation.presliding_dynamics.presliding_fit import PreslidingDynamics
+from campaign.estimation.presliding_dynamics.record import Assumed, Record
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.presliding_multisine.held_current import between_samples
 from campaign.experiments.shared.captions import amount
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.identification.intervals import shifted_by
-from campaign.identification.presliding import damping_by_ratio
-from campaign.identification.presliding_dynamics.driven_torque import Driven, driven_torques
-from campaign.identification.presliding_dynamics.found import PreslidingDynamics
-from campaign.identification.presliding_dynamics.plant import Appendage
-from campaign.identification.presliding_dynamics.record import Assumed, Record
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.loop import at_load

@@ -15,6 +15,10 @@ from pydantic import Field
 from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.presliding_dynamics.presliding_fit import (
+    PreslidingDynamics,
+    identify_presliding_dynamics,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.presliding_multisine.dynamics import (
     QUANTITIES,
@@ -35,10 +39,6 @@ from campaign.experiments.shared.multisine import (
     below_breakaway,
     first_slip,
     odd_multisine,
-)
-from campaign.identification.presliding_dynamics.found import (
-    PreslidingDynamics,
-    identify_presliding_dynamics,
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench

@@ -16,6 +16,8 @@ from pydantic import Field
 
 from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.stabilization_error import over_trials
+from campaign.estimation.threshold import Threshold
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.sensitivity.conclusions import sensitivity_conclusions
 from campaign.experiments.sensitivity.figures import (
@@ -40,8 +42,6 @@ from campaign.experiments.shared.pointing_error import (
     of_each,
     windows_of,
 )
-from campaign.identification.stabilization_error import over_trials
-from campaign.identification.threshold import Threshold
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import pointing_high_pass

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from campaign.estimate import Origin
+from campaign.estimation.threshold import Threshold
 from campaign.experiments.sensitivity.results import Judged
 from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import ends
-from campaign.identification.threshold import Threshold
 from campaign.result import Axis, Curve, Figure, Mark, Panel, Value
 from campaign.units import in_words
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.identification.threshold import Threshold, crossing, passing
+from campaign.estimation.threshold import Threshold, crossing, passing
 from campaign.reason import Cause
 from campaign.result import (
     Array,

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import LEVEL, ratio, student
+from campaign.estimation.stabilization_error import NO_SCATTER, OF_ONE_TRIAL
 from campaign.experiments.interface import TestData, bench_of
-from campaign.identification.intervals import LEVEL, ratio, student
-from campaign.identification.stabilization_error import NO_SCATTER, OF_ONE_TRIAL
 from campaign.options import Options, describe
 from campaign.reason import Cause
 from campaign.result import Amount, Conclusion, Factor, Finding, Value

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from campaign.axis_kind import is_linear
+from campaign.estimation.relative_rate import LONGEST, STOP_FACTOR, WORST_COUNT, stop_rate
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.choices import Choices, Reasons, nice, share
 from campaign.experiments.shared.fitting import DEG, MILLIMETRE, PEAK, overcome_friction, usual
 from campaign.experiments.shared.rig import MOST, SLOW, Rig
-from campaign.identification.relative_rate import LONGEST, STOP_FACTOR, WORST_COUNT, stop_rate
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate, limits_of
 from campaign.physics.steady_friction import steady_friction

@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.channels import BASE_RATE, COMMAND, GYRO_RATE
 from campaign.estimate import Window
-from campaign.identification.found_excitation import (
+from campaign.estimation.found_excitation import (
     FoundStretch,
     found_sine,
     found_step,

@@ -10,10 +10,10 @@ from typing import Any
 from pydantic import JsonValue, ValidationError
 
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import shifted_by
+from campaign.estimation.sampled import together
 from campaign.experiments.interface import Metrics, TrialData, metrics
 from campaign.experiments.shared.common import grouped
-from campaign.identification.intervals import shifted_by
-from campaign.identification.sampled import together
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.result import Column, Value

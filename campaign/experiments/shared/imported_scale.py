@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import TrialData
-from campaign.identification.intervals import shifted_by
 
 SOURCE = "constant of the {} column"
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from campaign.estimation.excitation_design.passage import first_passage
 from campaign.experiments.interface import Chosen
 from campaign.experiments.shared.choices import Choices, nice
 from campaign.experiments.shared.rig import Rig
-from campaign.identification.excitation_design.passage import first_passage
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.loop import at_load

@@ -13,8 +13,8 @@ import numpy as np
 
 from campaign.channels import POINTING_ERROR
 from campaign.estimate import Estimate, Window
+from campaign.estimation import stabilization_error
 from campaign.experiments.interface import TrialData, metrics
-from campaign.identification import stabilization_error
 from campaign.recording import Recording
 from campaign.result import Array, ends_of
 from campaign.signals import Sine

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from campaign.estimate import Estimate, Systematic
-from campaign.identification.intervals import shifted_by
+from campaign.estimation.intervals import shifted_by
 from campaign.physics.bench import Bench
 
 TORQUE_CONSTANT = "motor.torque_constant"

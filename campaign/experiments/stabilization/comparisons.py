@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from campaign.estimation.stabilization_error import decrease, quotient
 from campaign.experiments.interface import TrialData, bench_of
-from campaign.identification.stabilization_error import decrease, quotient
 from campaign.result import Finding, Value
 
 

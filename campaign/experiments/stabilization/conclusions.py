@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from campaign.estimation.stabilization_error import NO_SCATTER
 from campaign.experiments.shared.common import method
 from campaign.experiments.shared.conclusion_parts import (
     Parts,
@@ -22,7 +23,6 @@ from campaign.experiments.shared.conclusion_parts import (
     shown_by,
     varied,
 )
-from campaign.identification.stabilization_error import NO_SCATTER
 from campaign.result import Amount, Conclusion, Factor, Finding, Value
 
 ERROR, GAIN, GROWTH = "stabilization_error", "error_reduction", "error_growth"

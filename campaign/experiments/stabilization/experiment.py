@@ -25,6 +25,10 @@ from campaign.channels import (
     missing,
 )
 from campaign.estimate import Estimate
+from campaign.estimation.prediction_interval import of_next
+from campaign.estimation.sampled import LOST
+from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
+from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
@@ -54,10 +58,6 @@ from campaign.experiments.stabilization.identified_compensations import (
     beside_rows,
     beside_table,
 )
-from campaign.identification.place import of_next
-from campaign.identification.sampled import LOST
-from campaign.identification.stabilization_error import BLOCKS, over_trials, whole_cycles
-from campaign.identification.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import pointing_high_pass

@@ -9,6 +9,7 @@ import numpy as np
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, POINTING_ERROR
 from campaign.estimate import Estimate, Window
+from campaign.estimation.relative_rate import mean
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.captions import amount
 from campaign.experiments.shared.common import conditions, method_label
@@ -22,7 +23,6 @@ from campaign.experiments.shared.pointing_error import (
 from campaign.experiments.shared.swept_words import words
 from campaign.experiments.stabilization.errors import BARE, COMPENSATION, error_figures
 from campaign.experiments.stabilization.reversal_figures import TIME, can_be_shown, reversal
-from campaign.identification.relative_rate import mean
 from campaign.options import Options
 from campaign.recording import Recording
 from campaign.result import Array, Axis, Cell, Curve, Figure, Mark, Panel

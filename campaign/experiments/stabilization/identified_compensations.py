@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from campaign.estimate import Estimate
+from campaign.estimation.stabilization_error import quotient
 from campaign.experiments.shared.common import METHOD_LABELS
 from campaign.experiments.shared.conclusion_parts import (
     conclusion,
@@ -12,7 +13,6 @@ from campaign.experiments.shared.conclusion_parts import (
     held_at_once,
     shown_by,
 )
-from campaign.identification.stabilization_error import quotient
 from campaign.physics.compensation.identified import stated_name
 from campaign.result import Cell, Column, Conclusion, Factor, Table
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.channels import BASE_RATE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE, missing
+from campaign.estimation.relative_rate import RelativeRate, relative_rate
 from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import rate_of
-from campaign.identification.relative_rate import RelativeRate, relative_rate
 from campaign.recording import Recording
 from campaign.result import Array, Axis, Curve, Mark, Panel
 from campaign.units import angle_here, rate_here

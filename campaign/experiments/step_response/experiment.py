@@ -11,6 +11,14 @@ from pydantic import Field, ValidationError, field_validator
 
 from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.intervals import of_repeats
+from campaign.estimation.rise_time import rise_interval
+from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.step_response import (
+    NOT_SETTLED,
+    StepCharacteristics,
+    step_characteristics,
+)
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import fitting
 from campaign.experiments.shared.common import (
@@ -25,14 +33,6 @@ from campaign.experiments.shared.found_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.experiments.step_response.conclusions import step_conclusions
 from campaign.experiments.step_response.results import Step, step_figure, step_table
-from campaign.identification.intervals import of_repeats
-from campaign.identification.rise_time import rise_interval
-from campaign.identification.sampled import where_it_scatters
-from campaign.identification.step_response import (
-    NOT_SETTLED,
-    StepCharacteristics,
-    step_characteristics,
-)
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -283,7 +283,7 @@ def _together(repeats: Sequence[Step], name: str, unit: str) -> Estimate:
         # Told where all read alike: their values may differ by less than a text shows.
         why = unseen[0] if len(set(map(str, unseen))) == 1 else NOT_SEEN()
         return Estimate.without_interval(name, math.nan, unit, why)
-    return where_it_scatters(of_repeats(name, values, unit), max(map(abs, values)))
+    return drop_interval_if_deterministic(of_repeats(name, values, unit), max(map(abs, values)))
 
 
 EXPERIMENT = Experiment(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep, RunResumed, TrialsFollowed
-from campaign.archive.layout.story import Lines
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.reason import Cause
 from campaign.report.content.drift import drift_figure, drift_table, drifts_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from campaign.identification.stabilization_error import OF_ONE_TRIAL
+from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.published.headline import is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status

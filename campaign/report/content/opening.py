@@ -13,8 +13,8 @@ from campaign.axis_kind import speaking_of
 from campaign.published.headline import NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
 from campaign.report.content.predicted import Predicted
+from campaign.report.content.run_problems import wrong_with
 from campaign.report.content.truth import biases, held
-from campaign.report.content.wrong import wrong_with
 from campaign.result import Factor, Figure, Result, Table
 
 FROM = {

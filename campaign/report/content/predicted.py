@@ -18,14 +18,14 @@ from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.difference import Difference, difference_of
+from campaign.estimation.trends.family import RATE, adjusted
 from campaign.experiments.interface import bench_of
-from campaign.identification.difference import Difference, difference_of
-from campaign.identification.trends.family import RATE, adjusted
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import why_altered
 from campaign.physics.stated_values import stated_value
 from campaign.physics.true_values import QUANTITIES
-from campaign.report.content.truth import SIMULATED, conditions_text, is_of, says_again
+from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import number, quantity_words
@@ -118,7 +118,7 @@ def _pairs(findings: Sequence[Finding], trials: Sequence[Trial]) -> Iterator[_Pa
         stated = stated_value(bench, finding.quantity, finding.conditions, finding.unit)
         if stated is not None:
             compared = difference_of(stated, finding.known)
-            yield _Pair(finding, stated, compared, says_again(finding, known))
+            yield _Pair(finding, stated, compared, duplicate_of(finding, known))
 
 
 def _is_in(finding: Finding, mean: Finding) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from campaign.access.analysis import AnalysedTest
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep
-from campaign.archive.layout.story import Lines
+from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import trial_number
 from campaign.archive.reading.sound_samples import sound_part

@@ -18,8 +18,8 @@ from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.axis_kind import speaking_of, words_here
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import student
 from campaign.experiments.interface import bench_of
-from campaign.identification.intervals import student
 from campaign.physics.bench import Bench
 from campaign.physics.true_values import QUANTITIES, true_of, true_value
 from campaign.physics.truth import simulated
@@ -99,7 +99,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
         for finding in test.result.findings
         if finding.quantity in QUANTITIES and not finding.recomputed
     ]
-    again = [says_again(finding, known) for finding in known]
+    again = [duplicate_of(finding, known) for finding in known]
     found = [_row(finding, trials, benches, units) for finding in known]
     pairs = [(row, why) for row, why in zip(found, again, strict=True) if row is not None]
     rows = [{**row, COUNTED: not why} for row, why in pairs]
@@ -204,7 +204,7 @@ def _is_mean(finding: Finding) -> bool:
     return conditions.get("statistic") == "mean" or conditions.get("direction") in MEANS
 
 
-def says_again(finding: Finding, others: Sequence[Finding]) -> str:
+def duplicate_of(finding: Finding, others: Sequence[Finding]) -> str:
     """As what a finding says again what others of its quantity say; "" where it says its own."""
     beside = [each for each in others if each.quantity == finding.quantity]
     if _is_mean(finding) and not all(map(_is_mean, beside)):

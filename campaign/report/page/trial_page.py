@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from campaign.archive.reading.damage_words import in_words
 from campaign.channels import RELATIVE_ANGLE, RELATIVE_RATE
-from campaign.identification.relative_rate import relative_rate
+from campaign.estimation.relative_rate import relative_rate
 from campaign.recording import Channel, Recording
 from campaign.report.content import tables
 from campaign.report.content.trial_account import TrialAccount, account_of, lost_account

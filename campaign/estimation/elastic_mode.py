@@ -1,0 +1,168 @@
+"""The first elastic mode in a torque-to-rate response: a resonance beside an antiresonance.
+
+An elastic part hung on the load multiplies the smooth response of the rigid axis by
+
+    (wz^2 - w^2 + 2 i dz wz w) / (wp^2 - w^2 + 2 i dp wp w) * wp^2 / wz^2
+
+with its own frequency as antiresonance wz, and the resonance wp of part and load together. Their
+intervals follow from what the fit leaves over, be it noise or friction: Student's t, with the
+freedom of as many residuals as neighbours do not know of each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency_response import Array, ComplexArray, Response
+from campaign.estimation.intervals import with_error
+
+SPAN = 2.0
+"""The response is smooth, but for the mode, from the candidate over this to the candidate times
+this: a complex parabola over the logarithm of frequency."""
+FEWEST_POINTS = 12
+EVIDENCE = 4.0
+"""A mode must divide the squared residual of a smooth response by this ..."""
+SMALLEST_PEAK = 0.03
+"""... and stand out of it by this share."""
+APART = 0.3
+"""Logarithm of antiresonance over resonance up to which the parabola stands for all else."""
+NEARLY = 0.99
+"""of that is at this bound: the response is no small mode on top of a smooth one."""
+
+
+@dataclass(frozen=True)
+class ElasticMode:
+    """A mode found.
+
+    Attributes:
+        frequency: its resonance (Hz).
+        damping_ratio: of that resonance.
+        antiresonance: (Hz); below the resonance for a part that hangs on the load.
+        explained: squared residual of a smooth response over that with the mode.
+    """
+
+    frequency: Estimate
+    damping_ratio: Estimate
+    antiresonance: Estimate
+    explained: float
+
+
+def elastic_mode(response: Response) -> ElasticMode | None:
+    """The most prominent mode of a response.
+
+    None when the response is smooth without one, and where antiresonance and resonance lie too far
+    apart.
+    """
+    frequency = response.frequency
+    logarithm = np.log(np.maximum(np.abs(response.values), 1e-300)) + 1j * response.phase
+    best: tuple[float, float] | None = None
+    for candidate in frequency:
+        window = _window(frequency, float(candidate))
+        if np.count_nonzero(window) < FEWEST_POINTS or not window[:-1].any():
+            continue
+        for damping in (0.01, 0.03, 0.1):
+            gain = _evidence(frequency[window], logarithm[window], float(candidate), damping)
+            if best is None or gain > best[0]:
+                best = gain, float(candidate)
+    return None if best is None else _refine(frequency, logarithm, best[1])
+
+
+def _window(frequency: Array, centre: float) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (frequency >= centre / SPAN) & (frequency <= centre * SPAN)
+    # A mode at the edge of the sweep cannot be told from the smooth part.
+    whole = frequency[0] <= centre / SPAN**0.5 and frequency[-1] >= centre * SPAN**0.5
+    return inside if whole else np.zeros_like(inside)
+
+
+def _smooth(frequency: Array) -> ComplexArray:
+    log = np.log(frequency / frequency[len(frequency) // 2])
+    return np.column_stack([np.ones_like(log), log, log**2]).astype(complex)
+
+
+def _left(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """What is left of `values` after the best combination of `basis`."""
+    found, *_ = np.linalg.lstsq(basis, values, rcond=None)
+    return np.asarray(values - basis @ found)
+
+
+def _evidence(frequency: Array, values: ComplexArray, centre: float, damping: float) -> float:
+    """By what a small mode at `centre` divides the squared residual."""
+    basis = _smooth(frequency)
+    small = frequency**2 / (centre**2 - frequency**2 + 2j * damping * centre * frequency)
+    without = np.sum(np.abs(_left(basis, values)) ** 2)
+    with_mode = np.sum(np.abs(_left(np.column_stack([basis, small]), values)) ** 2)
+    return float(without / max(with_mode, 1e-30))
+
+
+def _mode(frequency: Array, p: Array) -> ComplexArray:
+    """Log of the factor above; p: resonance, its damping, log(antiresonance / resonance), its."""
+    pole, zero = p[0], p[0] * np.exp(p[2])
+    up = zero**2 - frequency**2 + 2j * p[3] * zero * frequency
+    down = pole**2 - frequency**2 + 2j * p[1] * pole * frequency
+    return np.asarray(np.log(up / down * (pole / zero) ** 2))
+
+
+def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMode | None:
+    from scipy.optimize import least_squares
+
+    window = _window(frequency, centre)
+    f, y = frequency[window], values[window]
+    basis = _smooth(f)
+
+    def residual(p: Array) -> Array:
+        left = _left(basis, np.asarray(y - _mode(f, p)))
+        return np.concatenate([left.real, left.imag])
+
+    lower, upper = [centre / 1.3, 1e-4, -APART, 1e-4], [centre * 1.3, 0.5, APART, 0.5]
+    fits = [
+        least_squares(residual, [centre, 0.03, shift, 0.03], bounds=(lower, upper))
+        for shift in (-0.01, 0.01)
+    ]
+    fit = min(fits, key=lambda each: float(each.cost))
+    smooth = float(np.sum(np.abs(_left(basis, y)) ** 2))
+    explained = smooth / max(2.0 * float(fit.cost), 1e-30)
+    peak = float(np.max(np.abs(np.exp(_mode(np.linspace(f[0], f[-1], 2000), fit.x)) - 1.0)))
+    if explained < EVIDENCE or peak < SMALLEST_PEAK or abs(fit.x[2]) > NEARLY * APART:
+        return None
+    return _mode_found(fit.x, fit.jac, fit.fun, explained)
+
+
+def _mode_found(p: Array, jacobian: Array, left: Array, explained: float) -> ElasticMode:
+    """The mode of the parameters `p` of `_mode`, with intervals.
+
+    The smooth part is linear and projected out of residuals and Jacobian alike, so that J^T J is
+    the information on the mode alone.
+    """
+    freedom = _freedom(left, len(p) + 6)  # the parabola has six real numbers
+    variance = float(left @ left) / freedom if freedom > 0 else np.nan
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * variance
+    pole, damping, shift = (float(value) for value in p[:3])
+    zero = pole * float(np.exp(shift))
+    by_zero = np.array([zero / pole, 0.0, zero, 0.0])
+
+    def estimate(name: str, value: float, unit: str, gradient: Array) -> Estimate:
+        error = float(np.sqrt(gradient @ covariance @ gradient))
+        return with_error(name, value, unit, error, freedom, "mode on top of a smooth response")
+
+    return ElasticMode(
+        estimate("elastic_mode_frequency", pole, "Hz", np.eye(4)[0]),
+        estimate("damping_ratio", damping, "", np.eye(4)[1]),
+        estimate("antiresonance", zero, "Hz", by_zero),
+        explained,
+    )
+
+
+def _freedom(left: Array, parameters: int) -> float:
+    """Degrees of freedom of residuals over frequency (real parts, then imaginary parts).
+
+    Neighbours that resemble each other count less, by (1 - r) / (1 + r) of their correlation r.
+    """
+    halves = left.reshape(2, -1)
+    power = float(np.sum(halves**2))
+    together = float(np.sum(halves[:, 1:] * halves[:, :-1])) / power if power > 0 else 0.0
+    alike = min(max(together, 0.0), 0.95)
+    return (len(left) - parameters) * (1.0 - alike) / (1.0 + alike)

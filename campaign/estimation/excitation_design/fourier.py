@@ -1,0 +1,215 @@
+"""A Fourier series of an angle from which an inverse dynamic model is told best.
+
+Its coefficients are searched for the lowest condition number of the model's columns, within limits
+on angle, rate and acceleration (Swevers, Ganseman, Tükel, De Schutter and Van Brussel, "Optimal
+robot excitation and identification", IEEE Trans. Robot. Autom. 13 (1997) 730). Columns count with
+unit length, so that no choice of units decides; the series is then as large as the limits let it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array, Motion
+from campaign.estimation.inverse.terms import TERMS
+from campaign.signals import MultiSine
+
+PER_CYCLE = 64
+"""Points per cycle of the highest harmonic, at which a series is looked at."""
+STILL = 0.02
+"""of the largest rate: slower samples do not count; friction there is whatever holds the axis."""
+POPULATION = 40
+"""Series that a search carries on with."""
+SCALES, CROSSED = (0.4, 0.9), 0.9
+"""Differential evolution: range of its scale factor, and share of coefficients that it crosses."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Largest magnitudes that a series may have; rad, rad/s, rad/s^2, or m of a linear axis.
+
+    angle: of the swing around its middle.
+    """
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class FourierSeries:
+    """sum of sine[k] sin(2 pi (k+1) t / period) + cosine[k] cos(2 pi (k+1) t / period).
+
+    Attributes:
+        period: (s).
+        sine, cosine: of the angle (rad), each of shape (harmonics,).
+    """
+
+    period: float
+    sine: tuple[float, ...]
+    cosine: tuple[float, ...]
+
+    def sample(self, time: Array, order: int = 0) -> Array:
+        """The angle or its `order`-th derivative at `time` (s), shape (n,), in closed form."""
+        omega = 2.0 * np.pi * np.arange(1.0, len(self.sine) + 1.0) / self.period
+        turned = np.outer(time, omega) + 0.5 * np.pi * order
+        sized = omega**order
+        return np.asarray(
+            np.sin(turned) @ (sized * self.sine) + np.cos(turned) @ (sized * self.cosine)
+        )
+
+    @property
+    def rate(self) -> MultiSine:
+        """Its first derivative as a signal (rad/s)."""
+        sine, cosine = np.array(self.sine), np.array(self.cosine)
+        harmonic = np.arange(1.0, len(sine) + 1.0)
+        size = np.hypot(sine, cosine) * 2.0 * np.pi * harmonic / self.period
+        return MultiSine(
+            amplitudes=tuple(map(float, size)),
+            frequencies=tuple(float(f"{k / self.period:.12g}") for k in harmonic),
+            phases=tuple(map(float, np.arctan2(sine, -cosine))),
+        )
+
+    def motion(self, middle: float = 0.0) -> Motion:
+        """One period on a grid that misses no extreme by more than 0.12 %, around `middle`."""
+        time = _grid(len(self.sine)) * self.period
+        angle, rate, acceleration = (self.sample(time, order) for order in range(3))
+        return Motion(time, middle + angle, rate, acceleration, np.zeros_like(time))
+
+
+def _grid(harmonics: int) -> Array:
+    """Shares of a period."""
+    count = PER_CYCLE * harmonics
+    return np.arange(count) / count
+
+
+def condition(motion: Motion, terms: Sequence[str]) -> float:
+    """Condition number of the columns of these terms, each of unit length; infinite for none.
+
+    Samples that are slower than `STILL` of the largest rate do not count.
+    """
+    columns = np.stack([TERMS[name].column(motion) for name in terms], axis=-1)
+    return float(_conditions((columns * _moves(motion.rate)[:, None])[None])[0])
+
+
+def _moves(rate: Array) -> Array:
+    """1 where a series moves and 0 where it stands still; rate: shape (..., n), as what returns."""
+    size = np.abs(rate)
+    return np.asarray(size >= STILL * np.max(size, axis=-1, keepdims=True), dtype=float)
+
+
+def _conditions(columns: Array) -> Array:
+    """Of each of p sets of columns, shape (p, n, k): shape (p,)."""
+    length = np.linalg.norm(columns, axis=1)
+    alike = np.einsum("pnk,pnl->pkl", columns, columns)
+    product = length[:, :, None] * length[:, None, :]
+    whole = np.all(length > 0, axis=1)
+    found = np.full(len(columns), np.inf)
+    values = np.linalg.eigvalsh(alike[whole] / product[whole])
+    with np.errstate(divide="ignore"):
+        found[whole] = np.sqrt(values[:, -1] / np.maximum(values[:, 0], 0.0))
+    return found
+
+
+def random_series(
+    period: float, harmonics: int, room: Room, count: int, seed: int
+) -> list[FourierSeries]:
+    """Series with random coefficients, each as large as the room lets it; see `best_series`."""
+    random = np.random.default_rng(seed)
+    drawn = _allowed(random.standard_normal((count, 2 * harmonics)), period, room)
+    return [_series(period, each) for each in drawn]
+
+
+@lru_cache(maxsize=32)  # a plan asks for the same one again and again
+def best_series(
+    period: float,
+    harmonics: int,
+    terms: tuple[str, ...],
+    room: Room,
+    middle: float,
+    generations: int,
+    seed: int,
+) -> FourierSeries:
+    """The series with the lowest condition number that a seeded search finds.
+
+    By differential evolution (Storn and Price, J. Global Optim. 11 (1997) 341) from random series.
+    Rate and acceleration begin at zero, so that a bench at rest is not jerked.
+
+    Args:
+        terms: names of the model's terms (`identification.inverse.terms`).
+        middle: angle around which it swings (rad): gravity depends on it.
+
+    Raises ValueError for fewer than two harmonics, no room, a term that there is not, and terms
+    that no motion tells apart.
+    """
+    unknown = [name for name in terms if name not in TERMS or "temperature" in name]
+    if unknown:
+        known = ", ".join(name for name in TERMS if "temperature" not in name)
+        raise ValueError(f"there is no term {unknown[0][:60]!r} to excite; there are {known}")
+    if harmonics < 2:
+        raise ValueError("one harmonic cannot begin at rest: two are the fewest")
+    if not min(room.angle, room.rate, room.acceleration) > 0:
+        raise ValueError("the limits leave no room to move")
+    random = np.random.default_rng(seed)
+    size = 2 * harmonics
+    best = _allowed(random.standard_normal((POPULATION, size)), period, room)
+    scores = _scores(best, terms, period, middle)
+    for _ in range(generations):
+        one, two = (best[random.permutation(POPULATION)] for _ in range(2))
+        scale = random.uniform(*SCALES, (POPULATION, 1))
+        towards = best[int(np.argmin(scores))] - best
+        tried = best + scale * (towards + one - two)
+        kept = random.uniform(size=(POPULATION, size)) > CROSSED
+        tried = _allowed(np.where(kept, best, tried), period, room)
+        fresh = _scores(tried, terms, period, middle)
+        better = fresh < scores
+        best[better], scores[better] = tried[better], fresh[better]
+    if not np.isfinite(np.min(scores)) or np.min(scores) > 1e6:
+        raise ValueError(f"no motion tells {', '.join(terms)} apart: leave one of them out")
+    return _series(period, best[int(np.argmin(scores))])
+
+
+def _series(period: float, coefficients: Array) -> FourierSeries:
+    half = len(coefficients) // 2
+    sine, cosine = coefficients[:half], coefficients[half:]
+    return FourierSeries(period, tuple(map(float, sine)), tuple(map(float, cosine)))
+
+
+def _allowed(coefficients: Array, period: float, room: Room) -> Array:
+    """The nearest that begin at rest, as large as the room lets them, shape (p, 2 harmonics)."""
+    half = coefficients.shape[1] // 2
+    harmonic = np.arange(1.0, half + 1.0)
+    sine, cosine = coefficients[:, :half], coefficients[:, half:]
+    # No rate at the beginning: sum of k sine[k]; no acceleration: sum of k^2 cosine[k].
+    sine = sine - np.outer(sine @ harmonic, harmonic) / np.sum(harmonic**2)
+    cosine = cosine - np.outer(cosine @ harmonic**2, harmonic**2) / np.sum(harmonic**4)
+    rested = np.concatenate([sine, cosine], axis=1)
+    bounds = (room.angle, room.rate, room.acceleration)
+    peaks = [np.max(np.abs(each), axis=1) for each in _path(rested, period)]
+    # Between the points a series of that degree is at most so much larger (Ehlich and Zeller 1964).
+    between = 1.0 / math.cos(math.pi / PER_CYCLE)
+    used = np.max([between * p / bound for p, bound in zip(peaks, bounds, strict=True)], axis=0)
+    return np.asarray(rested / np.maximum(used, 1e-300)[:, None])
+
+
+def _path(coefficients: Array, period: float) -> tuple[Array, Array, Array]:
+    """Angle, rate and acceleration of p series on the grid, each of shape (p, n)."""
+    half = coefficients.shape[1] // 2
+    omega = 2.0 * np.pi * np.arange(1.0, half + 1.0) / period
+    turned = np.outer(omega * period, _grid(half))
+    sine, cosine = np.sin(turned), np.cos(turned)
+    a, b = coefficients[:, :half], coefficients[:, half:]
+    rate = (a * omega) @ cosine - (b * omega) @ sine
+    return a @ sine + b @ cosine, rate, -((a * omega**2) @ sine + (b * omega**2) @ cosine)
+
+
+def _scores(coefficients: Array, terms: Sequence[str], period: float, middle: float) -> Array:
+    angle, rate, acceleration = _path(coefficients, period)
+    moved = Motion(np.zeros(0), middle + angle, rate, acceleration, np.zeros(0))
+    columns = np.stack([TERMS[name].column(moved) for name in terms], axis=-1)
+    return _conditions(columns * _moves(rate)[..., None])

@@ -1,0 +1,92 @@
+"""Odd multisines as commands: a low crest factor, and a beginning that jerks nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from campaign.estimation.excitation_design.passage import first_passage
+from campaign.estimation.frequency.multisine import Lines, OddGrid, random_phases
+from campaign.estimation.inverse.motion import Array
+from campaign.signals import MultiSine
+
+POINTS = 16
+"""Points per cycle of the highest line."""
+CLIPPED = (0.75, 0.98)
+"""of its peak at which a signal is clipped, in the first round and in the last."""
+ROUNDS = 400
+
+
+def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order: int) -> MultiSine:
+    """One realisation on the lines of a grid, of rms 1.
+
+    Args:
+        draws: how many sets of random phases, of which the one with the lowest crest factor counts.
+        lowered: whether phases are then changed to lower it further (`low_crest`).
+        order: it begins where its `order`-th integral of zero mean passes zero: 0 for a rate, which
+            then begins at rest, 1 for a torque, after which a free load does not drift.
+    """
+    signal = random_phases(grid, 1.0, seed, draws=draws)
+    phases = np.array(signal.phases)
+    if lowered:
+        phases = low_crest(grid.excited, phases)
+    begun = _begun(grid.excited, phases, order)
+    frequencies = tuple(float(f"{f:.12g}") for f in grid.frequency)
+    return MultiSine(
+        amplitudes=signal.amplitudes, frequencies=frequencies, phases=tuple(map(float, begun))
+    )
+
+
+def low_crest(lines: Lines, phases: Array, rounds: int = ROUNDS) -> Array:
+    """Phases (rad) of sines of equal size with a lower crest factor than those that it begins with.
+
+    A signal is clipped, and its phases are kept (Van der Ouderaa, Schoukens and Renneboog, IEEE
+    Trans. Instrum. Meas. 37 (1988) 145); the best of all rounds counts. lines: multiples of the
+    base frequency, shape (k,), as phases.
+    """
+    count = POINTS * int(lines[-1])
+    best, lowest = phases, np.inf
+    for share in np.linspace(*CLIPPED, rounds):
+        course = _course(lines, phases, count)
+        peak = float(np.max(np.abs(course)))
+        if peak < lowest:
+            best, lowest = phases, peak
+        level = share * peak
+        spectrum = np.fft.rfft(np.clip(course, -level, level))
+        phases = np.angle(spectrum[lines]) + 0.5 * np.pi
+    return np.asarray(best % (2.0 * np.pi))
+
+
+def peak(signal: MultiSine, period: float) -> float:
+    """Largest magnitude of a multisine of that period (s), on 64 points of its fastest cycle."""
+    count = 4 * POINTS * round(max(signal.frequencies) * period)
+    lines = np.round(np.array(signal.frequencies) * period).astype(int)
+    phases = np.array(signal.phases)
+    return float(np.max(np.abs(_course(lines, phases, count, np.array(signal.amplitudes)))))
+
+
+def crest_factor(signal: MultiSine, period: float) -> float:
+    """Largest magnitude over rms."""
+    rms = np.sqrt(0.5 * np.sum(np.square(signal.amplitudes)))
+    return peak(signal, period) / float(rms)
+
+
+def _course(
+    lines: Lines, phases: Array, count: int, amplitudes: Array | float = 1.0, order: int = 0
+) -> Array:
+    """One period of sines in `count` points, or its `order`-th integral but for its scale."""
+    spectrum = np.zeros(count // 2 + 1, dtype=complex)
+    spectrum[lines] = amplitudes * np.exp(1j * (phases - 0.5 * np.pi)) / (1j * lines) ** order
+    return np.asarray(np.fft.irfft(spectrum, count) * count / 2.0)
+
+
+def _begun(lines: Lines, phases: Array, order: int) -> Array:
+    """The same signal from where its `order`-th integral first passes zero."""
+    count = POINTS * int(lines[-1])
+    course = _course(lines, phases, count, 1.0, order)
+    size = 1.0 / lines.astype(float) ** order
+
+    def value(share: float) -> float:
+        turned = 2.0 * np.pi * lines * share + phases - 0.5 * np.pi * order
+        return float(np.sum(size * np.sin(turned)))
+
+    return np.asarray((phases + 2.0 * np.pi * first_passage(course, value) * lines) % (2.0 * np.pi))

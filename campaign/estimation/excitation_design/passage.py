@@ -1,0 +1,28 @@
+"""Where a periodic signal passes zero: a command that begins there jerks nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array
+
+BISECTIONS = 60
+
+
+def first_passage(course: Array, value: Callable[[float], float]) -> float:
+    """Share of its period at which a signal first passes zero, to all digits.
+
+    course: one period of it, evenly sampled, finely enough that its first change of sign between
+    two samples is a single passage. value: the signal itself, at a share of its period.
+    """
+    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
+    low, high = index / len(course), (index + 1) / len(course)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if value(low) * value(middle) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)

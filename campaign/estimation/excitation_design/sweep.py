@@ -1,0 +1,76 @@
+"""A sine whose frequency runs from one to another: a chirp, as points on its course."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array
+
+Law = Literal["linear", "logarithmic"]
+PER_CYCLE = 32
+"""Points per cycle: straight lines between them miss the sine by half a percent at most."""
+
+
+@dataclass(frozen=True)
+class Chirp:
+    """sin(phase(t)), from 0 to a whole number of cycles.
+
+    Attributes:
+        lowest, highest: frequency at the beginning and at the end (Hz).
+        duration: (s).
+        law: linear: the frequency grows by the same each second; logarithmic: by the same factor.
+    """
+
+    lowest: float
+    highest: float
+    duration: float
+    law: Law
+
+    def frequency(self, time: Array) -> Array:
+        """At once, at `time` (s), shape (n,) (Hz)."""
+        share = time / self.duration
+        if self.law == "linear":
+            return np.asarray(self.lowest + (self.highest - self.lowest) * share)
+        return np.asarray(self.lowest * (self.highest / self.lowest) ** share)
+
+    def phase(self, time: Array) -> Array:
+        """The integral of 2 pi `frequency` from 0, at `time` (s), shape (n,) (rad)."""
+        share = time / self.duration
+        if self.law == "linear":
+            cycles = (
+                self.duration * share * (self.lowest + 0.5 * (self.highest - self.lowest) * share)
+            )
+        else:
+            grown = math.log(self.highest / self.lowest)
+            cycles = self.duration * self.lowest * np.expm1(grown * share) / grown
+        return np.asarray(2.0 * np.pi * cycles)
+
+    def points(self) -> Array:
+        """Times (s) at even steps of phase, `PER_CYCLE` of each cycle, shape (n,)."""
+        whole = round(float(self.phase(np.array([self.duration]))[0] / (2.0 * np.pi)))
+        cycles = np.arange(whole * PER_CYCLE + 1) / PER_CYCLE
+        if self.law == "linear":
+            slope = (self.highest - self.lowest) / self.duration
+            time = 2.0 * cycles / (self.lowest + np.sqrt(self.lowest**2 + 2.0 * slope * cycles))
+        else:
+            grown = math.log(self.highest / self.lowest) / self.duration
+            time = np.log1p(grown * cycles / self.lowest) / grown
+        return np.minimum(time, self.duration)
+
+
+def chirp(lowest: float, highest: float, duration: float, law: Law) -> Chirp:
+    """A sweep of about that duration (s): of a whole number of cycles, so that it ends at 0.
+
+    Raises ValueError where `highest` is not above `lowest`, and for less than a cycle.
+    """
+    if not 0.0 < lowest < highest:
+        raise ValueError("highest must be above lowest")
+    cycles = float(Chirp(lowest, highest, duration, law).phase(np.array([duration]))[0])
+    cycles /= 2.0 * np.pi
+    if round(cycles) < 1:
+        raise ValueError(f"{duration:.4g} s are less than a cycle: raise lowest, or sweep longer")
+    return Chirp(lowest, highest, duration * round(cycles) / cycles, law)

@@ -1,0 +1,220 @@
+"""Best linear approximation of a nonlinear system from repeated multisines: the robust method.
+
+Over realisations of the phases everything scatters that is not linear, over periods only noise
+does; so the two are told apart (Pintelon and Schoukens, "System Identification: A Frequency Domain
+Approach" (2012), 4.3). A best linear approximation belongs to its excitation: its rms, band and
+distribution are part of what it says, and stand in the result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimation.frequency.distortion import Distortion, detected
+from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.multisine import Lines
+from campaign.estimation.frequency.welch import Excited
+from campaign.estimation.frequency_response import Array, ComplexArray
+
+FEWEST_REALISATIONS = 7
+"""below which a variance over realisations is no weight for a fit (Pintelon, Schoukens: 4.3.1)."""
+
+
+NOTHING = 1e-9
+"""Share of the largest line below which there is no input at a line."""
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a best linear approximation belongs to.
+
+    Attributes:
+        rms: of the input without its mean, in its unit.
+        lowest, highest: of the excited lines (Hz).
+        lines: how many are excited.
+        crest: largest value of the input over its rms, the mean over realisations.
+        odd: whether no line of even number is excited.
+        unit: of the input, for people.
+    """
+
+    rms: float
+    realisations: int
+    periods: int
+    lowest: float
+    highest: float
+    lines: int
+    crest: float
+    odd: bool = True
+    unit: str = ""
+
+    def __str__(self) -> str:
+        rms = f"{self.rms:.4g} {self.unit}".rstrip()
+        kind = "odd random-phase" if self.odd else "odd and even"
+        return (
+            f"{kind} multisine, {self.lines} lines from "
+            f"{self.lowest:.4g} to {self.highest:.4g} Hz, rms {rms}, crest factor "
+            f"{self.crest:.3g}, {self.realisations} realisations of {self.periods} periods"
+        )
+
+
+@dataclass(frozen=True)
+class BestLinear:
+    """The response at the excited lines, and what else the output holds.
+
+    Attributes:
+        response: its variance is that over realisations, noise and stochastic nonlinear part alike;
+            of a single realisation that of noise alone (see `undetermined`).
+        noise: variance of the response by noise, shape (n,); NaN for a single period.
+        nonlinear: variance of the response of *one* realisation by the stochastic nonlinear part,
+            shape (n,); NaN where it is not determined.
+        distortion: what the output holds at detection lines; None for a single period.
+        transient: largest share of the output that transient or drift had at an excited line.
+        undetermined: what this measurement cannot tell, and why, in sentences.
+    """
+
+    response: MeasuredResponse
+    noise: Array
+    nonlinear: Array
+    distortion: Distortion | None
+    excitation: Excitation
+    transient: float
+    undetermined: tuple[str, ...]
+
+
+def best_linear(
+    input_: Array,
+    output: Array,
+    rate: float,
+    periods: int,
+    excited: Lines,
+    acts_on: Excited = "input",
+    reference: Array | None = None,
+) -> BestLinear:
+    """From whole periods of realisations, signals of shape (m, periods * samples) at `rate` (Hz).
+
+    The first period may hold the transient: it is told from the lines between those of the period.
+
+    Args:
+        excited: lines of the period that the excitation has, rising, shape (k,).
+        acts_on: `input`: the input was decided outside; `reference`: the input is made by a loop,
+            and `reference` is what comes into it from outside, shape (m, periods * samples).
+
+    Raises ValueError for a loop without its reference, for shapes that do not fit, and where an
+    excited line has no input.
+    """
+    if acts_on == "reference" and reference is None:
+        raise ValueError(
+            "a closed loop without its reference: output over input would be a mixture of the "
+            "plant and its controller; record what comes into the loop from outside"
+        )
+    signals = [np.atleast_2d(input_), np.atleast_2d(output)]
+    if reference is not None:
+        signals.append(np.atleast_2d(reference))
+    if len({each.shape for each in signals}) > 1:
+        raise ValueError("input, output and reference differ in shape")
+    samples = signals[0].shape[1] // max(periods, 1)
+    found = line_spectra(np.stack(signals), rate, periods, (excited[-1] + 1.5) * rate / samples)
+    if len(found.frequency) < excited[-1]:
+        raise ValueError("the highest excited line lies above half the sampling rate")
+    leading = found.lines[2 if reference is not None else 0]
+    phase = leading / np.maximum(np.abs(leading), 1e-300)
+    response, noise, nonlinear = _response(found.conjugated(phase), excited - 1)
+    described = _excitation(signals[0], found, excited)
+    distortion = None
+    if found.noise is not None:
+        distortion = detected(found, found.noise, excited, response.values)
+    level = np.mean(np.abs(found.lines[1][:, excited - 1]), axis=0)
+    passing = np.mean(np.abs(found.transient[1][:, excited - 1]), axis=0)
+    return BestLinear(
+        response,
+        noise,
+        nonlinear,
+        distortion,
+        described,
+        float(np.max(passing / np.maximum(level, 1e-300))),
+        _undetermined(described),
+    )
+
+
+def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array, Array]:
+    """Response, its variance by noise, and the nonlinear variance of one realisation."""
+    lines = found.lines[:2][..., at]
+    realisations = lines.shape[1]
+    mean = np.mean(lines, axis=1)
+    largest = float(np.max(np.abs(found.lines[0])))
+    if np.any(np.abs(mean[0]) <= NOTHING * largest):
+        raise ValueError("an excited line has no input; are these its lines?")
+    values = mean[1] / mean[0]
+    nothing = np.full(len(at), np.nan)
+    noise = nothing
+    if found.noise is not None:
+        noise = _spread(values, found.noise[at, :2, :2], mean[0]) / realisations
+    if realisations > 1:
+        apart = lines - mean[:, None]
+        spread = np.einsum("amk,bmk->kab", apart, np.conj(apart)) / (realisations - 1)
+        variance = _spread(values, spread, mean[0]) / realisations
+        freedom = 2.0 * (realisations - 1)
+        nonlinear = np.maximum(realisations * (variance - noise), 0.0)
+    else:
+        variance, freedom, nonlinear = noise, found.freedom, nothing
+    power = np.mean(np.abs(lines[1]) ** 2, axis=0)
+    linear = np.abs(values) ** 2 * np.mean(np.abs(lines[0]) ** 2, axis=0)
+    response = MeasuredResponse(
+        found.frequency[at],
+        values,
+        variance,
+        np.full(len(at), freedom),
+        np.minimum(linear / np.maximum(power, 1e-300), 1.0),
+        np.zeros(len(at)),
+        "best linear approximation",
+    )
+    return response, noise, nonlinear
+
+
+def _spread(values: ComplexArray, covariance: ComplexArray, input_: ComplexArray) -> Array:
+    """Variance of output over input, of the covariance (k, 2, 2) of input and output."""
+    row = np.stack([-values, np.ones_like(values)], axis=1)
+    total = np.einsum("ka,kab,kb->k", row, covariance, np.conj(row)).real
+    return np.asarray(np.maximum(total, 0.0) / np.abs(input_) ** 2)
+
+
+def _excitation(input_: Array, found: LineSpectra, excited: Lines) -> Excitation:
+    moving = input_ - np.mean(input_, axis=1, keepdims=True)
+    rms = np.sqrt(np.mean(moving**2, axis=1))
+    crest = np.max(np.abs(moving), axis=1) / np.maximum(rms, 1e-300)
+    ends = found.frequency[excited[[0, -1]] - 1]
+    return Excitation(
+        float(np.sqrt(np.mean(rms**2))),
+        input_.shape[0],
+        found.periods,
+        float(ends[0]),
+        float(ends[1]),
+        len(excited),
+        float(np.mean(crest)),
+        bool(np.all(excited % 2 == 1)),
+    )
+
+
+def _undetermined(excitation: Excitation) -> tuple[str, ...]:
+    """What too few realisations and periods leave open."""
+    told = []
+    if excitation.periods < 2:
+        told.append(
+            "Noise is not determined by a single period, nor which part of a line is distortion, "
+            "nor what a transient adds: record two periods or more of each realisation."
+        )
+    if excitation.realisations < 2:
+        told.append(
+            "The nonlinear part of the variance is not determined by a single realisation: the "
+            "response holds for these phases, and its intervals hold noise alone."
+        )
+    elif excitation.realisations < FEWEST_REALISATIONS:
+        told.append(
+            f"{excitation.realisations} realisations tell a variance too roughly to weigh a fit "
+            f"with: {FEWEST_REALISATIONS} are the fewest for intervals of modes, margins and "
+            "parameters."
+        )
+    return tuple(told)

@@ -1,0 +1,114 @@
+"""What responses tell of a drive of two inertias on a spring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.rational import RationalFit
+from campaign.estimation.frequency.two_mass_model import (
+    Side,
+    model,
+    model_jacobian,
+    polynomials,
+)
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.reason import Reason
+
+PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
+HIDDEN_BY_PLACE = {
+    **dict(zip(PARTS, ("kg m^2", "kg m^2", "N m/rad", "N m s/rad"), strict=True)),
+    "antiresonance": "Hz",
+    "antiresonance_damping": "",
+    "inertia_ratio": "",
+}
+"""What a sensor at the load alone cannot tell, with units."""
+Correlations = Mapping[tuple[str, str], float]
+
+
+@dataclass(frozen=True)
+class TwoMass:
+    """What the responses tell of a two-mass drive; what they do not is *not determined*.
+
+    Attributes:
+        motor_inertia, load_inertia, total_inertia: (kg m^2).
+        stiffness: (N m/rad). damping: (N m s/rad).
+        resonance_damping: damping ratio of the resonance.
+        resonance, antiresonance: undamped, sqrt(k (1/J1 + 1/J2)) and sqrt(k / J2) over 2 pi (Hz).
+        antiresonance_damping: d / (2 sqrt(k J2)).
+        inertia_ratio: J2 / J1.
+        misfit: why such a drive is no model of the responses; none where it may be one.
+        excess: weighted square over what a right model leaves in the mean.
+        criterion: Schwarz' (BIC).
+        sides: that were measured.
+        point: parameters of `model` and a delay for each side, shape (p,).
+        function: what was fitted instead, to a load alone or to one inertia.
+        rigid: whether one inertia explains the responses, so that no second one is told.
+        grounded: whether a spring holds the motor, as friction does before it slides.
+        covariance: of `point` by scatter, shape (p, p).
+        correlations: of the numbers by scatter, by pairs of their names.
+        condition: number of the weighted Jacobian, its columns scaled to length 1.
+    """
+
+    motor_inertia: Estimate
+    load_inertia: Estimate
+    total_inertia: Estimate
+    stiffness: Estimate
+    damping: Estimate
+    resonance: Estimate
+    resonance_damping: Estimate
+    antiresonance: Estimate
+    antiresonance_damping: Estimate
+    inertia_ratio: Estimate
+    misfit: Reason
+    excess: float
+    criterion: float
+    sides: tuple[Side, ...]
+    point: Array
+    grounded: bool
+    rigid: bool = False
+    function: RationalFit | None = None
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    correlations: Correlations = field(default_factory=dict)
+    condition: float = math.nan
+
+    def value(self, frequency: Array, side: Side) -> ComplexArray:
+        """The fitted response at `frequency` (Hz), shape (n,)."""
+        if self.function is not None:
+            return self.function.value(frequency)
+        frequency = np.asarray(frequency, dtype=float)
+        return model(frequency, self.point, side, self.delay(side))
+
+    def delay(self, side: Side) -> float:
+        """Of the answer of that side (s); zero for one that was not measured."""
+        if self.function is not None:
+            return self.function.delay
+        return float(self.point[7 + self.sides.index(side)]) if side in self.sides else 0.0
+
+    def jacobian(self, frequency: Array, side: Side) -> ComplexArray:
+        """Derivative of `value` by `point`, shape (n, p)."""
+        if self.function is not None:
+            return self.function.value(frequency)[:, None] * self.function.log_jacobian(frequency)
+        return model_jacobian(frequency, self.point, self.sides, side)
+
+    def polynomials(self, side: Side) -> tuple[Array, Array]:
+        """Numerator and denominator without the delay, by powers of s (1/s), lowest first."""
+        if self.function is not None:
+            return self.function.polynomials
+        return polynomials(self.point, side)
+
+
+def correlations_of(names: Sequence[str], gradients: Array, spread: Array) -> Correlations:
+    """Of numbers with these gradients (k, p) by parameters of that covariance (p, p)."""
+    together = gradients @ spread @ gradients.T
+    error = np.sqrt(np.maximum(np.diag(together), 0.0))
+    return {
+        (names[i], names[j]): float(np.clip(together[i, j] / error[i] / error[j], -1.0, 1.0))
+        for i in range(len(names))
+        for j in range(i)
+        if error[i] > 0 and error[j] > 0
+    }

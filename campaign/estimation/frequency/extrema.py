@@ -1,0 +1,114 @@
+"""Modes read between the lines of a response that no function may be fitted to.
+
+Of few realisations no variance weighs a fit. What the response still shows is between which of its
+lines the gain has an extremum: the interval ends at the nearest lines whose gain surely differs
+from that of the extremum, and so is never narrower than the spacing of the lines. No model of the
+drive enters, and the interval tells no standard error.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.best_linear import BestLinear
+from campaign.estimation.frequency.modes import Mode
+from campaign.estimation.frequency_response import Array
+from campaign.estimation.intervals import LEVEL
+from campaign.reason import Cause, Reason
+
+PROMINENCE = 1.5
+"""Ratio of gains, of that of a free inertia, by which an extremum stands out of its surroundings at
+least."""
+SURELY = 2.0
+"""Standard deviations of a difference of two gains from which on they differ."""
+BESIDE = 1.1
+"""Ratio of gains within which an undamped frequency may lie beside the extremum: a damped one, with
+damping ratio z, shifts by some z², and this is reached z / 2 beside it."""
+TOGETHER = 3
+"""Neighbouring lines whose relative scatter counts as the same."""
+METHOD = "extremum of the measured gain, between the nearest lines whose gain surely differs"
+NO_SCATTER = Cause(
+    "scatter of the lines not known",
+    "without odd lines left out, and two periods or more, nothing shows how far the lines of so "
+    "few realisations scatter",
+)
+NO_EXTREMUM = Cause(
+    "no extremum stands out",
+    "no extremum of the response stands out of the scatter of its lines",
+)
+NEEDS_A_FIT = Cause("needs a fitted function", "only a fitted function tells a damping")
+
+
+def extrema(frequency: Array, gain: Array, scatter: Array | None) -> tuple[Mode, Mode]:
+    """The resonance, and the antiresonance below it; not determined where none stands out.
+
+    Args:
+        frequency: of the lines (Hz), rising, shape (n,).
+        gain: of torque to rate, shape (n,).
+        scatter: standard deviation of its logarithm, shape (n,); None where it is not known.
+    """
+    if scatter is None:
+        return _none(NO_SCATTER(), is_zero=False), _none(NO_SCATTER(), is_zero=True)
+    level = np.log(np.maximum(gain, 1e-300) * frequency)  # flat of a free inertia
+    peak = _extremum(level, scatter)
+    if peak is None:
+        return _none(NO_EXTREMUM(), is_zero=False), _none(NO_EXTREMUM(), is_zero=True)
+    below = slice(None, peak[1] + 1)
+    dip = _extremum(-level[below], scatter[below])
+    return _mode(frequency, peak, is_zero=False), _mode(frequency, dip, is_zero=True)
+
+
+def relative_scatter(best: BestLinear) -> Array | None:
+    """Standard deviation of the logarithm of the gain at each line, shape (n,); None: not known.
+
+    Noise and distortion together, as the odd lines show that the excitation left out.
+    """
+    told = best.distortion
+    if told is None or told.mixed or not len(told.odd.frequency):
+        return None
+    beside = np.interp(told.odd.frequency, best.response.frequency, told.excited)
+    square = np.mean(told.odd.power, axis=0) / beside / best.excitation.realisations
+    around = np.pad(square, TOGETHER // 2, mode="edge")
+    alike = np.convolve(around, np.full(TOGETHER, 1.0 / TOGETHER), "valid")
+    # Of a complex error the logarithm of the gain has one of two parts.
+    return np.interp(best.response.frequency, told.odd.frequency, np.sqrt(0.5 * alike))
+
+
+def _extremum(level: Array, scatter: Array) -> tuple[int, int, int] | None:
+    """Line of the most prominent maximum, and the nearest on each side that surely lie lower."""
+    from scipy.signal import find_peaks
+
+    peaks, told = find_peaks(level, prominence=math.log(PROMINENCE))
+    if not len(peaks):
+        return None
+    most = int(np.argmax(told["prominences"]))
+    peak = int(peaks[most])
+    if told["prominences"][most] < math.log(PROMINENCE) + SURELY * scatter[peak]:
+        return None
+    apart = math.log(BESIDE) + SURELY * np.hypot(scatter, scatter[peak])
+    lower = level + apart < level[peak]
+    left, right = np.flatnonzero(lower[:peak]), np.flatnonzero(lower[peak + 1 :])
+    if not len(left) or not len(right):
+        return None
+    return int(left[-1]), peak, peak + 1 + int(right[0])
+
+
+def _mode(frequency: Array, found: tuple[int, int, int] | None, *, is_zero: bool) -> Mode:
+    if found is None:
+        return _none(NO_EXTREMUM(), is_zero=is_zero)
+    low, value, high = (float(frequency[line]) for line in found)
+    without = _none(NEEDS_A_FIT(), is_zero=is_zero)
+    name = without.frequency.name
+    return Mode(Estimate(name, value, "Hz", low, high, LEVEL, METHOD), without.damping, is_zero)
+
+
+def _none(reason: Reason, *, is_zero: bool) -> Mode:
+    name = "antiresonance" if is_zero else "resonance"
+    return Mode(
+        Estimate.without_interval(name, math.nan, "Hz", reason),
+        Estimate.without_interval(f"{name}_damping", math.nan, "", reason),
+        is_zero,
+    )

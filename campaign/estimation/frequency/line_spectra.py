@@ -1,0 +1,115 @@
+"""The lines of periodic signals, freed of transient and drift, with the covariance of their noise.
+
+A record of P periods has P - 1 lines between two harmonics of its period: whatever nonlinear system
+it comes from, these hold transient and noise alone. A transient is smooth over frequency, so that a
+polynomial through the lines around a harmonic tells its part there, and what it leaves is noise
+(robust local polynomial method; Pintelon, Vandersteen, Schoukens and Rolain, Mech. Syst. Signal
+Process. 25 (2011) 2892; Pintelon and Schoukens (2012), 7.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.frequency_response import Array, ComplexArray
+
+ORDER = 2
+"""of the polynomial through the transient ..."""
+AROUND = 10
+"""... fitted to so many lines around a harmonic that belong to none."""
+REACH = 2 * AROUND
+"""Lines to either side of a harmonic among which these are."""
+
+
+@dataclass(frozen=True)
+class LineSpectra:
+    """Complex amplitudes of c signals in m realisations at lines 1 to n of their period.
+
+    Attributes:
+        frequency: of the lines (Hz), shape (n,).
+        lines: without transient, shape (c, m, n): a sine of amplitude a has |line| = a.
+        transient: what was taken off, shape (c, m, n); zero for a single period.
+        noise: covariance E[e e*] of `lines` in one realisation, shape (n, c, c), a mean over the
+            realisations; None for a single period.
+        freedom: real degrees of freedom behind `noise`.
+        periods: of each realisation.
+    """
+
+    frequency: Array
+    lines: ComplexArray
+    transient: ComplexArray
+    noise: ComplexArray | None
+    freedom: float
+    periods: int
+
+    @property
+    def shared(self) -> float:
+        """How many lines are told their noise by one and the same line between harmonics."""
+        return max(1.0, AROUND / max(self.periods - 1, 1))
+
+    def conjugated(self, phase: ComplexArray) -> LineSpectra:
+        """Turned back by a phase for each realisation and line, |phase| = 1, shape (m, n)."""
+        turned = self.lines * np.conj(phase)
+        return LineSpectra(
+            self.frequency, turned, self.transient, self.noise, self.freedom, self.periods
+        )
+
+
+def line_spectra(signals: Array, rate: float, periods: int, highest: float) -> LineSpectra:
+    """Lines of signals of shape (c, m, periods * samples), sampled at `rate` (Hz).
+
+    Args:
+        highest: frequency up to which lines are told (Hz).
+
+    Raises ValueError where the length is no whole number of periods, or nothing is below `highest`.
+    """
+    total = signals.shape[-1]
+    if periods < 1 or total % periods:
+        raise ValueError(f"{total} samples are not {periods} whole periods")
+    if not np.all(np.isfinite(signals)):
+        raise ValueError("a signal has samples that are no numbers")
+    bins = np.fft.rfft(signals, axis=-1) * (2.0 / total)
+    count = min(int(np.floor(highest * total / rate / periods + 1e-9)), total // periods // 2 - 1)
+    if count < 1:
+        raise ValueError(f"no line of the period lies below {highest:g} Hz")
+    at = periods * np.arange(1, count + 1)
+    frequency = at * rate / total
+    own = bins[..., at]
+    if periods == 1:
+        return LineSpectra(frequency, own, np.zeros_like(own), None, 0.0, 1)
+    channels, realisations = signals.shape[:2]
+    transient = np.zeros_like(own)
+    noise = np.zeros((count, channels, channels), dtype=complex)
+    free = float(AROUND - ORDER - 1)
+    for k, bin_ in enumerate(at.tolist()):
+        away, basis, inverse = _fitted_around(
+            min(bin_, REACH + 1), periods, min(bins.shape[-1] - bin_, REACH + 1)
+        )
+        there = bins[..., bin_ + away]
+        found = there @ inverse.T
+        transient[..., k] = found[..., 0]
+        left = there - found @ basis.T
+        spread = np.einsum("amj,bmj->ab", left, np.conj(left)) / (free * realisations)
+        # The transient taken off has noise of its own: that of `inverse` beside the line's.
+        noise[k] = spread * (1.0 + float(np.sum(inverse[0] ** 2)))
+    return LineSpectra(
+        frequency, own - transient, transient, noise, 2.0 * free * realisations, periods
+    )
+
+
+@cache
+def _fitted_around(below: int, periods: int, above: int) -> tuple[NDArray[np.intp], Array, Array]:
+    """How far the lines lie from a harmonic that its polynomial is fitted to; basis and inverse.
+
+    The nearest that belong to no harmonic and are not that of the mean, which lies `below` lines
+    lower, and within the spectrum, which ends `above` lines higher.
+    """
+    away = np.arange(max(1 - below, -REACH), min(above, REACH + 1))
+    away = away[away % periods != 0]
+    away = np.sort(away[np.argsort(np.abs(away), kind="stable")[:AROUND]])
+    basis = np.vander(away / AROUND, ORDER + 1, increasing=True)
+    return np.asarray(away, dtype=np.intp), np.asarray(basis), np.asarray(np.linalg.pinv(basis))

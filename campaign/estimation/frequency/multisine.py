@@ -1,0 +1,150 @@
+"""Odd random-phase multisines: excitations that show noise and distortion beside the response.
+
+Only odd lines of the base frequency are excited, and of every few of them one, drawn at random, is
+left out. What the output has there is odd distortion, at even lines even distortion; phases are
+independent and uniform, so that realisations average the rest (Pintelon and Schoukens, "System
+Identification: A Frequency Domain Approach" (2012), 3.5 and 4.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.frequency_response import Array
+from campaign.signals import MultiSine
+
+Lines = NDArray[np.int64]
+CREST_SAMPLES = 8
+"""times the highest line: samples of a period from which a crest factor is read."""
+
+
+@dataclass(frozen=True)
+class OddGrid:
+    """Lines of a period: multiples of 1 / `period`.
+
+    Attributes:
+        period: (s).
+        excited: rising odd lines, shape (k,).
+        odd_detection: odd lines left out between them.
+        even_detection: even lines between the first and the last excited one.
+    """
+
+    period: float
+    excited: Lines
+    odd_detection: Lines
+    even_detection: Lines
+
+    @property
+    def frequency(self) -> Array:
+        """Of the excited lines (Hz), shape (k,)."""
+        return np.asarray(self.excited / self.period)
+
+
+def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int = 3) -> OddGrid:
+    """Odd lines from `lowest` to `highest` (Hz), of every `group` one, drawn at random, left out.
+
+    The first and the last line are never left out. Raises ValueError where fewer than three groups
+    fit, or for groups of one.
+    """
+    if group < 2:
+        raise ValueError("a group has at least two lines: one is left out")
+    first, last = int(np.ceil(lowest * period)), int(np.floor(highest * period))
+    odd = np.arange(first + (first + 1) % 2, last + 1, 2, dtype=np.int64)
+    odd = odd[odd > 0]
+    if len(odd) < 3 * group:
+        raise ValueError(
+            f"{len(odd)} odd lines between {lowest:g} and {highest:g} Hz; {3 * group} are the "
+            "fewest: lengthen the period"
+        )
+    random = np.random.default_rng(seed)
+    left_out = []
+    for start in range(0, len(odd) - group + 1, group):
+        choice = [k for k in range(start, start + group) if 0 < k < len(odd) - 1]
+        left_out.append(int(random.choice(choice)))
+    kept = np.ones(len(odd), dtype=bool)
+    kept[left_out] = False
+    even = np.arange(odd[0] + 1, odd[-1], 2, dtype=np.int64)
+    return OddGrid(period, odd[kept], odd[~kept], even)
+
+
+def random_phases(
+    grid: OddGrid, rms: float, seed: int, shape: Array | None = None, draws: int = 1
+) -> MultiSine:
+    """One realisation: uniform random phases, of that rms (in the unit of the input).
+
+    Args:
+        shape: relative amplitudes of the excited lines, shape (k,); absent: all alike.
+        draws: how many to draw, of which the one with the lowest crest factor is kept. Of a few
+            tens the phases still count as random; a search would make them depend on each other.
+    """
+    random = np.random.default_rng(seed)
+    size = np.ones(len(grid.excited)) if shape is None else np.asarray(shape, dtype=float)
+    if size.shape != grid.excited.shape:
+        raise ValueError("shape has one amplitude for each excited line")
+    amplitude = rms * size / np.sqrt(0.5 * np.sum(size**2))
+    phases = random.uniform(0.0, 2.0 * np.pi, (max(draws, 1), len(size)))
+    if draws > 1:
+        best = min(range(draws), key=lambda k: _crest(grid.excited, amplitude, phases[k]))
+        phases = phases[best : best + 1]
+    return MultiSine(
+        amplitudes=tuple(map(float, amplitude)),
+        frequencies=tuple(map(float, grid.frequency)),
+        phases=tuple(map(float, phases[0])),
+    )
+
+
+def _crest(lines: Lines, amplitude: Array, phases: Array) -> float:
+    """Largest value over rms."""
+    samples = CREST_SAMPLES * int(lines[-1])
+    spectrum = np.zeros(samples // 2 + 1, dtype=complex)
+    spectrum[lines] = amplitude * np.exp(1j * (phases - 0.5 * np.pi))  # of sines
+    signal = np.fft.irfft(spectrum, samples) * samples / 2.0
+    return float(np.max(np.abs(signal)) / np.std(signal))
+
+
+def crest_factor(signal: Array) -> float:
+    """Largest value over rms of one period, shape (n,)."""
+    return float(np.max(np.abs(signal)) / np.sqrt(np.mean(np.square(signal))))
+
+
+ALIKE = 1e-3
+"""Mean square of the change from one period to the next, over twice the variance: a repetition."""
+UNLIKE = 0.5
+"""What it comes to between repetitions, at least."""
+LOOKED_AT = 1 << 21
+"""Samples at the end of a recording by which it is judged."""
+STRONG, MANY = 0.2, 10
+"""Share of the largest line in amplitude, and how many such lines a multisine has at least."""
+
+
+def repetition(signal: Array) -> int | None:
+    """Samples of the period of a multisine, shape (n,), seen twice or more; None for all else.
+
+    A sine, a triangle and trapezoids repeat as well, and have few strong lines.
+    """
+    signal = signal[-LOOKED_AT:]
+    moving = signal - np.mean(signal)
+    count = len(moving)
+    power = float(np.mean(moving**2))
+    if count < 4 * MANY or not power > 0:
+        return None
+    spectrum = np.fft.rfft(moving, 2 * count)
+    lags = np.arange(count // 2 + 1)
+    alike = np.fft.irfft(np.abs(spectrum) ** 2)[: len(lags)]
+    square = np.concatenate([[0.0], np.cumsum(moving**2)])
+    both = square[count - lags] + square[count] - square[lags]
+    change = (both - 2.0 * alike) / (2.0 * power * (count - lags))
+    apart = np.flatnonzero(change > UNLIKE)
+    if not len(apart):
+        return None
+    again = apart[0] + np.flatnonzero(change[apart[0] :] < ALIKE)
+    if not len(again):
+        return None
+    beyond = np.flatnonzero(change[again[0] :] >= ALIKE)
+    ends = again[0] + (int(beyond[0]) if len(beyond) else len(change) - again[0])
+    period = int(again[0] + np.argmin(change[again[0] : ends]))
+    size = np.abs(np.fft.rfft(moving[-period:]))
+    return period if np.count_nonzero(size > STRONG * np.max(size)) >= MANY else None

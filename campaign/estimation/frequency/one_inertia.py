@@ -1,0 +1,126 @@
+"""Drives whose responses tell less than two inertias: seen from the load alone, or rigid."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.drive import (
+    HIDDEN_BY_PLACE,
+    TwoMass,
+    correlations_of,
+)
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.modes import of_fit
+from campaign.estimation.frequency.rational import rational_fit
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency_response import Array
+from campaign.reason import Cause
+
+HIDDEN = Cause(
+    "load side alone",
+    "a sensor at the load shows no antiresonance: any J1, J2 and k with the same resonance and the "
+    "same sum of inertias answer alike; measure the motor's rate too",
+)
+RIGID = Cause(
+    "rigid drive",
+    "one inertia explains the response: no second one shows; excite up to above the resonance, or "
+    "with more torque around it",
+)
+NEGATIVE_INERTIA = Cause("negative inertia", "its inertia would be negative")
+NO_RESONANCE = Cause("no resonance in band", "no resonance of two inertias lies in the band")
+METHOD = "One inertia with viscous friction and a delay, least squares weighted by scatter"
+NOT_OF_ONE = {**HIDDEN_BY_PLACE, "resonance": "Hz", "resonance_damping": ""}
+"""What one inertia has not, with units."""
+
+
+def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
+    """One inertia: exp(-s delay) / (J s + b)."""
+    fit = rational_fit(measured, (0, 1))
+    up, down = float(fit.numerator[0]), fit.denominator
+    unit = 2.0 * math.pi * fit.scale
+    inertia = float(down[1]) / up / unit
+    by = np.array([-inertia / up, 0.0, 1.0 / up / unit, 0.0])
+    error = math.sqrt(max(float(by @ fit.scatter @ by), 0.0))
+    misfit = fit.misfit
+    if not misfit and inertia <= 0:
+        misfit = NEGATIVE_INERTIA()
+    told = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
+    nothing: dict[str, Any] = {
+        name: Estimate.without_interval(name, math.nan, of, RIGID())
+        for name, of in NOT_OF_ONE.items()
+    }
+    return TwoMass(
+        **nothing,
+        total_inertia=told,
+        misfit=misfit,
+        excess=fit.excess,
+        criterion=fit.criterion,
+        sides=(side,),
+        point=np.concatenate([fit.numerator, fit.denominator, [fit.delay]]),
+        grounded=False,
+        rigid=True,
+        function=fit,
+        covariance=fit.scatter,
+        condition=fit.condition,
+    )
+
+
+def load_side_fit(measured: MeasuredResponse) -> TwoMass:
+    """What a rate at the load tells: by a function of third order with one zero and a delay.
+
+    With friction at one of the inertias it is (d s + k) / (J1 J2 s³ + ... + b k), of which the sum
+    of the inertias and sqrt(k (1/J1 + 1/J2)) follow, and neither J1, J2 nor k.
+    """
+    fit = rational_fit(measured, (1, 3))
+    if fit.zeros[0].real > 0:
+        # A zero with as much delay less answers nearly alike, but no spring has negative damping.
+        mirrored = np.array([fit.numerator[0], -fit.numerator[1]])
+        later = fit.delay + 2.0 / float(fit.zeros[0].real)
+        fit = rational_fit(
+            measured, (1, 3), start=np.concatenate([mirrored, fit.denominator, [later]])
+        )
+    unit = 2.0 * math.pi * fit.scale
+
+    def told(theta: Array) -> Array:
+        b, a = theta[:2], theta[2:6]
+        total = a[1] / b[0] - a[0] * b[1] / b[0] ** 2
+        rise = math.sqrt(abs(b[0] / a[3] * total)) * unit
+        roots = np.polynomial.polynomial.polyroots(a)
+        root = max(roots, key=abs)
+        return np.array([total / unit, rise / (2.0 * math.pi), -root.real / abs(root)])
+
+    theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
+    found = told(theta)
+    steps = np.diag(np.maximum(1e-5 * np.abs(theta), 1e-12))
+    by = np.array([(told(theta + h) - told(theta - h)) / (2.0 * np.sum(h)) for h in steps])
+    error = np.sqrt(np.maximum(np.einsum("pi,pq,qi->i", by, fit.scatter, by), 0.0))
+    method = "function of third order with a delay, friction taken to be at one of the inertias"
+    misfit = fit.misfit
+    if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
+        misfit = NO_RESONANCE()
+    names = (("total_inertia", "kg m^2"), ("resonance", "Hz"), ("resonance_damping", ""))
+    estimates: dict[str, Any] = {
+        name: of_fit(name, float(value), of, float(by_fit), misfit, method)
+        for (name, of), value, by_fit in zip(names, found, error, strict=True)
+    }
+    for name, of in HIDDEN_BY_PLACE.items():
+        estimates[name] = Estimate.without_interval(name, math.nan, of, HIDDEN())
+    return TwoMass(
+        **estimates,
+        misfit=misfit,
+        excess=fit.excess,
+        criterion=fit.criterion,
+        sides=("load",),
+        point=theta,
+        grounded=False,
+        function=fit,
+        covariance=fit.scatter,
+        correlations={}
+        if misfit
+        else correlations_of([each for each, _ in names], by.T, fit.scatter),
+        condition=fit.condition,
+    )

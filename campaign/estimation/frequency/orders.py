@@ -1,0 +1,139 @@
+"""Which order a response tells: by Schwarz' criterion, among those without unstable poles.
+
+What several orders explain about equally well they do not tell alike: that is a part of an
+interval, too, and no scatter shows it (`Chosen.near`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.rational import RationalFit, delays_to_try, rational_fit
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.estimation.intervals import shifted_by
+
+HIGHEST = 6
+"""of the denominator, unless told otherwise."""
+FEWER_ZEROS = 3
+"""by which a numerator's order lies below the denominator's at most."""
+NEAR = 2.0
+"""Schwarz' criterion within which two orders are told apart by how many parameters they have."""
+POSSIBLE = 10.0
+"""Above the best criterion up to which an order is not ruled out (Kass and Raftery, 1995)."""
+SURE = 2.0
+"""Standard errors by which a pole's real part must lie above zero to be unstable."""
+INTEGRATOR = 0.5
+"""times the lowest frequency: a pole below that cannot be told from an integrator's."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The fit chosen, and all that were tried, with why each other was not.
+
+    Attributes:
+        tried: fits by order of numerator and denominator.
+        refused: why an order was left out.
+        near: other fits that the data do not rule out.
+    """
+
+    fit: RationalFit
+    tried: dict[tuple[int, int], RationalFit]
+    refused: dict[tuple[int, int], str]
+    near: tuple[RationalFit, ...] = ()
+
+
+def order_of(fit: RationalFit) -> tuple[int, int]:
+    """Of numerator and denominator."""
+    return len(fit.numerator) - 1, len(fit.denominator) - 1
+
+
+def chosen_order(
+    measured: MeasuredResponse,
+    highest: int = HIGHEST,
+    orders: Sequence[tuple[int, int]] | None = None,
+    with_delay: bool = True,
+    stable: bool = True,
+) -> Chosen:
+    """Fits of all orders up to `highest`, and the one with the lowest criterion.
+
+    Args:
+        orders: to try instead of all; pairs of numerator and denominator.
+        stable: whether a fit with an unstable pole is refused.
+
+    Orders are tried upwards, until two in a row of the denominator's bring no better criterion.
+    Raises ValueError where none can be fitted, or all are refused.
+    """
+    tried: dict[tuple[int, int], RationalFit] = {}
+    refused: dict[tuple[int, int], str] = {}
+    delays = delays_to_try(measured) if with_delay else np.zeros(1)
+    best, without = math.inf, 0
+    for down in range(1, highest + 1):
+        some = [(up, down) for up in range(max(0, down - FEWER_ZEROS), down + 1)]
+        some = [each for each in some if orders is None or each in orders]
+        better = False
+        for order in some:
+            try:
+                fit = rational_fit(measured, order, with_delay, delays)
+            except (ValueError, np.linalg.LinAlgError) as error:
+                refused[order] = str(error)
+                continue
+            tried[order] = fit
+            why = _unusable(fit, stable)
+            if why:
+                refused[order] = why
+            elif fit.criterion < best - NEAR:
+                best, better = fit.criterion, True
+        without = 0 if better or not some else without + 1
+        if without >= 2 and math.isfinite(best):
+            break
+    usable = [order for order in tried if order not in refused]
+    if not usable:
+        reasons = "; ".join(sorted(set(refused.values()))) or "too few frequencies"
+        raise ValueError(f"no order fits: {reasons}")
+    near = [order for order in usable if tried[order].criterion <= best + NEAR]
+    order = min(near or usable, key=lambda each: (tried[each].parameters, tried[each].criterion))
+    possible = [each for each in usable if each != order and not tried[each].misfit]
+    close = [each for each in possible if tried[each].criterion <= best + POSSIBLE]
+    return Chosen(tried[order], tried, refused, tuple(tried[each] for each in close))
+
+
+def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:
+    """The estimate with what other orders, which the data do not rule out, say of it.
+
+    The largest deviation counts as the half-width of a uniform distribution.
+    """
+    told = [abs(each - estimate.value) for each in others if math.isfinite(each)]
+    if not told or not estimate.has_interval:
+        return estimate
+    return shifted_by(estimate, "order of the function", max(told) / math.sqrt(3.0))
+
+
+def _unusable(fit: RationalFit, stable: bool) -> str:
+    if not np.all(np.isfinite(fit.covariance)):
+        return "its covariance is not finite"
+    if not stable:
+        return ""
+    first = len(fit.numerator)
+    part = slice(first, first + len(fit.denominator))
+    covariance = fit.scatter[part, part]
+    for pole in fit.poles[fit.poles.real > 0]:
+        by = np.real(root_jacobian(fit.denominator, fit.scale, complex(pole)))
+        surely = SURE * math.sqrt(max(float(by @ covariance @ by), 0.0))
+        if pole.real > surely and abs(pole) > INTEGRATOR * 2.0 * np.pi * fit.lowest:
+            return "a pole is unstable"
+    return ""
+
+
+def root_jacobian(coefficients: Array, scale: float, root: complex) -> ComplexArray:
+    """Derivative of a root (rad/s) by the coefficients of powers of s / (2 pi scale), (k,)."""
+    unit = 2.0 * np.pi * scale
+    x = root / unit
+    slope = np.polynomial.polynomial.polyval(x, np.polynomial.polynomial.polyder(coefficients))
+    safe = complex(slope) if abs(slope) > 0 else 1e-300
+    return np.asarray(-(x ** np.arange(len(coefficients))) / safe * unit)

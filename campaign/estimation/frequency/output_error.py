@@ -1,0 +1,122 @@
+"""The output that a fitted response makes of a recorded input, over time.
+
+The spectrum of the input times the response is the output that a periodic input would have left;
+what begins and ends otherwise differs from it by free motions of the function's poles (Pintelon and
+Schoukens (2012), 2.6.3), which are fitted with an offset and a drift. Both sides are seen through
+one zero-phase filter over the band that was fitted: further down, friction and offsets of the
+torque move a drive away from any simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.estimation.intervals import of_positive_repeats
+
+ORDER = 3
+"""of the Butterworth filter, which runs forward and backward."""
+FEWEST_PARTS = 8
+"""into which recordings are cut, at least, for an interval."""
+PERIODS = 3.0
+"""of the lowest frequency that a part is long, at least."""
+LONGEST = 700.0
+"""Largest exponent of a free motion."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A recorded output and the simulated one within the band, shape (n,).
+
+    Attributes:
+        time: (s).
+        measured, simulated: filtered alike, without their ends.
+    """
+
+    time: Array
+    measured: Array
+    simulated: Array
+
+    @property
+    def relative(self) -> float:
+        """Norm of the difference over that of the measured output."""
+        left = np.linalg.norm(self.measured - self.simulated)
+        return float(left / max(float(np.linalg.norm(self.measured)), 1e-300))
+
+
+def simulated_output(
+    input_: Array,
+    output: Array,
+    rate: float,
+    response: Callable[[Array], ComplexArray],
+    poles: ComplexArray,
+    lowest: float,
+    highest: float,
+) -> Simulated:
+    """The output of an input, evenly sampled at `rate` (Hz), shape (n,).
+
+    Args:
+        response: output over input at frequencies (Hz), shape (n,).
+        poles: of it (rad/s).
+        lowest, highest: of the band (Hz).
+
+    Raises ValueError for a recording shorter than three periods of `lowest`, or a band above half
+    the sampling rate.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    n = len(output)
+    if n < 2.0 * PERIODS * rate / lowest:
+        raise ValueError(f"it is shorter than {2.0 * PERIODS:g} periods of {lowest:.3g} Hz")
+    highest = min(highest, 0.45 * rate)
+    if not lowest < highest:
+        raise ValueError("the band lies above half the sampling rate")
+    frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64)
+    inside = frequency > 0.1 * lowest
+    spectrum = np.fft.rfft(input_ - np.mean(input_))
+    spectrum[~inside] = 0.0
+    spectrum[inside] *= response(frequency[inside])
+    time = np.arange(n) / rate
+    columns = np.column_stack(
+        [np.fft.irfft(spectrum, n), output - np.mean(output), *_free(poles, time)]
+    )
+    band = butter(ORDER, (lowest, highest), "bandpass", fs=rate, output="sos")
+    filtered = sosfiltfilt(band, columns, axis=0)
+    # Filter and period both show at the ends.
+    cut = round(PERIODS * rate / lowest / 2.0)
+    inner = filtered[cut : n - cut]
+    periodic, measured, free = inner[:, 0], inner[:, 1], inner[:, 2:]
+    found, *_ = np.linalg.lstsq(free, measured - periodic, rcond=1e-8)
+    return Simulated(time[cut : n - cut], measured, periodic + free @ found)
+
+
+def _free(poles: ComplexArray, time: Array) -> list[Array]:
+    """Free motions, largest 1, with an offset and a drift."""
+    found = [np.ones_like(time), time / time[-1]]
+    for pole in poles[poles.imag >= 0.0]:
+        begin = time if pole.real <= 0.0 else time - time[-1]
+        motion = np.exp(np.clip(pole.real * begin, -LONGEST, 0.0)) * np.exp(1j * pole.imag * time)
+        found += [motion.real, motion.imag] if pole.imag > 0.0 else [motion.real]
+    return found
+
+
+def output_error(name: str, simulated: Sequence[Simulated], lowest: float) -> Estimate:
+    """Relative error of the output over all recordings, with an interval over parts of them.
+
+    lowest: of the band (Hz); a part has three periods of it.
+    """
+    parts = []
+    for each in simulated:
+        step = float(each.time[1] - each.time[0])
+        longest = max(int(len(each.time) * step * lowest / PERIODS), 1)
+        count = min(longest, max(1, -(-FEWEST_PARTS // len(simulated))))
+        parts += [
+            Simulated(each.time[rows], each.measured[rows], each.simulated[rows])
+            for rows in np.array_split(np.arange(len(each.time)), count)
+        ]
+    shares = [max(each.relative, 1e-12) for each in parts]
+    return of_positive_repeats(name, shares, "", "parts of recordings")

@@ -1,0 +1,94 @@
+"""A fitted response held against one that was measured elsewhere, in units of its deviation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.rational import SURE, Weights
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.reason import NONE, Cause, Reason
+
+NO_DEVIATION = Cause(
+    "too few realisations", "too few realisations or averages tell how it scatters"
+)
+
+
+@dataclass(frozen=True)
+class HeldAgainst:
+    """A response that no model was fitted to, and what a model says of it, at n frequencies.
+
+    Attributes:
+        measured: the response.
+        predicted: of the model, shape (n,).
+        deviation: standard deviation of either part of measured less predicted, shape (n,): scatter
+            of the measurement and of the fit; NaN where the measurement does not tell its own.
+        square: squared difference over its expectation, all frequencies together, with what the
+            fit's own error has in common among them: 1 in the mean for a right model; NaN likewise.
+        most: 3.3 standard deviations of `square` above 1.
+        reason: why there is no deviation; none where there is.
+    """
+
+    measured: MeasuredResponse
+    predicted: ComplexArray
+    deviation: Array
+    square: float
+    most: float
+    reason: Reason = NONE
+
+    @property
+    def difference(self) -> ComplexArray:
+        """Measured less predicted, shape (n,)."""
+        return np.asarray(self.measured.values - self.predicted)
+
+    @property
+    def relative(self) -> float:
+        """Root of the mean square of the difference over the measured size."""
+        share = np.abs(self.difference) / np.maximum(np.abs(self.measured.values), 1e-300)
+        return float(np.sqrt(np.mean(share**2)))
+
+    @property
+    def in_deviations(self) -> Array:
+        """Size of the difference over what one expects of it, shape (n,): 1 in the mean square."""
+        return np.asarray(np.abs(self.difference) / (math.sqrt(2.0) * self.deviation))
+
+    @property
+    def verdict(self) -> str:
+        """Whether the model predicts it, in words."""
+        if self.reason:
+            return f"not determined: {self.reason}"
+        if self.square <= self.most:
+            return "as closely as scatter allows"
+        return f"with {self.square:.1f} times the square that scatter would leave"
+
+
+def held_against(
+    measured: MeasuredResponse, predicted: ComplexArray, jacobian: ComplexArray, covariance: Array
+) -> HeldAgainst:
+    """A prediction and its covariance against a measured response.
+
+    Args:
+        predicted: shape (n,). jacobian: its derivative by the parameters, shape (n, p).
+        covariance: of the parameters, shape (p, p).
+    """
+    n = len(measured.frequency)
+    left = measured.values - predicted
+    try:
+        weights = Weights.of(measured)
+    except ValueError:
+        nothing = np.full(n, math.nan)
+        return HeldAgainst(measured, predicted, nothing, math.nan, math.nan, NO_DEVIATION())
+    stacked = np.concatenate([jacobian.real, jacobian.imag])
+    shared = stacked @ covariance @ stacked.T
+    # Variances that are estimates are too small in their inverse mean.
+    own = np.concatenate([weights.error, weights.error]) ** 2 * weights.mean
+    together = shared + np.diag(own)
+    apart = np.concatenate([left.real, left.imag])
+    square = float(apart @ np.linalg.solve(together, apart)) / (2 * n)
+    fitted = np.diag(shared)
+    deviation = np.sqrt(weights.error**2 + 0.5 * (fitted[:n] + fitted[n:]))
+    most = 1.0 + SURE * math.sqrt(n * weights.spread) / weights.mean / (2 * n)
+    return HeldAgainst(measured, predicted, deviation, square, most)

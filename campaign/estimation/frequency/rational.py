@@ -1,0 +1,370 @@
+"""A rational function with a delay through a measured response, with real coefficients.
+
+    G(s) = exp(-s delay) * (b0 + b1 s' + ...) / (a0 + a1 s' + ...),    s' = s / (2 pi scale)
+
+Started by Sanathanan and Koerner's iteration (IEEE Trans. AC-8 (1963) 56) for several delays, then
+refined by Levenberg's and Marquardt's to the smallest weighted square, which is the maximum
+likelihood of errors of known variance (Pintelon and Schoukens, "System Identification: A Frequency
+Domain Approach" (2012), 9.11).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.frequency.measured import ALIKE, LEAST_FREEDOM, MeasuredResponse
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.estimation.least_squares import covariance, minimum
+from campaign.reason import NONE, Cause, Reason
+
+SANATHANAN = 8
+"""iterations before a refinement."""
+DELAYS = 6
+"""Values of the delay that a fit is started from."""
+EXACT = 1e-6
+"""Share of a value below which no error is believed: what a fit's arithmetic resolves."""
+MOST_EXCESS = 2.0
+"""Weighted square over its expectation above which a function is no model of the response."""
+SURE = 3.3
+"""Standard deviations of a statistic above which it is no chance (0.05 %, one-sided)."""
+LARGE_RESIDUALS = Cause(
+    "residuals too large", "it leaves {times:.1f} times the square that scatter would"
+)
+ALIKE_RESIDUALS = Cause(
+    "residuals alike",
+    "what it leaves is alike at neighbouring frequencies ({correlation:.2f})",
+)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """How a weighted square is judged whose variances are estimates themselves.
+
+    Attributes:
+        error: standard deviation of either part of each value, shape (n,).
+        mean: expectation of one squared, weighted residual of a right model.
+        spread: variance of the sum of the two squares of one value.
+        inflation: of a covariance by the scatter of the weights.
+    """
+
+    error: Array
+    mean: float
+    spread: float
+    inflation: float
+
+    @staticmethod
+    def of(measured: MeasuredResponse) -> Weights:
+        """Raises ValueError where variances have too few degrees of freedom, or there are none."""
+        freedom = float(np.min(measured.freedom, initial=math.inf))
+        if not np.all(np.isfinite(measured.variance)) or freedom < LEAST_FREEDOM:
+            raise ValueError(
+                "the variance of the response is not determined well enough to weigh a fit with: "
+                "more averages, periods or realisations are needed"
+            )
+        floor = EXACT * np.abs(measured.values)
+        error = np.sqrt(0.5 * (measured.variance + ALIKE * measured.bias**2))
+        error = np.maximum(error, floor)
+        if math.isinf(freedom):
+            return Weights(error, 1.0, 4.0, 1.0)
+        # |error|² / variance follows F(2, freedom).
+        mean = freedom / (freedom - 2.0)
+        spread = 4.0 * freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
+        return Weights(error, mean, spread, freedom / (freedom - 4.0))
+
+
+@dataclass(frozen=True)
+class RationalFit:
+    """A fitted function; coefficients lowest power first, of s over `2 pi scale`.
+
+    Attributes:
+        numerator, denominator: shapes (nb + 1,) and (na + 1,).
+        delay: (s).
+        scale: (Hz).
+        covariance: of (numerator, denominator, delay), shape (p, p); not yet with `excess`.
+        residuals: weighted, complex, shape (n,); squares of either part are 1 in the mean.
+        excess: weighted square over what a right model leaves in the mean.
+        misfit: why it is no model of the response; none where it may be one.
+        parameters: how many are free.
+        with_delay: whether the delay is one of them.
+        lowest, highest: of the frequencies (Hz).
+        condition: number of the weighted Jacobian, its columns scaled to length 1.
+    """
+
+    numerator: Array
+    denominator: Array
+    delay: float
+    scale: float
+    covariance: Array
+    residuals: ComplexArray
+    excess: float
+    misfit: Reason
+    parameters: int
+    with_delay: bool
+    lowest: float
+    highest: float
+    condition: float = math.nan
+
+    def value(self, frequency: Array) -> ComplexArray:
+        """G at `frequency` (Hz), shape (n,)."""
+        s = 1j * np.asarray(frequency, dtype=float) / self.scale
+        delayed = np.exp(-s * (2.0 * np.pi * self.scale * self.delay))
+        over = np.polynomial.polynomial.polyval(s, self.denominator)
+        return np.asarray(delayed * np.polynomial.polynomial.polyval(s, self.numerator) / over)
+
+    def log_jacobian(self, frequency: Array) -> ComplexArray:
+        """Derivative of log G by (numerator, denominator, delay), shape (n, p)."""
+        s = 1j * np.asarray(frequency, dtype=float) / self.scale
+        return _log_jacobian(s, self.numerator, self.denominator, self.scale)
+
+    @property
+    def polynomials(self) -> tuple[Array, Array]:
+        """Numerator and denominator by powers of s (1/s), lowest first, without the delay."""
+        unit = 2.0 * np.pi * self.scale
+        up, down = (c / unit ** np.arange(len(c)) for c in (self.numerator, self.denominator))
+        return up, down
+
+    @cached_property
+    def scatter(self) -> Array:
+        """Covariance of (numerator, denominator, delay), with what the fit leaves over."""
+        return np.asarray(self.covariance * max(self.excess, 1.0))
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """(rad/s)."""
+        return _roots(self.denominator, self.scale)
+
+    @cached_property
+    def zeros(self) -> ComplexArray:
+        """(rad/s)."""
+        return _roots(self.numerator, self.scale)
+
+    @property
+    def criterion(self) -> float:
+        """Schwarz' criterion (BIC): lower is better."""
+        values = 2 * len(self.residuals)
+        square = float(np.sum(np.abs(self.residuals) ** 2))
+        return square + self.parameters * math.log(values)
+
+
+def _roots(coefficients: Array, scale: float) -> ComplexArray:
+    found = np.polynomial.polynomial.polyroots(coefficients)
+    return np.asarray(found * (2.0 * np.pi * scale), dtype=complex)
+
+
+def _log_jacobian(
+    s: ComplexArray, numerator: Array, denominator: Array, scale: float
+) -> ComplexArray:
+    return _log_jacobian_of(_powers(s, numerator, denominator), s, numerator, denominator, scale)
+
+
+def _powers(s: ComplexArray, numerator: Array, denominator: Array) -> ComplexArray:
+    """Powers of s, shape (n, most coefficients)."""
+    return np.asarray(s[:, None] ** np.arange(max(len(numerator), len(denominator))))
+
+
+def _log_jacobian_of(
+    powers: ComplexArray, s: ComplexArray, numerator: Array, denominator: Array, scale: float
+) -> ComplexArray:
+    up = powers[:, : len(numerator)] / (powers[:, : len(numerator)] @ numerator)[:, None]
+    down = powers[:, : len(denominator)] / (powers[:, : len(denominator)] @ denominator)[:, None]
+    return np.column_stack([up, -down, -s * (2.0 * np.pi * scale)])
+
+
+def rational_fit(
+    measured: MeasuredResponse,
+    order: tuple[int, int],
+    with_delay: bool = True,
+    delays: Array | None = None,
+    start: Array | None = None,
+) -> RationalFit:
+    """The function of that order (of numerator and denominator) that fits best.
+
+    Args:
+        measured: at n frequencies, with a variance of enough degrees of freedom.
+        with_delay: whether a delay is fitted; else it is zero.
+        delays: (s) to start from; absent: from none to what the phase falls at the upper end.
+        start: (numerator, denominator, delay) to start from instead.
+
+    Raises ValueError for too few frequencies, a numerator above the denominator, or variances that
+    are no weights.
+    """
+    up, down = order
+    free = up + down + 1 + with_delay
+    if up > down or up < 0 or down < 1:
+        raise ValueError("the numerator's order must not be above the denominator's")
+    if 2 * len(measured.frequency) < free + 4:
+        raise ValueError(f"{len(measured.frequency)} frequencies cannot tell {free} parameters")
+    weights = Weights.of(measured)
+    frequency = measured.frequency
+    scale = float(np.sqrt(frequency[0] * frequency[-1]))
+    s = np.asarray(1j * frequency / scale)
+    if start is not None:
+        return _refined(measured, weights, s, scale, up, start, with_delay)
+    if delays is None:
+        delays = delays_to_try(measured) if with_delay else np.zeros(1)
+    starts = []
+    for delay in delays:
+        advanced = measured.values * np.exp(s * (2.0 * np.pi * scale * delay))
+        starts.append(np.append(_sanathanan(s, advanced, weights.error, order), delay))
+
+    def square(theta: Array) -> float:
+        left = (_model(theta, s, up, scale) - measured.values) / weights.error
+        return float(np.sum(np.abs(left) ** 2))
+
+    return _refined(measured, weights, s, scale, up, min(starts, key=square), with_delay)
+
+
+def delays_to_try(measured: MeasuredResponse) -> Array:
+    """From none to 1.2 times what the phase falls over the upper third of the band (s)."""
+    upper = measured.frequency >= measured.frequency[-1] * 2.0 / 3.0
+    most = 0.0
+    if np.count_nonzero(upper) > 3:
+        phase = np.unwrap(np.angle(measured.values[upper]))
+        slope = np.polyfit(2.0 * np.pi * measured.frequency[upper], phase, 1)[0]
+        most = max(-1.2 * float(slope), 0.0)
+    return np.linspace(0.0, most, DELAYS) if most > 0 else np.zeros(1)
+
+
+def _sanathanan(
+    s: ComplexArray, values: ComplexArray, error: Array, order: tuple[int, int]
+) -> Array:
+    """Coefficients (numerator, denominator), of norm 1."""
+    up, down = order
+    powers = s[:, None] ** np.arange(down + 1)
+    linear = np.column_stack([powers[:, : up + 1], -values[:, None] * powers])
+    previous = np.ones(len(s))
+    best, least = np.zeros(up + down + 2), math.inf
+    for _ in range(SANATHANAN):
+        weighted = linear / (error * previous)[:, None]
+        stacked = np.concatenate([weighted.real, weighted.imag])
+        length = np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
+        _, _, right = np.linalg.svd(stacked / length, full_matrices=False)
+        found = right[-1] / length
+        found = found / np.linalg.norm(found)
+        previous = np.maximum(np.abs(powers @ found[up + 1 :]), 1e-12)
+        left = (linear @ found) / (error * previous)
+        square = float(np.sum(np.abs(left) ** 2))
+        if square < least:
+            best, least = found, square
+    return best
+
+
+def _model(theta: Array, s: ComplexArray, up: int, scale: float) -> ComplexArray:
+    numerator, denominator = theta[: up + 1], theta[up + 1 : -1]
+    over = _polynomial(s, denominator)
+    over = np.where(np.abs(over) > 1e-300, over, 1e-300)
+    delayed = np.exp(-s * (2.0 * np.pi * scale * theta[-1]))
+    return np.asarray(delayed * _polynomial(s, numerator) / over)
+
+
+def _polynomial(s: ComplexArray, coefficients: Array) -> ComplexArray:
+    """Horner's scheme, as numpy's `polyval` has it, which looks at its arguments for longer."""
+    found = coefficients[-1] + s * 0.0
+    for coefficient in coefficients[-2::-1].tolist():
+        found = coefficient + found * s
+    return np.asarray(found)
+
+
+def _refined(
+    measured: MeasuredResponse,
+    weights: Weights,
+    s: ComplexArray,
+    scale: float,
+    up: int,
+    start: Array,
+    with_delay: bool,
+) -> RationalFit:
+    values, error = measured.values, weights.error
+    # The largest term of the denominator is held: a common factor of all coefficients is free.
+    down = len(start) - up - 3
+    powers = np.abs(s[:, None]) ** np.arange(down + 1)
+    held = up + 1 + int(np.argmax(np.max(powers, axis=0) * np.abs(start[up + 1 : -1])))
+    start = np.append(start[:-1] / start[held], start[-1])
+    size = np.append(np.maximum(np.abs(start[:-1]), 1e-12), 1.0 / (2.0 * np.pi * scale))
+    powers_of_s = _powers(s, start[: up + 1], start[up + 1 : -1])
+
+    def function(scaled: Array) -> tuple[Array, Array]:
+        theta = scaled * size
+        model = _model(theta, s, up, scale)
+        left = (model - values) / error
+        by = _log_jacobian_of(powers_of_s, s, theta[: up + 1], theta[up + 1 : -1], scale)
+        by = by * (model / error)[:, None] * size
+        return np.concatenate([left.real, left.imag]), np.concatenate([by.real, by.imag])
+
+    low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
+    scaled = start / size
+    low[held] = high[held] = scaled[held]
+    fixed = [held]
+    if not with_delay:
+        low[-1] = high[-1] = scaled[-1]
+        fixed.append(len(start) - 1)
+    with np.errstate(all="ignore"):
+        found = minimum(function, scaled, low, high, steps=200)
+    free = np.setdiff1d(np.arange(len(start)), fixed)
+    inner, _ = covariance(found.jacobian[:, free])
+    spread = np.zeros((len(start), len(start)))
+    spread[np.ix_(free, free)] = inner * np.outer(size[free], size[free]) * weights.inflation
+    theta = found.point * size
+    n = len(values)
+    parts = found.residuals / math.sqrt(weights.mean)
+    residuals: ComplexArray = np.asarray(parts[:n] + 1j * parts[n:], dtype=complex)
+    excess, misfit = judged_fit(residuals, len(free), weights)
+    return RationalFit(
+        theta[: up + 1],
+        theta[up + 1 : -1],
+        float(theta[-1]),
+        scale,
+        spread,
+        residuals,
+        excess,
+        misfit,
+        len(free),
+        with_delay,
+        float(measured.frequency[0]),
+        float(measured.frequency[-1]),
+        condition_of(found.jacobian[:, free]),
+    )
+
+
+def condition_of(jacobian: Array) -> float:
+    """Condition number of columns of unit length, so that no unit of a parameter decides."""
+    length = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(length)) or not np.all(length > 0):
+        return math.inf
+    return float(np.linalg.cond(jacobian / length))
+
+
+def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tuple[float, Reason]:
+    """Weighted square over its expectation, and why a model is none of the response, or nothing.
+
+    Args:
+        residuals: weighted, shape (n,); squares of either part are 1 in the mean.
+    """
+    n = len(residuals)
+    left = max(2 * n - parameters, 1)
+    square = float(np.sum(np.abs(residuals) ** 2))
+    excess = square / left
+    chance = math.sqrt(n * weights.spread) / weights.mean / left
+    together = float(np.real(np.sum(residuals[1:] * np.conj(residuals[:-1])))) / max(square, 1e-300)
+    # Of white residuals this has a standard deviation of 1 / sqrt(2 n), and a model takes some off.
+    alike = together * math.sqrt(2.0 * n)
+    if excess > MOST_EXCESS and excess > 1.0 + SURE * chance:
+        return excess, LARGE_RESIDUALS(times=excess)
+    if alike > SURE and excess > 1.0 + SURE * chance:
+        return excess, ALIKE_RESIDUALS(correlation=together)
+    return excess, NONE
+
+
+def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:
+    """Every so many points: lines of a window whose neighbours know of each other (Hann: 2)."""
+    return measured.at(slice(None, None, max(every, 1)))
+
+
+def in_band(frequency: float, fit: RationalFit) -> NDArray[np.bool_] | bool:
+    """Whether a frequency lies within those that were measured."""
+    return fit.lowest <= frequency <= fit.highest

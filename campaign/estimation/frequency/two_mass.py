@@ -1,0 +1,249 @@
+"""Two inertias on a spring, from the responses of torque to rate at the motor, the load, or both.
+
+    J1 w1' = T - b1 w1 - kg x1 - tau,    J2 w2' = tau - b2 w2,    tau = k (x1 - x2) + d (w1 - w2)
+
+with the torque at the motor. What a sensor's place tells: at the motor the antiresonance
+sqrt(k / J2) and the resonance sqrt(k (1/J1 + 1/J2)), and so with a torque in N m all of J1, J2, k
+and d. At the load the antiresonance is not there: only the resonance, its damping and J1 + J2 are
+told, and infinitely many J1, J2 and k have the same three.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimation.frequency.drive import PARTS, TwoMass, correlations_of
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.modes import of_fit
+from campaign.estimation.frequency.one_inertia import HIDDEN, load_side_fit, rigid_fit
+from campaign.estimation.frequency.rational import (
+    Weights,
+    condition_of,
+    judged_fit,
+)
+from campaign.estimation.frequency.two_mass_model import (
+    Side,
+    mode_damping,
+    model,
+    model_jacobian,
+    sizes,
+    starts,
+)
+from campaign.estimation.frequency_response import Array
+from campaign.estimation.intervals import TORQUE_CONSTANT
+from campaign.estimation.least_squares import Minimum, covariance, minimum
+from campaign.reason import Cause, Reason
+
+ROUGH = 10
+"""Steps after which most starts are given up ..."""
+KEPT = 3
+"""... and how many are followed to the end."""
+LARGEST = 50.0
+"""Logarithm of an inertia or a stiffness (SI), either way, that no drive has."""
+WIDEST_RATIO = 8.0
+"""Largest logarithm of J2 / J1, either way."""
+METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
+NO_SCALE = Cause(
+    "input not a torque",
+    "the input is not a torque in N m, so that only frequencies and ratios are known",
+)
+OPEN_COMBINATION = Cause(
+    "combination left open",
+    "the data leave a combination of the inertias and the stiffness open",
+)
+
+
+def two_mass(
+    responses: Mapping[Side, MeasuredResponse],
+    torque_known: bool = True,
+    torque_uncertainty: float | None = None,
+    rigid: bool | None = None,
+) -> TwoMass:
+    """The drive whose responses fit best, with or without a spring that holds the motor.
+
+    Args:
+        responses: of torque at the motor (N m) to rate (rad/s), by where the rate was measured.
+        torque_known: whether the input is a torque in N m; else only frequencies and the ratio of
+            inertias are told.
+        torque_uncertainty: relative standard uncertainty of the torque (torque constant), a
+            systematic part of all that is in N m.
+        rigid: whether it is one inertia; None: where that explains the response of a sensor.
+
+    A fit that leaves more than scatter is *misfit*: values without intervals.
+    Raises ValueError for variances that are no weights, or too few frequencies.
+    """
+    if not responses:
+        raise ValueError("no response of a motor or a load")
+    if set(responses) == {"load"}:
+        found = _or_rigid(load_side_fit(responses["load"]), responses, rigid)
+        return _told(found, torque_known, torque_uncertainty)
+    free = two_mass_fit(responses, False)
+    held = two_mass_fit(responses, True)
+    best = held if held.criterion < free.criterion - 6.0 else free
+    if best.misfit and not held.misfit:
+        best = held
+    return _told(_or_rigid(best, responses, rigid), torque_known, torque_uncertainty)
+
+
+def _or_rigid(
+    found: TwoMass, responses: Mapping[Side, MeasuredResponse], rigid: bool | None
+) -> TwoMass:
+    """One inertia where that explains the response of a sensor as well, by Schwarz' criterion.
+
+    Or where it is no misfit, and of two the resonance is not determined within what was measured.
+    """
+    if len(responses) > 1 or rigid is False:
+        return found
+    ((side, measured),) = responses.items()
+    one = rigid_fit(measured, side)
+    rise = found.resonance
+    seen = rise.origin is Origin.MEASURED and rise.has_interval
+    seen = seen and measured.frequency[0] <= rise.value <= measured.frequency[-1]
+    better = not seen or one.criterion < found.criterion
+    return one if rigid or (better and not one.misfit) else found
+
+
+def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> TwoMass:
+    """As `two_mass`, of one of the two structures, with a torque that is known."""
+    sides: tuple[Side, ...] = tuple(sorted(responses, reverse=True))  # motor before load
+    weights = [Weights.of(responses[side]) for side in sides]
+    size = sizes(responses, sides)
+    fixed = [] if grounded else [6]
+    count = 7 + len(sides) - len(fixed)
+    if sum(2 * len(each.frequency) for each in responses.values()) < count + 8:
+        raise ValueError("too few frequencies for a two-mass drive")
+
+    def function(scaled: Array) -> tuple[Array, Array]:
+        point, left, by = scaled * size, [], []
+        for k, (side, weight) in enumerate(zip(sides, weights, strict=True)):
+            measured, error = responses[side], weight.error * math.sqrt(weight.mean)
+            found = model(measured.frequency, point, side, float(point[7 + k]))
+            left.append((found - measured.values) / error)
+            change = model_jacobian(measured.frequency, point, sides, side)
+            by.append(change * size / error[:, None])
+        all_left, all_by = np.concatenate(left), np.concatenate(by)
+        all_by[:, fixed] = 0.0
+        return (
+            np.concatenate([all_left.real, all_left.imag]),
+            np.concatenate([all_by.real, all_by.imag]),
+        )
+
+    low, high = np.full(len(size), -np.inf), np.full(len(size), np.inf)
+    low[1], high[1] = -WIDEST_RATIO, WIDEST_RATIO
+    low[[0, 2]], high[[0, 2]] = -LARGEST, LARGEST
+    low[fixed] = high[fixed] = 0.0
+    with np.errstate(all="ignore"):
+        rough = [
+            minimum(function, start / size, low, high, steps=ROUGH)
+            for start in starts(responses, sides)
+        ]
+        rough.sort(key=_cost)
+        fits = [minimum(function, each.point, low, high, steps=60) for each in rough[:KEPT]]
+    best = min(fits, key=_cost)
+    free = np.setdiff1d(np.arange(len(size)), fixed)
+    inner, open_ = covariance(best.jacobian[:, free])
+    spread = np.zeros((len(size), len(size)))
+    inflation = max(weight.inflation / weight.mean for weight in weights)
+    # Noise of the torque and leakage are the same ones in what both sensors show.
+    inflation *= len(sides)
+    spread[np.ix_(free, free)] = inner * np.outer(size[free], size[free]) * inflation
+    point = best.point * size
+    n = len(best.residuals) // 2
+    left = best.residuals[:n] + 1j * best.residuals[n:]
+    excess, misfit = judged_fit(left, len(free), weights[0])
+    if not misfit and np.any(open_[:3]):
+        misfit = OPEN_COMBINATION()
+    criterion = best.cost + len(free) * math.log(2 * n)
+    found = _estimates(point, spread * max(excess, 1.0), sides, misfit, excess, criterion, grounded)
+    return replace(found, condition=condition_of(best.jacobian[:, free]))
+
+
+def _cost(found: Minimum) -> float:
+    return found.cost if math.isfinite(found.cost) else math.inf
+
+
+def _estimates(
+    point: Array,
+    spread: Array,
+    sides: tuple[Side, ...],
+    misfit: Reason,
+    excess: float,
+    criterion: float,
+    grounded: bool,
+) -> TwoMass:
+    first, ratio, spring = (float(each) for each in np.exp(point[:3]))
+    unit = np.eye(len(point))
+    second = first * ratio
+    total = first + second
+    rise = math.sqrt(spring * (1.0 / first + 1.0 / second)) / (2.0 * math.pi)
+    dip = math.sqrt(spring / second) / (2.0 * math.pi)
+    # d log of each by (log J1, log J2 / J1, log k).
+    share = second / total
+    of_second, of_total = unit[0] + unit[1], unit[0] + share * unit[1]
+    by_rise = 0.5 * (unit[2] + of_total - unit[0] - of_second)
+    by_dip = 0.5 * (unit[2] - of_second)
+
+    share_of = 0.5 / math.sqrt(spring * second)
+    by_share = share_of * (unit[3] - 0.5 * float(point[3]) * (unit[2] + of_second))
+    damping = mode_damping(point)
+    apart = np.maximum(1e-4 * np.abs(point), 1e-9)
+    by_damping = [
+        (mode_damping(point + step) - mode_damping(point - step)) / (2.0 * np.sum(step))
+        for step in np.diag(apart)
+    ]
+    rows: Mapping[str, tuple[float, str, Array]] = {
+        "motor_inertia": (first, "kg m^2", first * unit[0]),
+        "load_inertia": (second, "kg m^2", second * of_second),
+        "total_inertia": (total, "kg m^2", total * of_total),
+        "stiffness": (spring, "N m/rad", spring * unit[2]),
+        "damping": (float(point[3]), "N m s/rad", unit[3]),
+        "resonance": (rise, "Hz", rise * by_rise),
+        "resonance_damping": (damping, "", np.array(by_damping)),
+        "antiresonance": (dip, "Hz", dip * by_dip),
+        "antiresonance_damping": (share_of * float(point[3]), "", by_share),
+        "inertia_ratio": (ratio, "", ratio * unit[1]),
+    }
+    gradients = np.array([gradient for _, _, gradient in rows.values()])
+    error = np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", gradients, spread, gradients), 0.0))
+    estimates: dict[str, Any] = {
+        name: of_fit(name, value, of, float(by_fit), misfit, METHOD)
+        for (name, (value, of, _)), by_fit in zip(rows.items(), error, strict=True)
+    }
+    return TwoMass(
+        **estimates,
+        misfit=misfit,
+        excess=excess,
+        criterion=criterion,
+        sides=sides,
+        point=point,
+        grounded=grounded,
+        covariance=spread,
+        correlations={} if misfit else correlations_of(list(rows), gradients, spread),
+    )
+
+
+def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) -> TwoMass:
+    """What can be told from these sides, and with this knowledge of the torque."""
+    hidden: dict[str, Reason] = {}
+    if not torque_known:
+        hidden = dict.fromkeys((*PARTS, "total_inertia"), NO_SCALE())
+    if found.sides == ("load",) and not found.rigid:
+        hidden |= dict.fromkeys(PARTS, HIDDEN())
+    changed: dict[str, Any] = {
+        name: Estimate.without_interval(name, math.nan, getattr(found, name).unit, reason)
+        for name, reason in hidden.items()
+    }
+    for name in (*PARTS, "total_inertia"):
+        each = getattr(found, name)
+        if name in changed or not each.has_interval or torque_uncertainty is None:
+            continue
+        part = Systematic(TORQUE_CONSTANT, abs(each.value) * torque_uncertainty)
+        changed[name] = replace(each, systematic=(*each.systematic, part))
+    kept = {pair: share for pair, share in found.correlations.items() if not {*pair} & {*hidden}}
+    return replace(found, **changed, correlations=kept)

@@ -1,0 +1,91 @@
+"""Frequency responses measured sine by sine: closed loop, open loop, level and phase.
+
+What they say about a loop is read elsewhere: `crossings` (where a level is passed, and how surely),
+`servo` (bandwidth and margins), `continuation` (how a loop goes on above its sweep), `refinement`
+(where a second sweep should measure).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.sine_point import SinePoint, mean_point
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+MOST_ERROR = 0.2
+"""of a point's own size: with more its phase is hardly known, nor its level."""
+NEIGHBOURS = 2
+"""Points on each side whose median size with it stands for its own."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """A frequency response: arrays of shape (n,), by rising frequency (Hz); see `SinePoint`."""
+
+    frequency: Array
+    values: ComplexArray
+    error: Array
+    coherence: Array
+
+    @property
+    def level(self) -> Array:
+        """Magnitude (dB), shape (n,)."""
+        return np.asarray(20.0 * np.log10(np.maximum(np.abs(self.values), 1e-300)))
+
+    @property
+    def phase(self) -> Array:
+        """Unwrapped phase (rad), shape (n,); its first value lies within half a turn of zero."""
+        return np.asarray(np.unwrap(np.angle(self.values)))
+
+    @property
+    def relative_error(self) -> Array:
+        """Standard deviation of the log magnitude and of the phase (rad), shape (n,)."""
+        return np.asarray(self.error / np.maximum(np.abs(self.values), 1e-300))
+
+    @property
+    def size(self) -> Array:
+        """Magnitude, the median of a point's and its neighbours', shape (n,).
+
+        What weights and thresholds go by: a point that noise makes large would else seem surer than
+        one that noise makes small.
+        """
+        padded = np.pad(np.abs(self.values), NEIGHBOURS, constant_values=np.nan)
+        near = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
+        return np.asarray(np.nanmedian(near, axis=1))
+
+    @property
+    def told(self) -> Response:
+        """The points whose error is below `MOST_ERROR` of their size."""
+        if not len(self.frequency):
+            return self
+        kept = self.error < MOST_ERROR * self.size
+        return Response(
+            self.frequency[kept], self.values[kept], self.error[kept], self.coherence[kept]
+        )
+
+
+def make_response(points: Sequence[SinePoint]) -> Response:
+    """Points by rising frequency; repetitions of a frequency are averaged."""
+    groups: dict[float, list[SinePoint]] = {}
+    for point in points:
+        groups.setdefault(point.frequency, []).append(point)
+    rows = [mean_point(group) for _, group in sorted(groups.items())]
+    return Response(
+        np.array([row.frequency for row in rows], dtype=float),
+        np.array([row.response for row in rows], dtype=complex),
+        np.array([row.error for row in rows], dtype=float),
+        np.array([row.coherence for row in rows], dtype=float),
+    )
+
+
+def open_loop(closed: Response) -> Response:
+    """L = T / (1 - T): error to output, of a closed loop T with unit feedback."""
+    rest = 1.0 - closed.values
+    rest = np.where(np.abs(rest) > 0, rest, 1e-300)
+    return replace(closed, values=closed.values / rest, error=closed.error / np.abs(rest) ** 2)

@@ -1,0 +1,102 @@
+"""A second interface that the noise of a ramp's rate hides from the fit of a single one.
+
+An interface that is stiffer and slips first changes the rate of the early part of a ramp only.
+Where that part is not resolved by the gyro, the curve of one interface fits as well. Its stiffness
+is then too low as stiffness at rest, and too high as that of the interface that goes on deflecting:
+one that never gives until it slips at the torque Th leaves a rate that is exactly that of a single
+interface, with a stiffness Tb / (Tb - Th) times too high.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.autocorrelated import whitened
+from campaign.estimation.bristle_fit import BristleFit
+from campaign.estimation.intervals import student
+from campaign.estimation.presliding_curve import (
+    Interface,
+    angle_derivatives,
+    presliding_angle,
+)
+
+Array = NDArray[np.float64]
+
+SHARES = (0.1, 0.15, 0.2, 0.3, 0.4)
+"""of all torque that a hidden interface is taken to carry. One of less is never resolved: half of
+the first lies before the first bin that is fitted. Of two that carry the same none is the strong
+one."""
+EARLIER = (4.0, 6.0, 10.0, 20.0, 50.0, 300.0)
+"""How many times earlier (in angle) it slips. Two that are nearer bend as one does, and no ramp
+tells them apart; the last is as good as rigid."""
+
+
+class Shift(NamedTuple):
+    """How far hidden interfaces may be from a fit's stiffness, as shares of it, not negative.
+
+    Attributes:
+        stiffness: of the interface that carries the largest torque.
+        at_rest: of the sum of all interfaces.
+    """
+
+    stiffness: float
+    at_rest: float
+
+
+class _Candidate(NamedTuple):
+    """Squares that are left over, and both stiffnesses over that of the single interface."""
+
+    squares: float
+    stiffness: float
+    at_rest: float
+
+
+def hidden_shift(one: BristleFit) -> Shift:
+    """The largest shift among the pairs of interfaces that the data do not contradict.
+
+    Each pair of `SHARES` and `EARLIER` is fitted again. A pair is not contradicted when its squares
+    exceed the least of all by no more than Student's t squared times the residual variance (profile
+    likelihood: Venzon and Moolgavkar, Appl. Statist. 37, 1988), with residuals whitened as
+    `errors_of` found them.
+    """
+    alone = _fitted(one, 0.0, 1.0)
+    pairs = [_fitted(one, share, earlier) for share, earlier in product(SHARES, EARLIER)]
+    freedom = one.errors.freedom
+    least = min(each.squares for each in (alone, *pairs) if each.stiffness > 0)
+    limit = least + student(freedom) ** 2 * alone.squares / freedom
+    left = [each for each in pairs if each.stiffness > 0 and each.squares <= limit]
+    return Shift(
+        max((abs(each.stiffness - 1.0) for each in left), default=0.0),
+        max((abs(each.at_rest - 1.0) for each in left), default=0.0),
+    )
+
+
+def _fitted(one: BristleFit, share: float, earlier: float) -> _Candidate:
+    """A pair fitted to the bins of a single interface: one linear step.
+
+    At given `share` and `earlier` the rate is linear in the bias and in 1 / stiffness, and nearly
+    so in the logarithm of all torque.
+    """
+    ((stiffness, torque),) = one.interfaces
+    # The same late part of the curve, so that the step is small.
+    parts = [Interface(stiffness * (1.0 - share), torque * (1.0 - share))]
+    if share:
+        parts.append(Interface(earlier * stiffness * share, torque * share))
+    ramp, coefficient = one.ramp, one.errors.correlation
+    angle = presliding_angle(ramp.torque, parts)
+    by_torque = angle_derivatives(angle, parts)[:, 1::2] @ [part.torque for part in parts]
+    columns = np.stack([angle, by_torque, ramp.edges], axis=1)
+    rates = (np.diff(columns, axis=0) / np.diff(ramp.edges)[:, None])[one.used]
+    design, data = whitened(rates, coefficient), whitened(ramp.rate[one.used], coefficient)
+    scale = np.linalg.norm(design, axis=0)
+    step = np.linalg.lstsq(design / scale, data, rcond=None)[0] / scale
+    left = data - design @ step
+    factor = 1.0 / float(step[0]) if step[0] > 0 else 0.0
+    total = sum(part.stiffness for part in parts)
+    return _Candidate(
+        float(left @ left), factor * parts[0].stiffness / stiffness, factor * total / stiffness
+    )

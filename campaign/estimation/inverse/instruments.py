@@ -1,0 +1,78 @@
+"""Instruments: what was wanted of a motion stands in for what was measured of it.
+
+A measured rate has noise in it, and within a loop the force answers that noise: least squares is
+biased by both. What the loop was asked for knows of neither. Source: Janot, Vandanjon, Gautier,
+IEEE Trans. Control Syst. Technol. 22 (2014); the strength of instruments after Sanderson and
+Windmeijer, J. Econometrics 190 (2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array
+from campaign.estimation.inverse.regression import (
+    Piece,
+    Regression,
+    effective_count,
+    fitted,
+    stacked,
+)
+
+WEAK = 10.0
+"""F of the first stage below which a coefficient is not determined by its instrument."""
+
+
+@dataclass(frozen=True)
+class Instrumented:
+    """A regression by instruments.
+
+    Attributes:
+        strength: conditional F of the first stage, shape (k,), with as many rows as are worth it.
+    """
+
+    fit: Regression
+    strength: Array
+
+
+def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> Instrumented:
+    """Coefficients from the same columns of another motion, row by row.
+
+    Raises ValueError where instruments say nothing of a column.
+    """
+    design, force = stacked(pieces)
+    other, _ = stacked(instruments)
+    across = other.T @ design
+    length = np.linalg.norm(other, axis=0)
+    if not np.all(length > 0):
+        raise ValueError("what was wanted never asks for some term of the model")
+    scaled = across / np.outer(length, np.linalg.norm(design, axis=0))
+    if np.linalg.cond(scaled) > 1e8:
+        raise ValueError("what was wanted cannot tell the model's terms apart")
+    inverse = np.asarray(np.linalg.solve(across, other.T))
+    fit = fitted(pieces, inverse, design, force)
+    return Instrumented(fit, _strength(design, other, pieces))
+
+
+def _strength(design: Array, other: Array, pieces: Sequence[Piece]) -> Array:
+    basis = np.linalg.qr(other)[0]
+    cuts = np.cumsum([len(piece.force) for piece in pieces])[:-1]
+
+    def explained(values: Array) -> Array:
+        return np.asarray(basis @ (basis.T @ values))
+
+    found = []
+    for index in range(design.shape[1]):
+        rest = np.delete(design, index, axis=1)
+        own = design[:, index]
+        if rest.shape[1]:
+            own = own - rest @ np.linalg.lstsq(explained(rest), own, rcond=None)[0]
+        told = explained(own)
+        left = own - told
+        count = effective_count(np.split(left, cuts))
+        noise = max(float(left @ left), float(np.finfo(float).tiny))
+        found.append(float(told @ told) / noise * max(count - other.shape[1], 1.0))
+    return np.array(found)

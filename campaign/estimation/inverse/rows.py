@@ -1,0 +1,115 @@
+"""The rows of a regression: a motion's columns and force, filtered alike and decimated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Sequence
+from itertools import pairwise
+from typing import Any, TypeVar, cast
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import (
+    Array,
+    Filtering,
+    LateRows,
+    Motion,
+    decimated,
+    kept_times,
+)
+from campaign.estimation.inverse.regression import Piece
+from campaign.estimation.inverse.terms import TERMS, Term, Terms, columns
+
+T = TypeVar("T")
+
+END_ROWS, END_PERIODS = 5, 3.0
+"""Rows, or periods of the low-pass, that its beginning and its end spoil; a tenth at most."""
+
+
+def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+    """Columns (n, k) and force (n,) of a motion, the force `delay` (s) later than recorded.
+
+    Rows that are left out as standing still are zero: the others keep their places in time.
+    """
+    piece = all_rows(motion, terms, filtering, delay)
+    if filtering.slowest == 0.0:
+        return piece
+    moves = moving(motion, filtering)
+    return Piece(piece.columns * moves[:, None], piece.force * moves, piece.time)
+
+
+def all_rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+    """The same with those that stand still."""
+    made = [_column(motion, term, filtering) for term in terms]
+    force = late_force(motion, filtering).at(delay)
+    return Piece(np.column_stack(made), force, kept_times(motion, filtering))
+
+
+_MADE: WeakKeyDictionary[Motion, dict[Hashable, Any]] = WeakKeyDictionary()
+"""Filtered columns by motion: dozens of structures share them, and filtering is what takes time."""
+
+
+def _once(motion: Motion, key: Hashable, make: Callable[[], T]) -> T:
+    kept = _MADE.setdefault(motion, {})
+    if key not in kept:
+        kept[key] = make()
+    return cast("T", kept[key])
+
+
+def _column(motion: Motion, term: Term, filtering: Filtering) -> Array:
+    def make() -> Array:
+        whole = columns(motion, [term])[filtering.skip :]
+        return decimated(whole, filtering.decimation)[:, 0]
+
+    return _once(motion, (term, filtering.decimation, filtering.skip), make)
+
+
+def late_force(motion: Motion, filtering: Filtering) -> LateRows:
+    """The rows of the force, for any delay."""
+    return _once(
+        motion,
+        (filtering.decimation, filtering.skip),
+        lambda: LateRows(motion.force, motion.sample_rate, filtering),
+    )
+
+
+def moving(motion: Motion, filtering: Filtering) -> Array:
+    """1 for rows in which the axis moves, and 0 for others, shape (n,).
+
+    Those at both ends are among the others: differentiated noise is large there.
+    """
+    rate = _column(motion, TERMS["viscous"], filtering)
+    slow = np.abs(rate) < filtering.slowest
+    beside = slow.copy()
+    beside[1:] |= slow[:-1]
+    beside[:-1] |= slow[1:]
+    if filtering.slowest > 0.0:
+        per_second = motion.sample_rate / filtering.decimation
+        edge = max(END_ROWS, math.ceil(END_PERIODS * per_second / filtering.low_pass))
+        edge = min(edge, len(beside) // 10)
+        beside[:edge] = True
+        beside[len(beside) - edge :] = True
+    return np.asarray(~beside, dtype=float)
+
+
+def in_blocks(pieces: Sequence[Piece], count: int) -> list[list[slice]]:
+    """About `count` blocks of rows that follow each other, of nearly equal length, per piece."""
+    total = sum(len(piece.force) for piece in pieces)
+    parts = []
+    for piece in pieces:
+        own = max(1, round(count * len(piece.force) / total))
+        edges = np.linspace(0, len(piece.force), own + 1).astype(int)
+        parts.append([slice(int(a), int(b)) for a, b in pairwise(edges)])
+    return parts
+
+
+def part(piece: Piece, which: slice) -> Piece:
+    """Some rows of a piece."""
+    return Piece(piece.columns[which], piece.force[which], piece.time[which])
+
+
+def relative(residuals: Sequence[Array], forces: Sequence[Array]) -> float:
+    """Norm of what is left over, over that of the force."""
+    over = sum(float(each @ each) for each in residuals)
+    return float(np.sqrt(over / sum(float(each @ each) for each in forces)))

@@ -1,0 +1,77 @@
+"""How well a model predicts a motion that it was not fitted to, and whether another does better."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL
+from campaign.estimation.inverse.motion import Array
+from campaign.estimation.inverse.regression import effective_count
+from campaign.reason import Cause
+
+REPEATS = 2000
+FEWEST_BLOCKS = 8
+"""Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
+TOO_FEW_BLOCKS = Cause(
+    "too few independent blocks", "only {blocks} parts of the motion do not know of each other"
+)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Rows of a motion and what a model says of them; all of shape (n,), in the force's unit."""
+
+    time: Array
+    force: Array
+    predicted: Array
+
+    @property
+    def residuals(self) -> Array:
+        """What is left over."""
+        return self.force - self.predicted
+
+    @property
+    def relative(self) -> float:
+        """Norm of what is left over, over that of the force."""
+        return float(np.linalg.norm(self.residuals) / np.linalg.norm(self.force))
+
+
+def relative_error(name: str, prediction: Prediction, seed: int = 1) -> Estimate:
+    """The relative residual, with an interval over blocks of the motion."""
+    return _by_blocks(name, (prediction,), seed)
+
+
+def improvement(name: str, one: Prediction, other: Prediction, seed: int = 1) -> Estimate:
+    """How much lower the relative residual of `other` is than that of `one`, on the same rows."""
+    return _by_blocks(name, (one, other), seed)
+
+
+def _by_blocks(name: str, sides: tuple[Prediction, ...], seed: int) -> Estimate:
+    """Circular blocks, longer than residuals know of each other (Politis and Romano, 1992)."""
+    squares = [side.residuals**2 for side in sides]
+    norm = sides[0].force ** 2
+    count = len(norm)
+
+    def value(rows: NDArray[np.int64]) -> Array:
+        shares = [np.sqrt(each[rows].sum(-1) / norm[rows].sum(-1)) for each in squares]
+        return np.asarray(shares[0] if len(shares) == 1 else shares[0] - shares[1])
+
+    here = float(value(np.arange(count)))
+    correlated = count / min(effective_count((each - each.mean(),)) for each in squares)
+    length = max(1, math.ceil(max(2.0 * correlated, count ** (1.0 / 3.0))))
+    blocks = count // length
+    method = f"{REPEATS} resamplings of {blocks} blocks of {length} rows"
+    if blocks < FEWEST_BLOCKS:
+        reason = TOO_FEW_BLOCKS(blocks=blocks)
+        return Estimate.without_interval(name, here, "", reason, method=method)
+    random = np.random.Generator(np.random.PCG64(seed))
+    starts = random.integers(0, count, (REPEATS, blocks, 1))
+    rows = (starts + np.arange(length)).reshape(REPEATS, -1) % count
+    low, high = np.quantile(value(rows), (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
+    low, high = min(float(low), here), max(float(high), here)
+    return Estimate(name, here, "", low, high, LEVEL, method)

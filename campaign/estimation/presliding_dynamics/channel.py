@@ -1,0 +1,91 @@
+"""A measured channel of a record: what is taken out of its residuals, and how its noise weighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.presliding_dynamics.plant import Array
+
+MOST_ORDER = 12
+"""Of the autoregression of a channel's noise."""
+DRIFT = {"rate": 2, "angle": 1}
+"""Coefficients of the polynomial that each channel may be off by: offset, drift."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A measured channel of a record, and what is taken out of it.
+
+    Attributes:
+        name: `rate` or `angle`.
+        samples: measured (rad/s or rad), 0 where lost, shape (n,).
+        kept: which samples are there.
+        there: 1 where a whitened sample is there, else 0, shape (n,).
+        basis: orthonormal columns of whitened offset and drift, shape (n, q).
+        deviation: of its residuals, whitened (rad/s or rad).
+        whitening: 1, -a1, -a2, ... of the autoregression that its noise is taken for.
+    """
+
+    name: str
+    samples: Array
+    kept: NDArray[np.bool_]
+    there: Array
+    basis: Array
+    deviation: float
+    whitening: Array
+
+    @classmethod
+    def of(
+        cls, name: str, samples: Array, kept: NDArray[np.bool_], deviation: float, whitening: Array
+    ) -> Channel:
+        """With what follows from those: a sample after a lost one cannot be whitened."""
+        there = kept.copy()
+        for lag in range(1, len(whitening)):
+            there[lag:] &= kept[:-lag]
+        # The first samples have no past; what is before them is not known to be 0.
+        there[: len(whitening) - 1] = False
+        powers = np.vander(np.linspace(-1.0, 1.0, len(kept)), DRIFT[name])
+        basis = np.linalg.qr(filtered(powers, whitening) * there[:, None])[0]
+        return cls(name, samples, kept, there.astype(float), basis, deviation, whitening)
+
+    def left(self, values: Array) -> Array:
+        """What is left of values (n, ...) without offset and drift, whitened, in deviations."""
+        shown = (filtered(values, self.whitening).T * self.there).T
+        return np.asarray((shown - self.basis @ (self.basis.T @ shown)) / self.deviation)
+
+
+def filtered(values: Array, whitening: Array) -> Array:
+    """Values (n, ...) through the filter of an autoregression."""
+    from scipy.signal import lfilter
+
+    if len(whitening) == 1 or not values.size:
+        return values
+    return np.asarray(lfilter(whitening, [1.0], values, axis=0))
+
+
+def white_noise(samples: Array) -> float:
+    """Deviation of white noise on a smooth course, by second differences; never 0."""
+    rough = float(np.std(np.diff(samples, 2))) / np.sqrt(6.0)
+    return float(max(rough, 1e-4 * np.std(samples), np.finfo(float).tiny))
+
+
+def autoregression(residuals: Array) -> Array:
+    """1, -a1, ... of residuals (n,), by the recursion of Levinson and Durbin."""
+    count = len(residuals)
+    most = min(MOST_ORDER, count // 20)
+    covariance = np.array([residuals[lag:] @ residuals[: count - lag] for lag in range(most + 1)])
+    if not covariance[0] > 0:
+        return np.ones(1)
+    filters, variance = [np.ones(1)], covariance[0] / count
+    scores = [count * np.log(variance)]
+    for order in range(1, most + 1):
+        last = filters[-1]
+        reflection = -(last @ covariance[order:0:-1]) / (count * variance)
+        grown = np.append(last, 0.0)
+        filters.append(grown + reflection * grown[::-1])
+        variance *= max(1.0 - reflection**2, 1e-12)
+        scores.append(count * np.log(variance) + 2.0 * order)
+    return filters[int(np.argmin(scores))]

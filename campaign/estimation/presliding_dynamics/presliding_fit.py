@@ -1,0 +1,220 @@
+"""What records below breakaway say of an axis: the numbers for a reader, or why there are none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import (
+    LEVEL,
+    MODEL_MISFIT,
+    SPANS_DECADES,
+    WIDEST,
+    shifted_by,
+    student,
+    with_error,
+)
+from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
+from campaign.estimation.presliding_dynamics.fitted import Fitted
+from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
+from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.estimation.presliding_dynamics.record import Assumed, Record
+from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
+from campaign.estimation.presliding_dynamics.uncertainty import (
+    CURVED,
+    Spread,
+    profile_end,
+    spread_of,
+)
+from campaign.reason import NONE, Cause, Reason
+
+METHOD = "joint output-error fit below breakaway"
+UNITS = {
+    "bristle_stiffness": "N m/rad",
+    "bristle_damping": "N m s/rad",
+    "damping": "N m s/rad",
+    "inertia": "kg m^2",
+    "yielding": "1/(N m)",
+    "viscous_friction": "N m s/rad",
+    "rate_delay": "s",
+    "angle_delay": "s",
+    "appendage_frequency": "Hz",
+    "appendage_inertia": "kg m^2",
+    "appendage_damping_ratio": "",
+}
+POSITIVE = ("bristle_damping", "damping", "viscous_friction", "appendage_damping_ratio")
+UNSCALED = ("rate_delay", "angle_delay", "yielding")
+"""Whose size says nothing of how far an error of the model may move them."""
+PROFILED = ("bristle_stiffness", "bristle_damping", "damping", "inertia")
+"""Whose limits are looked for along the profile where an interval is wide."""
+SLIPPING = 0.95
+"""Bristle torque over that at which they slip, as fitted, from which on a load breaks away."""
+NO_MINIMUM = Cause("no minimum", "the search did not end in a minimum")
+BREAKS_AWAY = Cause(
+    "breakaway in a record",
+    "the load breaks away in {records}: leave that out, or ask for less torque",
+)
+FLAT_PROFILE = Cause(
+    "flat profile", "its profile never rises: the records say nothing of it on one side"
+)
+TOO_LITTLE = Cause("too little of it", "the records have it {where}: they show too little of it")
+
+
+@dataclass(frozen=True)
+class PreslidingDynamics:
+    """Result of a joint fit below breakaway.
+
+    Attributes:
+        estimates: by name, all of `UNITS` that were free, and what follows from them: `damping`,
+            the sum of sigma1 and sigma2 (N m s/rad), `damping_ratio` of that, and
+            `natural_frequency` (Hz).
+        fit, spread, misfit: what they rest on.
+        reason: why none of them has an interval; none: it is each one's own.
+    """
+
+    estimates: dict[str, Estimate]
+    fit: Fitted
+    spread: Spread
+    misfit: Misfit
+    reason: Reason
+
+    @property
+    def plant(self) -> Plant:
+        """That fits best."""
+        return self.fit.plant
+
+
+def identify_presliding_dynamics(
+    records: Sequence[Record], assumed: Assumed | None = None, first: Plant | None = None
+) -> PreslidingDynamics:
+    """Stiffness and damping of the bristles and inertia from all records at once.
+
+    `first`: where the search begins; absent: a linear fit of the spectra. An estimate is *not
+    determined* where its interval is wide, or the parameter is at its bound; none has an interval
+    where one inertia on one bristle does not describe the records. Raises ValueError with the
+    reason where there is no fit at all.
+    """
+    plain = fit_presliding_dynamics(records, assumed, first)
+    fit = whitened(plain)
+    misfit = misfit_of(plain, fit)
+    spread = spread_of(fit)
+    reason = _reason(fit, misfit)
+    if reason:
+        found = {name: _without(fit, name, reason) for name in fit.parameters.names}
+    else:
+        every = enumerate(fit.parameters.names)
+        found = {name: _estimate(fit, spread, misfit, index) for index, name in every}
+        found |= _derived(fit, spread, misfit)
+    return PreslidingDynamics(found, fit, spread, misfit, reason)
+
+
+def _reason(fit: Fitted, misfit: Misfit) -> Reason:
+    if not fit.reached:
+        return NO_MINIMUM()
+    slipping = [
+        record.named
+        for number, record in enumerate(fit.records)
+        if fit.largest_yielding(number) > SLIPPING
+    ]
+    if slipping:
+        return BREAKS_AWAY(records=", ".join(slipping))
+    return MODEL_MISFIT(why=misfit.reason) if misfit.reason else NONE
+
+
+def _without(fit: Fitted, name: str, reason: Reason) -> Estimate:
+    value, _ = fit.parameters.in_units(fit.vector, name)
+    return Estimate.without_interval(name, value, UNITS[name], reason, method=METHOD)
+
+
+def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estimate:
+    """Of one shared parameter, with its limits along the profile where that is curved."""
+    name = fit.parameters.names[index]
+    value, scale = fit.parameters.in_units(fit.vector, name)
+    freedom, deviation = float(spread.freedom[index]), float(spread.deviation[index])
+    quantile = student(freedom)
+    if name in LOGARITHMIC and quantile * deviation > WIDEST:
+        return replace(_without(fit, name, SPANS_DECADES()), origin=Origin.NOT_DETERMINED)
+    ends = [float(fit.vector[index]) + way * quantile * deviation for way in (-1.0, 1.0)]
+    size = 1.0 if name in LOGARITHMIC else abs(float(fit.vector[index]))
+    if name in PROFILED and CURVED * size < deviation < size:
+        try:
+            ends = [profile_end(fit, spread, index, quantile, way) for way in (-1.0, 1.0)]
+        except ValueError:
+            return replace(_without(fit, name, FLAT_PROFILE()), origin=Origin.NOT_DETERMINED)
+    low, high = (_in_units(fit, name, end) for end in ends)
+    found = Estimate(
+        name,
+        value,
+        UNITS[name],
+        low,
+        high,
+        LEVEL,
+        METHOD,
+        standard_error=deviation * scale,
+        freedom=freedom if math.isfinite(freedom) else None,
+    )
+    found = _missed(_shifted(found, float(misfit.shift[index]) * scale), misfit)
+    if name in POSITIVE and low <= 0.0:
+        where = "at or below nothing" if value <= 0.0 else "an interval that holds nothing"
+        reason = TOO_LITTLE(where=where)
+        origin = Origin.AT_BOUND if value <= 0.0 else Origin.NOT_DETERMINED
+        return replace(found, origin=origin, reason=reason)
+    return found if name.endswith("delay") or name == "yielding" else admitted(found)
+
+
+def _in_units(fit: Fitted, name: str, at: float) -> float:
+    vector: Array = fit.vector.copy()
+    vector[fit.parameters.names.index(name)] = at
+    return fit.parameters.in_units(vector, name)[0]
+
+
+def _shifted(estimate: Estimate, shift: float) -> Estimate:
+    """With a part that is evenly likely up to what other shapes would change (GUM 4.3.7)."""
+    if not shift:
+        return estimate
+    return shifted_by(estimate, "shape of the bristles' curve", abs(shift) / math.sqrt(3.0))
+
+
+def _missed(estimate: Estimate, misfit: Misfit) -> Estimate:
+    """With a part for what the model surely misses, though too little for a misfit.
+
+    An answer that is wrong by a share may have moved a number by as large a share.
+    """
+    share = misfit.band_share
+    if misfit.band_chance >= SURELY or not share or estimate.name in UNSCALED:
+        return estimate
+    return shifted_by(estimate, "what the model misses", share * abs(estimate.value))
+
+
+def _derived(fit: Fitted, spread: Spread, misfit: Misfit) -> dict[str, Estimate]:
+    """Whole damping, its ratio, and natural frequency of the load, by the delta method."""
+    plant, names = fit.plant, fit.parameters.names
+    scale, ratio = fit.parameters.damping_scale, 0.5 / math.sqrt(plant.stiffness * plant.inertia)
+    own = plant.bristles[0].damping
+    whole = own + plant.viscous
+    told: list[tuple[str, float, str, dict[str, float]]] = []
+    if "damping" in names:
+        row = {"damping": scale, "viscous_friction": -scale}
+        told.append(("bristle_damping", own, "N m s/rad", row))
+    else:
+        told.append(("damping", whole, "N m s/rad", {"bristle_damping": scale}))
+    # Of stiffness and inertia the vector has logarithms.
+    half = -0.5 * whole * ratio
+    row = {"bristle_stiffness": half, "inertia": half, names[1]: ratio * scale}
+    told.append(("damping_ratio", whole * ratio, "", row))
+    natural = plant.natural_frequency
+    row = {"bristle_stiffness": 0.5 * natural, "inertia": -0.5 * natural}
+    told.append(("natural_frequency", natural, "Hz", row))
+    found = {}
+    for name, value, unit, slopes in told:
+        of = np.array([slopes.get(each, 0.0) for each in names])
+        error = float(np.sqrt(of @ spread.covariance @ of))
+        freedom = float(np.min(spread.freedom[of != 0.0], initial=np.inf))
+        estimate = with_error(name, value, unit, error, freedom, METHOD)
+        found[name] = admitted(_missed(_shifted(estimate, float(of @ misfit.shift)), misfit))
+    return found

@@ -1,0 +1,266 @@
+"""Whether one inertia on one bristle describes the records, or something else than noise is left.
+
+Two questions are asked of the residuals, neither of which takes coloured noise for an error of the
+model. Are they a part of the simulated answer, band by band (an elastic part, a second inertia, a
+wrong delay)? And do they look like what other bristles would change: several interfaces that slip
+at different angles, a falling friction curve, springs that are not linear? These are score tests
+(Rao; White, Econometrica 50, 1982), with the covariance of autocorrelated scores; how far the
+parameters would move is the step to a model that has these terms.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimation.presliding_dynamics.fitted import Fitted, products, with_torque
+from campaign.estimation.presliding_dynamics.long_run import at_bandwidths
+from campaign.estimation.presliding_dynamics.plant import Array, Bristles
+from campaign.reason import NONE, Cause, Reason
+
+BANDS = 10
+"""into which the answer is cut, evenly over the logarithm of frequency."""
+FAINT = 1e-3
+"""Share of the answer's power below and above which no band lies."""
+SLIP_APART = 0.8
+"""How far the slip angles of the two halves of a bristle are set apart, either way."""
+PUSH = 0.02
+"""Size of a further force over the largest torque, for its influence to be told."""
+SURELY = 1e-4
+"""Chance with which noise would look like an error of the model that is taken for one."""
+LIKELY = 0.01
+"""Chance below which what other shapes would change is a part of the uncertainty."""
+LARGE = 0.02
+"""Share of the answer that an error of the model may have before no number is given."""
+NOISE = 2.0
+"""Times what noise explains by chance is taken off what columns explain: its own size is seldom
+known better."""
+ALIKE = 1e-8
+"""Share of a column that must be its own, or it says nothing that the parameters do not."""
+
+SHAPES = (
+    "interfaces that slip at different angles",
+    "friction that falls with the rate",
+    "bristles that stiffen",
+    "bristles that differ by direction",
+    "damping that grows with the rate",
+)
+
+ANSWER_MISSED = Cause(
+    "answer missed",
+    "one inertia on one bristle misses the answer by {share_percent:.2g} %, "
+    "most near {frequency:.3g} Hz",
+)
+SHAPE_MISSED = Cause(
+    "shape missed",
+    "one bristle misses the answer by {share_percent:.2g} %, as would be by {shape}",
+)
+
+
+@dataclass(frozen=True)
+class Band:
+    """What is left over in a band, over the simulated answer there: in phase, a quarter ahead."""
+
+    frequency: float
+    error: complex
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What residuals have in common with the simulated answer and with other shapes.
+
+    Attributes:
+        bands: gain error by frequency.
+        band_share: rms of what the bands explain over that of the answer.
+        band_chance: with which noise explains the residuals as well.
+        shape_share, shape_chance: the same of other shapes of the bristles.
+        shape: the one of `SHAPES` that says most by itself.
+        shift: by which the shared parameters would move with other shapes, in the vector's units,
+            shape (k,); 0 where noise explains the residuals as well.
+    """
+
+    bands: tuple[Band, ...]
+    band_share: float
+    band_chance: float
+    shape_share: float
+    shape_chance: float
+    shape: str
+    shift: Array
+
+    @property
+    def reason(self) -> Reason:
+        """Why no interval can be built on the fit; none: it can."""
+        if self.band_chance < SURELY and self.band_share > LARGE:
+            worst = max(self.bands, key=lambda band: abs(band.error))
+            return ANSWER_MISSED(share_percent=100 * self.band_share, frequency=worst.frequency)
+        if self.shape_chance < SURELY and self.shape_share > LARGE:
+            return SHAPE_MISSED(share_percent=100 * self.shape_share, shape=self.shape)
+        return NONE
+
+
+def misfit_of(plain: Fitted, whitened: Fitted) -> Misfit:
+    """Ask the residuals of a fit both questions, as they are and whitened.
+
+    How large an error of the model is, residuals say as they are: an autoregression would take much
+    of it for noise. Whether noise would look like it, only whitened ones say in short records.
+    """
+    found, other = _misfit_of(plain), _misfit_of(whitened)
+    shape_chance = max(found.shape_chance, other.shape_chance)
+    return replace(
+        found,
+        band_chance=max(found.band_chance, other.band_chance),
+        shape_chance=shape_chance,
+        shift=found.shift * (shape_chance < LIKELY),
+    )
+
+
+def _misfit_of(fit: Fitted) -> Misfit:
+    size = sum(float(np.sum(answer**2)) for answer in _answers(fit))
+    places, columns = _band_columns(fit)
+    _, _, chance, explained = _score_test(fit, columns)
+    left = sum(np.einsum("cn,cnk->k", r, c) for r, c in zip(fit.residuals, columns, strict=True))
+    there = sum(np.einsum("cnk,cnk->k", c, c) for c in columns)
+    pairs = (left / np.maximum(there, np.finfo(float).tiny)).reshape(-1, 2)
+    bands = tuple(Band(place, complex(*pair)) for place, pair in zip(places, pairs, strict=True))
+    found = _shape_columns(fit)
+    _, shift, shape_chance, shape_explained = _score_test(fit, found)
+    alone = [_score_test(fit, [each[:, :, [k]] for each in found])[3] for k in range(len(SHAPES))]
+    return Misfit(
+        bands,
+        float(np.sqrt(explained / size)),
+        chance,
+        float(np.sqrt(shape_explained / size)),
+        shape_chance,
+        SHAPES[int(np.argmax(alone))],
+        shift[: len(fit.parameters.names)],
+    )
+
+
+def _answers(fit: Fitted) -> list[Array]:
+    """Simulated answers without offset and drift, in deviations, shape (channels, n)."""
+    return [
+        np.array([c.left(told) for c, told in zip(group, fit.answers(number), strict=True)])
+        for number, group in enumerate(fit.channels)
+    ]
+
+
+def _band_columns(fit: Fitted) -> tuple[list[float], list[Array]]:
+    """Middle of each band (Hz), and the answer in it, in phase and a quarter ahead."""
+    answers = _answers(fit)
+    low, high = np.inf, 0.0
+    for record, answer in zip(fit.records, answers, strict=True):
+        power = np.cumsum(np.sum(np.abs(np.fft.rfft(answer)) ** 2, axis=0))
+        frequency = np.fft.rfftfreq(answer.shape[1], record.step)
+        inside = np.searchsorted(power / power[-1], [FAINT, 1.0 - FAINT])
+        low = min(low, float(frequency[max(int(inside[0]), 1)]))
+        high = max(high, float(frequency[min(int(inside[1]), len(frequency) - 1)]))
+    edges = np.geomspace(low, max(high, 1.1 * low), BANDS + 1)
+    columns = []
+    for record, answer in zip(fit.records, answers, strict=True):
+        spectrum = np.fft.rfft(answer)
+        frequency = np.fft.rfftfreq(answer.shape[1], record.step)
+        found = np.zeros((*answer.shape, 2 * BANDS))
+        for index, (begin, end) in enumerate(itertools.pairwise(edges)):
+            part = spectrum * ((frequency >= begin) & (frequency < end))
+            found[:, :, 2 * index] = np.fft.irfft(part, answer.shape[1])
+            found[:, :, 2 * index + 1] = np.fft.irfft(1j * part, answer.shape[1])
+        columns.append(found)
+    return [float(np.sqrt(a * b)) for a, b in itertools.pairwise(edges)], columns
+
+
+def _shape_columns(fit: Fitted) -> list[Array]:
+    """What each of `SHAPES` would change in the simulated answer, in deviations."""
+    plant, found = fit.plant, []
+    bristles = plant.bristles[0]
+    for number, group in enumerate(fit.channels):
+        motion = fit.motion(number)
+        rate, bent = motion.rate, motion.bristle_torque[:, 0]
+        base = fit.answers(number)
+        speed = float(np.sqrt(np.mean(rate**2)))
+        falling = replace(bristles, coulomb_share=0.7, stribeck_velocity=speed)
+        # By the same force at every amplitude, or larger records would not say more.
+        force, fastest = fit.parameters.torque, _fastest(fit)
+        forces = (bent**3 / force**2, bent**2 / force, rate * np.abs(rate) * force / fastest**2)
+        other = [
+            fit.answers(number, replace(plant, bristles=each))
+            for each in (_apart(bristles), (falling,))
+        ]
+        other += [_pushed(fit, number, each) for each in forces]
+        columns = [
+            np.array([c.left(a - b) for c, a, b in zip(group, each, base, strict=True)])
+            for each in other
+        ]
+        # A shape that cannot be simulated says nothing.
+        kept = [each if np.all(np.isfinite(each)) else np.zeros_like(each) for each in columns]
+        found.append(np.stack(kept, axis=-1))
+    return found
+
+
+def _fastest(fit: Fitted) -> float:
+    return max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
+
+
+def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
+    """Two halves, of which one slips at a smaller angle and the other at a larger one."""
+    return tuple(  # type: ignore[return-value]
+        replace(
+            bristles,
+            stiffness=0.5 * bristles.stiffness,
+            damping=0.5 * bristles.damping,
+            compliance=2.0 * bristles.compliance * factor,
+        )
+        for factor in (1.0 - SLIP_APART, 1.0 + SLIP_APART)
+    )
+
+
+def _pushed(fit: Fitted, number: int, force: Array) -> Array:
+    """The answer with a further force on the load, of shape (steps + 1,)."""
+    middle = 0.5 * (force[:-1] + force[1:])
+    more = PUSH * np.column_stack([force[:-1], middle, force[1:]])
+    return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
+
+
+def _score_test(fit: Fitted, columns: list[Array]) -> tuple[Array, Array, float, float]:
+    """Step to a model with more columns: theirs, the parameters', its chance, sum explained
+    beyond what noise explains.
+
+    columns: of each record, shape (channels, n, k). Those without anything of their own are 0.
+    """
+    from scipy.special import chdtrc
+
+    size, count = fit.parameters.size, columns[0].shape[-1]
+    information = fit.information
+    across, square = np.zeros((size, count)), np.zeros((count, count))
+    for slopes, more in zip(fit.jacobians, columns, strict=True):
+        across += products(slopes, more)
+        square += products(more, more)
+    onto = np.linalg.solve(information, across)
+    own = square - across.T @ onto
+    kept = np.diag(own) > ALIKE * np.maximum(np.diag(square), np.finfo(float).tiny)
+    if not np.any(kept):
+        return np.zeros(count), np.zeros(size), 1.0, 0.0
+    apart = [
+        (more - slopes @ onto)[:, :, kept]
+        for slopes, more in zip(fit.jacobians, columns, strict=True)
+    ]
+    pairs = list(zip(fit.residuals, apart, strict=True))
+    # What is known beforehand is measured, too: residuals of their own.
+    known = fit.priors[:, None] * onto[:, kept]
+    total = known.T @ (fit.priors * fit.vector)
+    total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=total)
+    inverse = np.linalg.pinv(own[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
+    # What the columns explain is no noise: it would hide itself behind its own size.
+    scores = [(left - more @ (inverse @ total))[:, :, None] * more for left, more in pairs]
+    meat = at_bandwidths([np.sum(each, axis=0) for each in scores])[1] + known.T @ known
+    scale = np.sqrt(np.diag(meat))
+    statistic = float(
+        (total / scale)
+        @ np.linalg.pinv(meat / np.outer(scale, scale), rcond=1e-9, hermitian=True)
+        @ (total / scale)
+    )
+    step = np.zeros(count)
+    step[kept] = inverse @ total
+    explained = float(total @ step[kept]) - NOISE * float(np.trace(inverse @ meat))
+    return step, -onto @ step, float(chdtrc(int(np.sum(kept)), statistic)), max(explained, 0.0)

@@ -1,0 +1,97 @@
+"""Where the joint fit begins: a linear inertia on a spring, from the spectra of the records."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
+from campaign.estimation.presliding_dynamics.record import Assumed, Record, measured
+
+ComplexArray = NDArray[np.complex128]
+
+GROUPS = 60
+"""of neighbouring frequencies, evenly over their logarithm: within one, noise averages out."""
+FAINT = 5e-4
+"""Share of the torque's power below and above which no group lies."""
+PASSES = 6
+"""of the weighted regression; the weights follow from the plant of the one before."""
+
+
+def first_plant(records: Sequence[Record], assumed: Assumed) -> Plant:
+    """A plant without yielding, by T = (J jw + d + sigma0 / jw) V at the excited frequencies.
+
+    Both sides are correlated with the torque, so that noise of the rate biases nothing; weights as
+    Sanathanan and Koerner have them (IEEE Trans. Autom. Control 8, 1963). Raises ValueError where
+    the records show no stiffness.
+    """
+    parts = [group for record in records for group in _groups(record)]
+    rows = np.array([row for row, _, _ in parts])
+    power = np.array([each for _, each, _ in parts])
+    highest = max(omega for _, _, omega in parts)
+    # Of each group the plant's dynamic stiffness over the rate, at first as measured.
+    plant = power / np.maximum(np.abs(rows[:, 1]), np.finfo(float).tiny)
+    found = np.zeros(3)
+    for _ in range(PASSES):
+        weight = 1.0 / (plant * np.sqrt(power))
+        design, aim = rows * weight[:, None], power * weight
+        if assumed.inertia is not None:
+            aim, design = aim - assumed.inertia * design[:, 0], design[:, 1:]
+        scale = np.linalg.norm(design, axis=0)
+        whole = np.concatenate([design.real, design.imag]) / scale
+        sides = np.concatenate([np.real(aim), np.imag(aim)])
+        found = np.linalg.lstsq(whole, sides, rcond=None)[0] / scale
+        if assumed.inertia is not None:
+            found = np.concatenate([[assumed.inertia], found])
+        omega = np.array([each for _, _, each in parts])
+        plant = np.abs(found[0] * 1j * omega + found[1] + found[2] / (1j * omega))
+        plant = np.maximum(plant, 1e-6 * np.max(plant))
+    inertia, damping, stiffness = map(float, found)
+    if not stiffness > 0:
+        raise ValueError("the motion shows no stiffness: it does not come back to where it was")
+    part = assumed.appendage
+    if not inertia > (part.inertia if part else 0.0):
+        # Nothing at high frequencies: as large as it may be without showing.
+        inertia = max(stiffness / (4.0 * highest) ** 2, 2.0 * part.inertia if part else 0.0)
+    least = 0.02 * 2.0 * np.sqrt(stiffness * inertia)
+    bristles = Bristles(
+        stiffness,
+        max(damping - assumed.viscous, least),
+        0.3 / max(record.amplitude for record in records),
+        assumed.coulomb_share,
+        assumed.stribeck_velocity,
+        assumed.stribeck_exponent,
+    )
+    return Plant(inertia, (bristles,), assumed.viscous, part)
+
+
+def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
+    """Of each group: sums of (jw V, V, V / jw) T*, the sum of T T*, middle frequency (rad/s)."""
+    window = np.hanning(len(record.torque))
+    channels = {name: values for name, values, _ in measured(record)}
+    frequency = np.fft.rfftfreq(len(window), record.step)
+    omega = 2.0 * np.pi * np.maximum(frequency, frequency[1])
+    torque = np.fft.rfft(window * _level(record.torque))
+    answer = channels["rate" if "rate" in channels else "angle"]
+    rate = np.fft.rfft(window * _level(answer))
+    if "rate" not in channels:
+        rate = 1j * omega * rate
+    power = np.abs(torque) ** 2
+    power[0] = 0.0
+    ends = np.searchsorted(np.cumsum(power) / np.sum(power), [FAINT, 1.0 - FAINT])
+    first, last = max(int(ends[0]), 1), min(int(ends[1]), len(omega) - 1)
+    edges = np.unique(np.geomspace(first, last + 1, GROUPS + 1).astype(int))
+    cross = rate * torque.conj()
+    for begin, end in itertools.pairwise(edges):
+        here, w = cross[begin:end], omega[begin:end]
+        row = np.array([np.sum(1j * w * here), np.sum(here), np.sum(here / (1j * w))])
+        yield row, float(np.sum(power[begin:end])), float(np.sqrt(w[0] * w[-1]))
+
+
+def _level(values: Array) -> Array:
+    """Without its straight line."""
+    x = np.linspace(-1.0, 1.0, len(values))
+    return np.asarray(values - np.polyval(np.polyfit(x, values, 1), x))

@@ -1,0 +1,193 @@
+"""How well a joint fit determines its parameters.
+
+Two covariances are compared: one from the autocorrelated scores of all samples, and one from how
+the records differ from each other, which is larger where friction changed between them. The
+larger one counts where they differ by more than chance explains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimation.presliding_dynamics.fit import search
+from campaign.estimation.presliding_dynamics.fitted import Fitted
+from campaign.estimation.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
+from campaign.estimation.presliding_dynamics.plant import Array
+
+CHANCE = 0.01
+"""with which records that agree would be taken for ones that do not."""
+CURVED = 0.03
+"""Relative standard error from which on a limit is looked for along the profile."""
+TELLABLE = 1e10
+"""Condition number of the scaled information beyond which parameters cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of the shared parameters, in the vector's units.
+
+    Attributes:
+        covariance: shape (k, k).
+        freedom: degrees of freedom behind each deviation, shape (k,); infinite for scores.
+        ordinary: deviations for independent residuals, shape (k,).
+        by_bandwidth: deviations at half, once and twice the bandwidth, shape (3, k).
+        between: deviation by how records differ over that by scores, shape (k,); NaN for one.
+        condition: condition number of the information, with columns of length 1.
+    """
+
+    covariance: Array
+    freedom: Array
+    ordinary: Array
+    by_bandwidth: Array
+    between: Array
+    condition: float
+
+    @property
+    def deviation(self) -> Array:
+        """Of each shared parameter, shape (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Array:
+        """Shape (k, k)."""
+        return np.asarray(self.covariance / np.outer(self.deviation, self.deviation))
+
+
+def spread_of(fit: Fitted) -> Spread:
+    """Covariance of the shared parameters of a fit.
+
+    Raises ValueError where the records cannot tell the parameters apart.
+    """
+    shared = len(fit.parameters.names)
+    information = fit.information
+    scores = [
+        np.sum(left[:, :, None] * slopes, axis=0)
+        for left, slopes in zip(fit.residuals, fit.jacobians, strict=True)
+    ]
+    length = np.sqrt(np.diag(information))
+    if not np.all(length > 0):
+        raise ValueError("a parameter changes nothing in these records")
+    scaled = information / np.outer(length, length)
+    condition = float(np.linalg.cond(scaled))
+    if not condition < TELLABLE:
+        raise ValueError("these records cannot tell the parameters of the fit apart")
+    inverse = np.linalg.inv(scaled) / np.outer(length, length)
+    count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
+    variance = fit.cost / max(count - fit.parameters.size, 1.0)
+    ordinary = np.sqrt(variance * np.diag(inverse))[:shared]
+    # What is known beforehand is known no better than it was said to be.
+    known = np.diag(fit.priors**2)
+    meats = [meat + known for meat in at_bandwidths(scores)]
+    folded = [
+        _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
+    ]
+    covariances = [(inverse @ meat @ inverse)[:shared, :shared] for meat in meats]
+    widths = np.array([np.sqrt(np.diag(each)) for each in covariances])
+    chosen = np.where(
+        np.max(widths, axis=0) > DIFFERENT * np.min(widths, axis=0),
+        np.max(widths, axis=0),
+        widths[1],
+    )
+    # A quantised channel errs alike in each period of the torque: no period scatters then.
+    repeated = inverse @ (at_bandwidths(folded)[1] + known) @ inverse
+    chosen = np.maximum(chosen, np.sqrt(np.diag(repeated))[:shared])
+    # Residuals that avoid their neighbours promise more than they can be trusted to keep.
+    chosen = np.maximum(chosen, ordinary)
+    covariance = _scaled_to(covariances[1], chosen)
+    freedom, between = np.full(shared, np.inf), np.full(shared, np.nan)
+    if len(fit.records) > 1:
+        covariance, freedom, between = _with_records(fit, information, covariance)
+    return Spread(covariance, freedom, ordinary, widths, between, condition)
+
+
+def _folded(scores: Array, period: int | None) -> Array:
+    """Scores (n, k) summed over all periods, (period, k): their sum is the same."""
+    if period is None:
+        return scores
+    count = -(-len(scores) // period) * period
+    padded = np.concatenate([scores, np.zeros((count - len(scores), scores.shape[1]))])
+    return np.asarray(padded.reshape(-1, period, scores.shape[1]).sum(axis=0))
+
+
+def _scaled_to(covariance: Array, deviation: Array) -> Array:
+    ratio = deviation / np.sqrt(np.diag(covariance))
+    return np.asarray(covariance * np.outer(ratio, ratio))
+
+
+def _with_records(fit: Fitted, information: Array, covariance: Array) -> tuple[Array, Array, Array]:
+    """Covariance, degrees of freedom, and ratio of the deviations between records to those within.
+
+    Each record's score, without what its own parameters take, shows where it would have the shared
+    ones (Liang and Zeger, Biometrika 73, 1986).
+    """
+    from scipy.special import chdtri
+
+    shared, groups = fit.parameters.common, len(fit.records)
+    reduced = information[:shared, :shared].copy()
+    scores = []
+    for number, (left, slopes) in enumerate(zip(fit.residuals, fit.jacobians, strict=True)):
+        own = fit.parameters.of_record(number)
+        across = information[:shared, own] @ np.linalg.inv(information[own, own])
+        reduced -= across @ information[own, :shared]
+        whole = np.einsum("cn,cni->i", left, slopes)
+        scores.append(whole[:shared] - across @ whole[own])
+    scatter = np.cov(np.array(scores).T, bias=False) * groups + np.diag(fit.priors[:shared] ** 2)
+    inverse = np.linalg.inv(reduced)
+    between = np.sqrt(np.diag(inverse @ scatter @ inverse))[: len(fit.parameters.names)]
+    within = np.sqrt(np.diag(covariance))
+    ratio = between / within
+    limit = float(np.sqrt(chdtri(groups - 1, CHANCE) / (groups - 1)))
+    apart = ratio > limit
+    freedom = np.where(apart, groups - 1.0, np.inf)
+    return _scaled_to(covariance, np.where(apart, between, within)), freedom, ratio
+
+
+def profile_end(fit: Fitted, spread: Spread, index: int, quantile: float, way: float) -> float:
+    """Where the profile of a shared parameter has risen by `quantile` deviations, to one side.
+
+    The sum of squares counts in units of the parameter's own variance, so that autocorrelated
+    residuals are allowed for. Raises ValueError where the profile never rises so far.
+    """
+    sigma = float(spread.deviation[index])
+    curvature = _curvature(fit, index)
+
+    def rise(distance: float) -> float:
+        """Deviations by which the profile has risen at a distance, in `sigma`."""
+        held = _held(fit, index, way * distance * sigma)
+        return float(np.sqrt(max(held.cost - fit.cost, 0.0) / curvature)) / sigma
+
+    low, high, at_low = 0.0, quantile, 0.0
+    at_high = rise(high)
+    for _ in range(6):
+        if at_high >= quantile:
+            break
+        low, at_low = high, at_high
+        high *= 1.6
+        at_high = rise(high)
+    else:
+        raise ValueError("the records give no limit on that side")
+    for _ in range(4):
+        middle = low + (high - low) * (quantile - at_low) / (at_high - at_low)
+        at = rise(middle)
+        if abs(at - quantile) < 0.02 * quantile:
+            return float(fit.vector[index] + way * middle * sigma)
+        if at < quantile:
+            low, at_low = middle, at
+        else:
+            high, at_high = middle, at
+    return float(fit.vector[index] + way * high * sigma)
+
+
+def _curvature(fit: Fitted, index: int) -> float:
+    """Rise of the profiled sum of squares over the square of a small distance."""
+    return 1.0 / float(np.linalg.inv(fit.information)[index, index])
+
+
+def _held(fit: Fitted, index: int, distance: float) -> Fitted:
+    """The fit with one parameter held so far away, the others as good as they get."""
+    column = np.linalg.inv(fit.information)[:, index]
+    vector = np.clip(fit.vector + distance * column / column[index], *fit.parameters.bounds())
+    vector[index] = fit.vector[index] + distance
+    return search(replace(fit, vector=vector), held=index)

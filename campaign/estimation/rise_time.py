@@ -1,0 +1,155 @@
+"""The rise time of one noisy step, with its interval: where levels may be crossed, for all we know.
+
+Around each level the response is a parabola, fitted to its neighbours. Wherever that is as close to
+the level as its standard error allows, the level may be crossed; the ends of those times are the
+interval's (test inversion, so that a flat approach gives a lopsided interval, as it should), and
+both together are Newcombe's square-and-add. Over 200 seeds each of loops of first and second order,
+with white noise of 0.3 to 5 % of the step, 95 % intervals hold in 94 to 99 %.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL, student
+from campaign.estimation.least_squares import Array
+from campaign.estimation.step_response import HIGH, LOW, SCATTERS, StepCharacteristics
+from campaign.reason import Cause
+
+METHOD = "parabolas around 10 and 90 %, and where they may cross these for the recording's noise"
+QUIET = 1e-4
+"""of the step: a noise below it is none, and tells nothing of how steps differ."""
+FEWEST = 30
+"""samples of a standstill by which noise, and how long it lasts, are told."""
+DEGREE = 2
+WIDTH = 0.25
+"""Half-width of a parabola over the rise time, at most ..."""
+NOISY = 0.01
+"""... with this noise, as a share of the step; with less it is narrower, for then it is how a
+response bends that makes a parabola wrong."""
+FINE = 100
+"""places in a rise time at which a parabola is looked at."""
+SHORT_STANDSTILL = Cause(
+    "standstill too short",
+    "the standstill before it has fewer than {samples} samples to tell its noise by",
+)
+HIDDEN_LEVEL = Cause(
+    "level hidden by noise",
+    SCATTERS + ", which hides when it comes to {level_percent:.0f} %",
+)
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """When a level is crossed (s), and how far before and after that it may be."""
+
+    at: float
+    before: float
+    after: float
+
+
+def rise_interval(
+    time: Array, response: Array, start: float, step: float, found: StepCharacteristics
+) -> tuple[Estimate, float] | None:
+    """Rise time (s) from 10 to 90 % of a step, and when it begins (s); None without any noise.
+
+    Not determined, with the reason, where noise hides when a level is crossed; without an interval
+    where little noise has no standstill to be told by.
+
+    Args:
+        time, response: shape (n,), starting before the step at `start` (s); `step` is its height.
+        found: what was found of it, with a rise time.
+    """
+    known = np.isfinite(response)
+    time, response = time[known], response[known]
+    rest = response[time < start]
+    if found.noise < QUIET:
+        return None
+    if len(rest) < FEWEST:
+        few = SHORT_STANDSTILL(samples=FEWEST)
+        plain = found.rise_time if found.noise <= NOISY else math.nan
+        return Estimate.without_interval("rise_time", plain, "s", few), found.rise_from
+    share = (response - float(np.mean(rest))) / step
+    scatter, lasting = _noise(rest / step)
+    error = max(scatter, found.noise) * lasting
+    zero = error / math.sqrt(len(rest))
+    quantile = student(len(rest) - 2)
+    spacing = float(np.median(np.diff(time)))
+    narrow = min(1.0, math.sqrt(found.noise / NOISY))
+    half = max(WIDTH * narrow * found.rise_time, 2.5 * spacing)
+    crossings = []
+    for level, about in ((LOW, found.rise_from), (HIGH, found.rise_from + found.rise_time)):
+        at = np.arange(
+            max(start, about - found.rise_time), about + found.rise_time, found.rise_time / FINE
+        )
+        value, weight = _parabolas(time[time >= start], share[time >= start], at, half)
+        bound = quantile * np.hypot(error * weight, zero)
+        crossing = _crossing(at, value - level, bound, about)
+        if crossing is None:
+            told = HIDDEN_LEVEL(noise_percent=100 * found.noise, level_percent=100 * level)
+            return Estimate.without_interval("rise_time", math.nan, "s", told), math.nan
+        crossings.append(crossing)
+    first, last = crossings
+    rise = last.at - first.at
+    low = rise - math.hypot(last.before, first.after)
+    high = rise + math.hypot(last.after, first.before)
+    return Estimate("rise_time", rise, "s", low, high, LEVEL, METHOD), first.at
+
+
+def _noise(rest: Array) -> tuple[float, float]:
+    """Standard deviation about a line, and by how much more a mean scatters than of white noise."""
+    place = np.linspace(-1.0, 1.0, len(rest))
+    left = rest - np.polynomial.Polynomial.fit(place, rest, 1)(place)
+    square = float(left @ left)
+    if square == 0.0:
+        return 0.0, 1.0
+    alike = float(left[1:] @ left[:-1]) / square
+    alike += (1.0 + 4.0 * max(alike, 0.0)) / len(rest)  # residuals are less alike than the noise
+    alike = min(max(alike, 0.0), 0.95)
+    return math.sqrt(square / (len(rest) - 2)), math.sqrt((1.0 + alike) / (1.0 - alike))
+
+
+def _parabolas(time: Array, share: Array, at: Array, half: float) -> tuple[Array, Array]:
+    """Value at each place of the parabola through what is within `half` (s) of it.
+
+    And its standard error over that of a sample; both (m,), NaN where there is too little.
+    """
+    value, weight = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    first = np.searchsorted(time, at - half)
+    stop = np.searchsorted(time, at + half, side="right")
+    for k, (low, high) in enumerate(zip(first.tolist(), stop.tolist(), strict=True)):
+        if high - low < DEGREE + 2:
+            continue
+        powers = np.vander((time[low:high] - at[k]) / half, DEGREE + 1, increasing=True)
+        row = np.linalg.pinv(powers)[0]
+        value[k], weight[k] = row @ share[low:high], np.linalg.norm(row)
+    return value, weight
+
+
+def _crossing(at: Array, off: Array, bound: Array, about: float) -> _Crossing | None:
+    """Where `off` rises through zero next to `about`, and as far as it is within `bound` of it.
+
+    None where it does not, or is within it up to an end.
+    """
+    rising = np.flatnonzero((off[:-1] < 0) & (off[1:] >= 0))
+    if not len(rising):
+        return None
+    k = int(rising[np.argmin(np.abs(at[rising] - about))])
+    when = _zero(at, off, k)
+    low, high = off + bound, off - bound
+    below = np.flatnonzero(low[: k + 1] <= 0)
+    above = np.flatnonzero(high[k + 1 :] >= 0)
+    if not len(above):
+        return None
+    # Nothing rises before the step does.
+    begin = _zero(at, low, int(below[-1])) if len(below) else float(at[0])
+    return _Crossing(when, when - begin, _zero(at, high, k + int(above[0])) - when)
+
+
+def _zero(at: Array, values: Array, k: int) -> float:
+    """Where a line from value k to the next is zero."""
+    return float(at[k] - values[k] * (at[k + 1] - at[k]) / (values[k + 1] - values[k]))

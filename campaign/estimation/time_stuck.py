@@ -1,0 +1,132 @@
+"""Share of the time in which the load moves with the hull, by a rate that the sensors resolve.
+
+Stuck is where the relative rate is below a threshold: a share of the largest rate of the hull.
+Rates are smoothed until what the sensor cannot tell apart is below that threshold, and a share is
+not determined where so much smoothing would hide what is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate, Systematic
+from campaign.estimation.intervals import of_repeats
+from campaign.reason import Cause
+
+Array = NDArray[np.float64]
+
+NAME = "time_stuck"
+THRESHOLD = 0.001
+"""of the largest rate of the hull."""
+SMOOTHED = 0.01
+"""Longest smoothing, as a share of one part of the record (a half cycle)."""
+SIGMAS = 2.0
+"""of the noise that stay below the threshold."""
+UNRESOLVED = Cause(
+    "rate not resolved",
+    "no sensor resolves it: with one count, or twice the noise, below 0.1 % of the hull's largest "
+    "rate, the smoothing is longer than 1 % of a half cycle",
+)
+
+
+@dataclass(frozen=True)
+class _Rate:
+    """Relative rate smoothed over `span` samples, and from which sensor."""
+
+    values: Array
+    span: int
+    sensor: str
+
+
+def time_stuck(
+    base_rate: Array, relative_angle: Array, gyro_rate: Array, step: float, parts: int
+) -> Estimate:
+    """Share of the time stuck, t over the parts of the record; arrays of one shape (n,).
+
+    By the encoder where one of its counts is small enough, else by the difference of the load's
+    and the hull's rate in space, which takes both on one clock.
+
+    Args:
+        base_rate: of the hull (rad/s).
+        relative_angle: of the load relative to the hull, by the encoder (rad).
+        gyro_rate: of the load in space (rad/s).
+        step: between samples (s).
+        parts: into which the record is cut: its half cycles.
+    """
+    threshold = THRESHOLD * float(np.max(np.abs(base_rate), initial=0.0))
+    longest = SMOOTHED * len(base_rate) / max(parts, 1)
+    for rate in _rates(base_rate, relative_angle, gyro_rate, step, threshold):
+        if not rate.span <= max(longest, 1.0) or not np.all(np.isfinite(rate.values)):
+            continue
+        stuck = np.abs(rate.values) < threshold
+        cut = np.round(np.linspace(0, len(stuck), parts + 1)).astype(int)
+        shares = np.add.reduceat(stuck.astype(float), cut[:-1]) / np.diff(cut)
+        told = of_repeats(NAME, shares, "", "half cycles")
+        # Each end of a time stuck is uncertain by the smoothing, rectangularly; it has two.
+        blur = rate.span * parts / len(base_rate) / math.sqrt(6.0)
+        how = f"relative rate below {threshold:.3g} rad/s by {rate.sensor}"
+        method = f"{how}, smoothed over {rate.span * step:.3g} s; {told.method}"
+        blurred = (Systematic("smoothing of the rate", blur),)
+        return replace(_share(told), method=method, systematic=blurred)
+    return Estimate.without_interval(NAME, math.nan, "", UNRESOLVED())
+
+
+def over_recordings(found: Sequence[Estimate]) -> Estimate | None:
+    """What several trials say together, t over them; None for none.
+
+    A share is told by its distance from 0 and 1, not by its size: 1 % ± 1 % is well determined, so
+    that `judged` has no place here.
+    """
+    if len(found) < 2:
+        return found[0] if found else None
+    shares = [one.value for one in found]
+    told = of_repeats(NAME, shares, "", "trials", systematic=found[0].systematic)
+    return _share(told)
+
+
+def _share(told: Estimate) -> Estimate:
+    """With the ends that scatter leaves where a share can be, as its systematic parts will be."""
+    low = None if told.low is None else max(told.low, 0.0)
+    high = None if told.high is None else min(told.high, 1.0)
+    return replace(told, low=low, high=high, kind="share")
+
+
+def _rates(
+    base_rate: Array, angle: Array, gyro: Array, step: float, threshold: float
+) -> Iterator[_Rate]:
+    """Relative rates, each smoothed as much as its sensor needs."""
+    if not threshold > 0:
+        return
+    if np.all(np.isfinite(angle)) and count_of(angle) > 0:
+        unsure = max(count_of(angle), SIGMAS * math.sqrt(2.0) * noise_of(angle))
+        span = max(1, math.ceil(unsure / (threshold * step)))
+        if span < len(angle):
+            yield _Rate((angle[span:] - angle[:-span]) / (span * step), span, "the encoder")
+    if np.all(np.isfinite(gyro)) and count_of(gyro) <= threshold:
+        span = max(1, math.ceil((SIGMAS * noise_of(gyro) / threshold) ** 2))
+        if span < len(gyro):
+            total = np.concatenate([[0.0], np.cumsum(gyro - base_rate)])
+            yield _Rate((total[span:] - total[:-span]) / span, span, "the rates of load and hull")
+
+
+def count_of(samples: Array) -> float:
+    """One count of the sensor: the smallest distance of two values; 0 where there is only one."""
+    steps = np.diff(np.unique(samples))
+    steps = steps[steps > 1e-9 * float(np.max(np.abs(samples), initial=0.0))]
+    return float(np.min(steps)) if len(steps) else 0.0
+
+
+def noise_of(samples: Array) -> float:
+    """Standard deviation of white noise on smooth samples, from their third differences.
+
+    By the median, so that reversals do not count; a third difference of noise has the variance
+    20 sigma^2 (1 + 9 + 9 + 1).
+    """
+    if len(samples) < 8:
+        return 0.0
+    return float(np.median(np.abs(np.diff(samples, 3)))) / (0.6745 * math.sqrt(20.0))

@@ -1,0 +1,47 @@
+"""Many quantities of one report: which changes are declared, and which would have been seen.
+
+Benjamini and Hochberg (Journal of the Royal Statistical Society B 57, 1995): of what is declared,
+at most a share of `RATE` is expected to be false.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from campaign.estimation.trends.scatter import Mixture
+
+RATE = 0.05
+POWER = 0.8
+"""How often a change of the detectable size would be declared."""
+
+
+def adjusted(p: Sequence[float]) -> list[float]:
+    """The p values as Benjamini and Hochberg adjust them, in the same order; none for none."""
+    if not p:
+        return []  # before what takes a third of a second to import
+    from scipy.stats import false_discovery_control
+
+    return [float(each) for each in false_discovery_control(list(p), method="bh")]
+
+
+def level_of(p: Sequence[float], rate: float = RATE) -> float:
+    """The p value at which one more of the family would be declared, given the others."""
+    if not p:
+        return rate
+    declared = sum(each <= rate for each in adjusted(p))
+    return rate * min(declared + 1, len(p)) / len(p)
+
+
+def detectable(known: Mixture, level: float, power: float = POWER) -> float:
+    """Smallest size that would be declared at `level` with a probability of `power`.
+
+    known: what the points leave open of the number; its centre does not matter. The scatter that
+        was found is taken as what it would have been with such a change, too.
+    """
+    from scipy.special import ndtri
+
+    needed = 0.5 * float(np.diff(known.interval(1.0 - level))[0])
+    one_sigma = 0.5 * float(np.diff(known.interval(0.682689492137))[0])
+    return needed + float(ndtri(power)) * one_sigma

@@ -1,0 +1,375 @@
+"""Static friction parameters from a friction-velocity map, with intervals that hold.
+
+A point is the mean of a window, whose own deviation is known, and it deviates from the next point
+by more: friction changes from trial to trial, and what is left of its ripple over position is no
+noise of the window. So a point counts with 1 / (window² + (between × torque)²), where the relative
+deviation between points is what makes chi-square equal to its degrees of freedom (Paule and Mandel,
+"Consensus values and weighting factors", J. Res. NBS 87 (1982)). The torque in it is all of the
+friction, or friction without its viscous part, whichever is likelier: grease and contact need not
+scatter alike. Intervals are Student's t with n - p, from (JᵀWJ)⁻¹. A parameter that ends
+at a bound is not known by that: p and J have it, too, so that the intervals of the others are
+rather too wide than too narrow.
+
+Every map is fitted with delta free, with delta = 2 as the LuGre model has it, and without a
+Stribeck effect. All three have the weights of the first, the most general: a model that does not
+fit the data must not call its misfit noise. Its interval is that of the curve of its kind that is
+closest to the truth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.extrapolated import extrapolated
+from campaign.estimation.gate import USELESS, admitted, mattering, refused
+from campaign.estimation.intervals import shifted_by, student, with_error
+from campaign.estimation.least_squares import Array, profile_limit, refuse_too_few
+from campaign.estimation.point_weights import (
+    Scatter,
+    fit_with_scatter,
+    lack_of_fit,
+    smoothed_deviation,
+)
+from campaign.estimation.stribeck import (
+    PARAMETERS,
+    UNITS,
+    StribeckFit,
+    fit_line,
+    fit_stribeck,
+    held_at,
+    stribeck,
+    with_misfit,
+)
+from campaign.reason import NONE, Cause, Reason
+
+Model = Literal["free", "2", "none"]
+MODELS: tuple[Model, ...] = ("free", "2", "none")
+"""How the Stribeck effect is modelled: delta free, delta = 2, none."""
+HELD = {"free": None, "2": 2.0}
+DOUBTED = 0.2
+"""p-value below which the points contradict a model that holds a parameter."""
+EFFECT = 1e-3
+"""p-value of a line below which a Stribeck effect shows. A line has neither vs nor delta, so that
+the F distribution is none of it (Davies, Biometrika 74 (1987) 33); and an effect that just shows is
+told too large. Of 600 lines two passed 0.01 and none 0.001."""
+FORM = "form of the curve"
+BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_exponent")
+STRAIGHT = 0.2
+"""Half-width of vs over it up to which intervals follow from the slopes of the curve."""
+TINY = 1e-300
+LACKING = 0.05
+"""p-value below which a model does not describe the points, or the repeated points."""
+HELD_EXPONENT = Cause("held", "held at {value:g}")
+LEFT_OPEN = Cause("left open by points", "these points leave it open")
+NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effect")
+SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
+EXPONENT_ENDED = Cause(
+    "exponent at search limit", "the exponent ended at {value:.3g}, its {side} limit, and moves it"
+)
+NEGATIVE = Cause("negative by the data", "the data would have it negative")
+LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
+CONTRADICTED: Mapping[Model, Cause] = {
+    "2": Cause("exponent contradicted", "the points contradict the exponent of 2 (p = {p:.2g})"),
+    "none": Cause("Stribeck effect shows", "the points show a Stribeck effect (p = {p:.2g})"),
+}
+"""Why parameters are those of a model that the data contradict."""
+
+
+@dataclass(frozen=True)
+class DirectionFit:
+    """The fits of one direction of a map; arrays of shape (n,), one entry for each speed.
+
+    Attributes:
+        place: what repeats had in common: the commanded speed; without repeats, `speed`.
+        speed, torque: positive (rad/s, N m).
+        window: deviation of each torque that its window shows (N m, 1 sigma).
+        scatters: how points deviate beyond that; by the larger, where they do not tell which.
+        fits: by model.
+        lack_of_fit: p-value of `free` against repeated points; None without repeats.
+    """
+
+    place: Array
+    speed: Array
+    torque: Array
+    window: Array
+    scatters: tuple[Scatter, ...]
+    fits: Mapping[Model, StribeckFit]
+    lack_of_fit: float | None = None
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of every interval: points beyond what `free` fits, bounds or not."""
+        return len(self.speed) - len(self.fits["free"].free)
+
+    @property
+    def deviation(self) -> Array:
+        """Of each torque, window and between together (N m, 1 sigma)."""
+        return self.fits["free"].deviation
+
+    @property
+    def shows_stribeck_effect(self) -> bool:
+        """Whether the points contradict a line beyond doubt."""
+        return self._p_value("none") < EFFECT
+
+    @property
+    def preferred(self) -> Model:
+        """The model with the lowest Bayesian information criterion."""
+        return min(MODELS, key=lambda model: self.fits[model].bic)
+
+    def contradiction(self, model: Model) -> Reason:
+        """Why the points contradict a model: what it holds fixed; `NONE` where they do not."""
+        p = self._p_value(model)
+        return CONTRADICTED[model](p=p) if p < DOUBTED else NONE
+
+    def _p_value(self, model: Model) -> float:
+        """F test of a model against the free fit, whose weights it has."""
+        held, free = self.fits[model], self.fits["free"]
+        more = len(free.free) - len(held.free)
+        if more <= 0:
+            return 1.0
+        excess = (held.chi_square - free.chi_square) / more
+        ratio = excess / max(free.chi_square / self.freedom, TINY)
+        from scipy.special import fdtrc
+
+        return float(fdtrc(more, self.freedom, max(ratio, 0.0)))
+
+    @property
+    def misfit(self) -> float:
+        """Deviation of the residuals with delta = 2 over that with delta free, each weighted."""
+        return math.sqrt(self.fits["2"].chi_square / max(self.fits["free"].chi_square, 1e-300))
+
+    def beyond(self, name: str) -> Reason:
+        """Why a parameter is extrapolated; none where it is not, or no Stribeck effect shows."""
+        velocity = self.fits["free"].values["stribeck_velocity"]
+        return extrapolated(name, self.speed, velocity) if self.shows_stribeck_effect else NONE
+
+    def form_part(self, model: Model, name: str) -> float:
+        """What the form of the curve leaves open of a parameter (1 sigma, in its unit).
+
+        Where no Stribeck effect shows, a line describes the points as well: the truth is anywhere
+        between the two (rectangular distribution; GUM, 4.3.7).
+        """
+        line = self.fits["none"]
+        if model == "none" or self.shows_stribeck_effect or name not in line.free:
+            return 0.0
+        return abs(self.fits[model].values[name] - line.values[name]) / math.sqrt(3.0)
+
+
+def fit_direction(
+    speed: Array, torque: Array, window: Array, repeat_of: Array | None = None
+) -> DirectionFit:
+    """The fits of one direction.
+
+    Args:
+        speed, torque: of each point, positive (rad/s, N m), shape (m,).
+        window: deviation of each torque that its window shows (N m); 0 or NaN where unknown.
+        repeat_of: points with the same entry repeat each other: the commanded speed, which has to
+            grow with `speed`; absent: none does.
+
+    Repeats are averaged first: what they have in common (ripple at one place) would count as often
+    as it was repeated. They tell the lack of fit; the intervals rest on the residuals of the means,
+    which hold whatever repeats cannot show.
+
+    Raises ValueError for fewer than 6 speeds.
+    """
+    order = np.argsort(speed)
+    speed, torque, window = speed[order], torque[order], np.nan_to_num(window[order])
+    place = np.arange(len(speed)) if repeat_of is None else np.asarray(repeat_of)[order]
+    shared, first, member, count = np.unique(
+        place, return_index=True, return_inverse=True, return_counts=True
+    )
+    refuse_too_few(len(first), len(PARAMETERS))
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(member, values) / count)
+
+    means, level = mean(speed), mean(torque)
+    scatter = smoothed_deviation(np.sqrt(mean(window**2) / count), np.log(means))
+    scatters, free = fit_with_scatter(means, level, scatter)
+    held = with_misfit(
+        fit_stribeck(means, level, free.deviation, HELD["2"], near=free.values), means, level
+    )
+    fits: dict[Model, StribeckFit] = {
+        "free": free,
+        "2": held,
+        "none": fit_line(means, level, free.deviation),
+    }
+    part = scatters[0].part(means, level)
+    lacking = lack_of_fit(torque, level, part, member, free.residuals, len(level) - len(free.free))
+    named = means if repeat_of is None else np.asarray(shared, dtype=float)
+    return DirectionFit(named, means, level, scatter, scatters, fits, lacking)
+
+
+def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
+    """The parameters of one direction with their intervals, by name, as they may be reported."""
+    return {name: passed(one, model, fit) for name, one in fitted_estimates(fit, model).items()}
+
+
+def fitted_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
+    """The parameters of one direction as fitted; `passed` says how they may be reported."""
+    names = PARAMETERS if model != "none" else ("viscous_friction", "coulomb_torque")
+    return {name: _estimate(fit, model, fit.fits[model], name) for name in names}
+
+
+def passed(told: Estimate, model: Model, *fits: DirectionFit) -> Estimate:
+    """A parameter of one direction, or of the mean of both, as it may be reported."""
+    shape = told.name in ("stribeck_velocity", "stribeck_exponent")
+    of_effect = shape or told.name == "static_torque"  # which may lie below the slowest speed
+    effect = all(fit.shows_stribeck_effect for fit in fits)
+    if of_effect and not effect and told.origin is Origin.MEASURED:
+        return refused(told, NO_EFFECT())
+    force = max(float(fit.torque.max()) for fit in fits)
+    rate = max(float(fit.speed.max()) for fit in fits)
+    one = admitted(told, 0.0 if shape else mattering(told.name, force, rate))
+    against = next(filter(None, (fit.contradiction(model) for fit in fits)), NONE)
+    if against and one.origin in (Origin.MEASURED, Origin.AT_BOUND):
+        return replace(one, origin=Origin.CONTRADICTED, reason=against)
+    return one
+
+
+def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) -> Estimate:
+    value, unit = found.values[name], UNITS[name]
+    method = f"least squares, points weighted by window and scatter, t({fit.freedom})"
+    if name == "stribeck_exponent" and model == "2":
+        return Estimate(
+            name, value, unit, reason=HELD_EXPONENT(value=HELD[model]), origin=Origin.GIVEN
+        )
+    ended = found.bounds.get("stribeck_exponent")
+    if ended and name in _moved_by_exponent(fit):
+        reason = EXPONENT_ENDED(value=found.values["stribeck_exponent"], side=ended)
+        return refused(Estimate(name, value, unit, method=method), reason)
+    if name in found.bounds:
+        return _at_bound(fit, model, name, method)
+    if name in found.open:
+        return refused(Estimate(name, value, unit, method=method), LEFT_OPEN())
+    error = math.sqrt(max(found.variance({name: 1.0}), 0.0))
+    told = with_error(name, value, unit, error, fit.freedom, method, reason=fit.beyond(name))
+    if is_bent(fit, model, name):
+        return _by_profile(fit, model, told)
+    form = fit.form_part(model, name)
+    return shifted_by(told, FORM, form) if form else told
+
+
+def _moved_by_exponent(fit: DirectionFit) -> tuple[str, ...]:
+    """Parameters that follow an exponent at its limit: without fast speeds the bend of the curve
+    takes the place of Tc and viscous friction as well.
+    """
+    slow = ("static_torque", "stribeck_velocity")
+    return (*slow, "coulomb_torque", "viscous_friction") if fit.beyond("coulomb_torque") else slow
+
+
+def is_bent(fit: DirectionFit, model: Model, name: str) -> bool:
+    """Whether the curve is not straight within the error of a parameter: it is extrapolated, or vs
+    is known badly. Its interval is by profile likelihood then.
+    """
+    if model == "none" or not fit.shows_stribeck_effect:
+        return False
+    found = fit.fits[model]
+    error = student(fit.freedom) * math.sqrt(max(found.variance({"stribeck_velocity": 1.0}), 0.0))
+    badly = error > STRAIGHT * found.values["stribeck_velocity"]
+    return bool(fit.beyond(name)) or (name in BENT and badly)
+
+
+def _by_profile(fit: DirectionFit, model: Model, told: Estimate) -> Estimate:
+    """By profile likelihood; refused where the points give no limit on a side."""
+    found, rise = fit.fits[model], student(fit.freedom) ** 2
+    step = 0.5 * (told.standard_error or 0.0)
+
+    def cost(tried: float) -> float:
+        return held_at(found, fit.speed, fit.torque, told.name, max(tried, TINY), HELD[model])
+
+    try:
+        low, high = (
+            float(profile_limit(cost, told.value, way * step, rise)) for way in (-1.0, 1.0)
+        )
+    except ValueError:
+        return refused(told, LEFT_OPEN())
+    method = f"profile likelihood, t({fit.freedom})"
+    return replace(told, low=low, high=high, method=method)
+
+
+def _at_bound(fit: DirectionFit, model: Model, name: str, method: str) -> Estimate:
+    """A friction that would be negative: one-sided, by profile; a search that ended: open."""
+    found = fit.fits[model]
+    value, unit = found.values[name], UNITS[name]
+    physical = name in ("viscous_friction", "coulomb_torque", "static_torque")
+    if not physical or model == "none":
+        ended = SEARCH_ENDED(value=value, side=found.bounds[name])
+        reason = NEGATIVE() if physical else ended
+        return refused(Estimate(name, value, unit, method=method), reason)
+    exponent = HELD[model]
+
+    def cost(tried: float) -> float:
+        return held_at(found, fit.speed, fit.torque, name, tried, exponent)
+
+    # Profile likelihood on one side: the rise of chi-square is the square of Student's t there; of
+    # the two-sided one, because the data choose whether there are one side or two.
+    rise = student(fit.freedom) ** 2
+    step = float(np.median(fit.deviation)) / (
+        float(fit.speed.max()) if name == "viscous_friction" else 1.0
+    )
+    try:
+        high = profile_limit(cost, value, step, rise)
+    except ValueError:
+        told = Estimate(name, value, unit, method=method)
+        return refused(told, LEFT_OPEN())
+    if name != "viscous_friction" and high > USELESS * float(fit.torque.max()):
+        # A map that ends below vs is as well described by Tc = 0 and a huge viscous friction as by
+        # the truth. Where noise prefers that, a limit would be of the wrong one of two minima: it
+        # held Tc in 22 % of such maps.
+        told = Estimate(name, value, unit, method=method)
+        return refused(told, LIKE_VISCOUS())
+    return Estimate(
+        name,
+        value,
+        unit,
+        high=high,
+        level=0.95,
+        method=f"at its bound; one-sided by profile likelihood, t({fit.freedom})",
+        origin=Origin.AT_BOUND,
+    )
+
+
+def shifts(found: StribeckFit, torque_shift: Array) -> dict[str, float]:
+    """By how much each parameter follows a shift of all torques (N m), shape (n,); by name."""
+    moved = found.influence @ torque_shift
+    return dict(zip(found.free, moved.tolist(), strict=True))
+
+
+def band(fit: DirectionFit, model: Model, speed: Array) -> Array:
+    """Half-width of the 95 % band of the fitted curve (N m) at `speed` (rad/s), shape (m,)."""
+    found = fit.fits[model]
+    columns = np.array([_slope(found, name, speed) for name in found.free])
+    variance = np.einsum("km,kl,lm->m", columns, found.covariance, columns)
+    return np.asarray(student(fit.freedom) * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _slope(found: StribeckFit, name: str, speed: Array) -> Array:
+    """Derivative of the torque by a parameter, by central differences; shape (m,)."""
+    value = found.values[name]
+    step = 1e-5 * (abs(value) or 1.0)
+    up, down = ({**found.values, name: value + s} for s in (step, -step))
+    return np.asarray((stribeck(speed, up) - stribeck(speed, down)) / (2.0 * step))
+
+
+def doubts(fit: DirectionFit) -> Iterator[str]:
+    """Sentences on what a fit with delta free does not tell, without a full stop."""
+    found = fit.fits["free"]
+    for name, side in found.bounds.items():
+        yield f"{name} ended at its {side} bound {found.values[name]:.4g}"
+    if not fit.shows_stribeck_effect:
+        yield ("no Stribeck effect shows: static_torque and stribeck_velocity are not determined")
+    for name, which in (("static_torque", "slower"), ("coulomb_torque", "faster")):
+        if why := fit.beyond(name):
+            yield f"{why}; add {which} ones"
+    if fit.lack_of_fit is not None and fit.lack_of_fit < LACKING:
+        yield (
+            f"repeated points scatter less than they deviate from the curve (p = "
+            f"{fit.lack_of_fit:.2g}): Equation 4.6 is not all there is"
+        )

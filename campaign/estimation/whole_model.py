@@ -1,0 +1,212 @@
+"""A model that is simulated, fitted to several recordings at once, with intervals that hold.
+
+What simulates is handed in: a friction model along measured motions, a whole bench. The search from
+several starts is that of calibrations (`multi_start`), and so is what counts as being at a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import USELESS
+from campaign.estimation.intervals import LEVEL
+from campaign.estimation.inverse.motion import Array
+from campaign.estimation.inverse.regression import (
+    Piece,
+    Regression,
+    fitted,
+)
+from campaign.estimation.least_squares import covariance
+from campaign.estimation.multi_start import (
+    Display,
+    Found,
+    Settings,
+    fit_from,
+    no_display,
+    search,
+)
+from campaign.estimation.objective import Objective
+from campaign.estimation.unknowns import Unknown, values_at
+from campaign.reason import Cause
+
+Values = tuple[float, ...]
+Residuals = Callable[[Values], Sequence[Array]]
+METHOD = "least squares through the simulation; deviation with autocorrelation (Newey and West)"
+NULL = 1e-6
+"""Of the largest singular value: directions below it leave their parameters open."""
+WENT_TO_BOUND = Cause("at bound", "it went to its {side} bound")
+NOT_IN_MOTION = Cause("not in the motion", "nothing in the motion tells it")
+LEFT_OPEN = Cause("left open by the motion", "the motion leaves it open")
+LEFT_WIDE = Cause(
+    "left wide by the motion",
+    "the motion leaves it anywhere from {low:.2g} to {high:.2g}{in_unit}",
+)
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """A fitted model.
+
+    Attributes:
+        estimates: of the unknowns, by name; at a bound, or not determined, where they are.
+        values: SI, in the order of the unknowns.
+        residuals: of each recording, shape (n,).
+        regression: of the residuals by the free unknowns' shares; None where none is free.
+        free: which unknowns these are.
+    """
+
+    found: Found
+    estimates: dict[str, Estimate]
+    values: Values
+    residuals: tuple[Array, ...]
+    regression: Regression | None
+    free: NDArray[np.bool_]
+
+    @property
+    def correlation(self) -> dict[tuple[str, str], float]:
+        """Of pairs of free unknowns, by their names."""
+        if self.regression is None:
+            return {}
+        free = np.flatnonzero(self.free)
+        names = [self.found.unknowns[i].name for i in free]
+        matrix = self.regression.correlation
+        return {
+            (names[i], names[j]): float(matrix[i, j]) for i in range(len(names)) for j in range(i)
+        }
+
+
+def fit_model(
+    unknowns: Sequence[Unknown],
+    units: dict[str, str],
+    residuals: Residuals,
+    *,
+    starts: int = 3,
+    seed: int = 1,
+    display: Display = no_display,
+) -> ModelFit:
+    """Fit from several starts, and say how sure each unknown is.
+
+    Args:
+        units: SI units by name.
+        residuals: of each recording, shape (n,), evenly spaced and in one unit, for values (SI) in
+            the order of the unknowns.
+
+    Raises KeyboardInterrupt where it is interrupted: half a fit is none.
+    """
+    objective = _objective(unknowns, residuals)
+    settings = Settings(starts=starts, seed=seed, stated=False, tolerance=1e-6)
+    found = search(objective, settings, display)
+    if found.interrupted or found.jacobian is None or found.uncertainty is None:
+        raise KeyboardInterrupt
+    values = tuple(values_at(unknowns, found.shares))
+    left = tuple(residuals(values))
+    at_bound = np.array([bool(side) for side in found.uncertainty.bound])
+    free = ~at_bound & (np.linalg.norm(found.jacobian, axis=0) > 0.0)
+    regression = _regression(found.jacobian[:, free], left) if free.any() else None
+    open_ones = np.zeros(len(free), dtype=bool)
+    if free.any():
+        open_ones[free] = covariance(found.jacobian[:, free], NULL, NULL)[1]
+    estimates = {
+        unknown.name: _estimate(
+            unknown, units.get(unknown.name, ""), i, found, regression, free, bool(open_ones[i])
+        )
+        for i, unknown in enumerate(unknowns)
+    }
+    return ModelFit(found, estimates, values, left, regression, free)
+
+
+def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
+    """How far the other free unknowns go (SI) when one is `shift` (SI) beside its best value.
+
+    Linearised at the optimum; empty where that unknown is not free.
+    """
+    unknowns, jacobian = fit.found.unknowns, fit.found.jacobian
+    index = [unknown.name for unknown in unknowns].index(name)
+    if jacobian is None or not fit.free[index]:
+        return {}
+    slopes = np.array([u.slope(float(s)) for u, s in zip(unknowns, fit.found.shares, strict=True)])
+    others = [i for i in np.flatnonzero(fit.free) if i != index]
+    there = jacobian[:, index] * shift / slopes[index]
+    shares = -np.linalg.lstsq(jacobian[:, others], there, rcond=None)[0]
+    moved = shares * slopes[others]
+    return {unknowns[i].name: float(each) for i, each in zip(others, moved, strict=True)}
+
+
+def refitted(unknowns: Sequence[Unknown], residuals: Residuals, begin: Array) -> Values:
+    """Values (SI) of a further fit to other residuals, from the shares `begin`."""
+    settings = Settings(starts=1, stated=False, tolerance=1e-6)
+    end = fit_from(_objective(unknowns, residuals), begin, settings)
+    return tuple(values_at(unknowns, end.end))
+
+
+def held_out(
+    unknowns: Sequence[Unknown],
+    residuals: Residuals,
+    begin: Array,
+    left_out: Sequence[NDArray[np.bool_]],
+) -> tuple[Array, ...]:
+    """Residuals of rows that a further fit, from the shares `begin`, did not see.
+
+    left_out: for each recording, shape (n,).
+    """
+    objective = _objective(unknowns, residuals)
+    unseen = np.concatenate(left_out)
+    settings = Settings(starts=1, stated=False, tolerance=1e-6)
+    end = fit_from(objective, begin, settings, used=~unseen)
+    found = residuals(tuple(values_at(unknowns, end.end)))
+    return tuple(own[mask] for own, mask in zip(found, left_out, strict=True))
+
+
+def _objective(unknowns: Sequence[Unknown], residuals: Residuals) -> Objective:
+    def whole(values: Values) -> Array:
+        return np.concatenate(residuals(values))
+
+    return Objective(tuple(unknowns), whole, step=1e-3)
+
+
+def _regression(jacobian: Array, left: tuple[Array, ...]) -> Regression:
+    cuts = np.cumsum([len(each) for each in left])[:-1]
+    pieces = [
+        Piece(-own, rest, np.arange(len(rest), dtype=float))
+        for own, rest in zip(np.split(jacobian, cuts), left, strict=True)
+    ]
+    return fitted(pieces, np.asarray(np.linalg.pinv(-jacobian)), -jacobian, np.concatenate(left))
+
+
+def _estimate(
+    unknown: Unknown,
+    unit: str,
+    index: int,
+    found: Found,
+    regression: Regression | None,
+    free: NDArray[np.bool_],
+    left_open: bool,
+) -> Estimate:
+    name, share = unknown.name, float(found.shares[index])
+    value = unknown.value(share)
+    if not free[index] or regression is None:
+        side = "" if found.uncertainty is None else found.uncertainty.bound[index]
+        reason = WENT_TO_BOUND(side=side) if side else NOT_IN_MOTION()
+        origin = Origin.AT_BOUND if side else Origin.NOT_DETERMINED
+        return Estimate.without_interval(name, value, unit, reason, method=METHOD, origin=origin)
+    place = int(np.count_nonzero(free[:index]))
+    half = regression.quantile * float(regression.robust[place])
+    reason = LEFT_OPEN()
+    low, high = value, value
+    if not left_open and half < 1.0:
+        low, high = sorted((unknown.value(share - half), unknown.value(share + half)))
+        reason = LEFT_WIDE(low=low, high=high, in_unit=f" {unit}".rstrip())
+    if not low < high or high - low > 2.0 * USELESS * abs(value):
+        return Estimate.without_interval(
+            name, value, unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
+        )
+    error = unknown.slope(share) * float(regression.robust[place])
+    return Estimate(
+        name, value, unit, low, high, LEVEL, METHOD,
+        standard_error=error, freedom=max(regression.freedom, 1.0),
+    )  # fmt: skip

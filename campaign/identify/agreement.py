@@ -1,0 +1,60 @@
+"""Whether methods that found the same number from other parts of the motion agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+from campaign.estimate import Estimate, Origin
+from campaign.identify.identification import Section
+from campaign.identify.tables import told, words
+
+SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
+"""Names of one method for what others call so."""
+COMPARED = ("coulomb", "viscous", "inertia")
+WORTH_TELLING = 0.1
+"""of the larger of two values by which they are apart at least."""
+OVER_TEMPERATURE = "_over_temperature"
+"""How names end of a model whose friction is that at one temperature, and no mean over several."""
+
+
+def disagreements(sections: Sequence[Section]) -> Iterator[str]:
+    """Of measured numbers whose intervals exclude each other, a sentence; the widest gap alone.
+
+    Friction at one temperature is not held against a mean over several.
+    """
+    found: dict[tuple[str, bool], list[tuple[str, Estimate, str]]] = {}
+    for section in sections:
+        names = {each.estimate.name for each in section.parameters}
+        for each in section.parameters:
+            name = each.estimate.name
+            for own, common in SAME.items():
+                name = name.replace(own, common) if name.startswith(own) else name
+            measured = each.estimate.origin is Origin.MEASURED and each.estimate.has_interval
+            if name.split("_")[0] in COMPARED and measured:
+                at_one = f"{name.split('_')[0]}{OVER_TEMPERATURE}" in names
+                found.setdefault((name, at_one), []).append(
+                    (section.method.name, each.estimate, each.display)
+                )
+    for (name, _), several in found.items():
+        pairs = [(_gap(one[1], other[1]), one, other) for one, other in combinations(several, 2)]
+        gap, one, other = max(pairs, key=lambda pair: pair[0], default=(0.0, None, None))
+        if gap <= 0 or one is None or other is None:
+            continue
+        yield (
+            f"Methods disagree about {words(name)}: {one[0]} finds {told(one[1], one[2])}, "
+            f"{other[0]} {told(other[1], other[2])}. At least one model lacks something of this "
+            "rig (look at what is left over), or the motion confuses place with direction: slide "
+            "over the same travel in both."
+        )
+
+
+def _gap(one: Estimate, other: Estimate) -> float:
+    """Between two intervals; 0 where they meet, or the values are hardly apart."""
+    (a, b), (c, d) = one.combined, other.combined
+    if None in (a, b, c, d):
+        return 0.0
+    apart = abs(one.value - other.value)
+    if apart < WORTH_TELLING * max(abs(one.value), abs(other.value)):
+        return 0.0
+    return max(float(c) - float(b), float(a) - float(d), 0.0)  # type: ignore[arg-type]

@@ -1,0 +1,239 @@
+"""The rig's bench file with what was identified: values, intervals, origins, and where from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from campaign import __version__
+from campaign.axis_kind import speaking_of, unit_here
+from campaign.errors import CampaignError
+from campaign.estimate import Estimate
+from campaign.identify.compensations import identified_compensations, without_identified
+from campaign.identify.identification import Identification, Section
+from campaign.identify.method import Parameter
+from campaign.identify.written import amount, known_of
+from campaign.physics.bench import Bench
+from campaign.physics.friction import coulomb, friction_models
+from campaign.protocol.bench_edit import with_known
+
+LEAST_CORRELATION = 0.1
+"""below which two values count as told apart."""
+FRICTION = "friction.load."
+CURVE = (
+    "coulomb_torque",
+    "static_torque",
+    "stribeck_velocity",
+    "stribeck_exponent",
+    "viscous_friction",
+)
+"""What a curve of sliding is made of: another one replaces it whole."""
+
+
+def bench_text(found: Identification, command: str) -> str:
+    """The bench's own text with the identified values in it; comments stay.
+
+    Raises CampaignError where the run does not hold the bench's file, or it cannot be edited.
+    """
+    name, text = _source(found)
+    text = without_identified(text)
+    values: dict[str, Any] = {}
+    known: dict[str, Any] = {}
+    correlations: list[list[Any]] = []
+    sliding = _of_sliding(found.sections)
+    with speaking_of(found.bench.sides):
+        for section in found.sections:
+            filled = _going(section, sliding)
+            for parameter in filled.values():
+                values[parameter.bench] = _written(parameter.estimate)
+                known[parameter.bench] = known_of(parameter.estimate)
+            correlations += _correlations(section, filled)
+            if filled and section.identified is not None:
+                for path, (value, unit, _) in _settings(section, found.bench).items():
+                    if _is_friction(path) and section is not sliding:
+                        continue
+                    values[path] = _value(value, unit)
+                    if isinstance(value, float):
+                        known[path] = {"origin": "assumed"}
+    compensations = identified_compensations(found, text)
+    values |= compensations.values
+    known |= compensations.known
+    entries: dict[str, Any] = {"identified": _identified(found, command), "values": known}
+    stale = _stale(values, found.bench)
+    kept = [
+        list(each)
+        for each in found.bench.known.correlations
+        if not {each[0], each[1]} & {*known, *stale}
+    ]
+    if correlations:
+        entries["correlations"] = kept + correlations
+    return with_known(_edited(text, values, stale), entries, name)
+
+
+def keys_by_method(found: Identification) -> dict[str, list[str]]:
+    """Names of methods, and keys of the bench file whose values are theirs."""
+    sliding = _of_sliding(found.sections)
+    method = {
+        parameter.bench: section.method.name
+        for section in found.sections
+        for parameter in _going(section, sliding).values()
+    }  # of a key that several fill in, the last
+    return {name: [k for k in method if method[k] == name] for name in method.values()}
+
+
+def nothing_to_write(found: Identification) -> bool:
+    """Whether no parameter has a place in a bench file."""
+    filled = any(_filled(section) for section in found.sections)
+    return not filled and not identified_compensations(found, _source(found)[1]).values
+
+
+def _source(found: Identification) -> tuple[str, str]:
+    header = found.chosen.run.header
+    tests = {str(each.get("name", "")): each for each in header.tests}
+    test = found.chosen.trials[0].trial.test
+    name = str(tests.get(test, {}).get("bench", ""))
+    if name not in header.sources:
+        raise CampaignError(f"{found.chosen.run.name}: does not hold the file of its bench")
+    return name, header.sources[name]
+
+
+def _filled(section: Section) -> dict[str, Parameter]:
+    """Parameters that have a place in a bench, by their names."""
+    if section.identified is None:
+        return {}
+    return {each.estimate.name: each for each in section.identified.parameters if each.bench}
+
+
+def _going(section: Section, sliding: Section | None) -> dict[str, Parameter]:
+    """What of a method goes into the file, by name; friction is that of `sliding`."""
+    filled = _filled(section)
+    if section is not sliding and _tells_sliding(filled):
+        # A curve whose numbers are of two models is the curve of neither.
+        return {n: each for n, each in filled.items() if not _is_friction(each.bench)}
+    if section is sliding and not _tells_curve(section):
+        return {n: each for n, each in filled.items() if not _bends(each.bench)}
+    return filled
+
+
+def _of_sliding(sections: Sequence[Section]) -> Section | None:
+    """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
+    directions apart, as for what one number leaves to an offset a bench has no key; then the last.
+    """
+
+    def tells(section: Section) -> tuple[bool, bool]:
+        both = _tells_sliding(_filled(section), "negative.coulomb_torque")
+        return _tells_curve(section), both
+
+    told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
+    return max(told, key=tells, default=None)
+
+
+def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
+    return any(each.bench == f"{FRICTION}{key}" for each in filled.values())
+
+
+def _is_friction(path: str) -> bool:
+    return path.startswith(FRICTION)
+
+
+def _tells_curve(section: Section) -> bool:
+    """Whether a Stribeck curve is measured, whole: what the motion leaves open is no fact."""
+    settings = section.identified.settings if section.identified is not None else {}
+    left_open = any(path.endswith(("static_torque", "stribeck_velocity")) for path in settings)
+    return _tells_sliding(_filled(section), "static_torque") and not left_open
+
+
+def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]:
+    """Its settings; bristles of the bench stay where the curve that slides over them is told.
+
+    Where no curve is told and the bench has no bristles, friction is Coulomb and viscous friction;
+    with bristles the rest of the bench's curve stays.
+    """
+    settings = dict(section.identified.settings) if section.identified is not None else {}
+    model, load = f"{FRICTION}model", bench.friction.get("load")
+    if model not in settings:
+        return settings
+    bristles = load is not None and load.model == "lugre"
+    if not _tells_curve(section):
+        settings = {path: each for path, each in settings.items() if not _bends(path)}
+        settings[model] = ("coulomb", "", "nothing else of the curve is told")
+        if bristles:
+            del settings[model]
+    elif bristles and settings[model][0] == "stribeck":
+        settings[model] = ("lugre", *settings[model][1:])
+    return settings
+
+
+def _bends(path: str) -> bool:
+    """Whether it is of a curve that Coulomb and viscous friction have not."""
+    return _is_friction(path) and path.rpartition(".")[2] not in {"model", *coulomb.CURVE}
+
+
+def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:
+    """Keys of the bench's friction that are of another curve, or unknown to the model."""
+    load, model = bench.friction.get("load"), values.get(f"{FRICTION}model")
+    if load is None or model is None:
+        return []
+    curve = [f"{FRICTION}{way}{key}" for way in ("", "negative.") for key in CURVE]
+    known = friction_models()[model].options.model_fields
+    unknown = [f"{FRICTION}{key}" for key in type(load).model_fields if key not in known]
+    return [path for path in (*curve, *unknown) if path not in values]
+
+
+def _without(document: Any, path: str) -> None:
+    """A file without a key, and without what it says is known of that."""
+    *tables, key = path.split(".")
+    here = document
+    for name in tables:
+        here = here.get(name, {})
+    if key in here:
+        del here[key]
+    of_values = document.get("known", {}).get("values", {})
+    if path in of_values:
+        del of_values[path]
+
+
+def _written(estimate: Estimate) -> Any:
+    return amount(estimate.value, estimate.unit)
+
+
+def _value(value: Any, unit: str) -> Any:
+    if not isinstance(value, float):
+        return value
+    return amount(value, unit_here(unit))
+
+
+def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:
+    if section.identified is None:
+        return
+    for (one, other), share in section.identified.correlations.items():
+        if one in filled and other in filled and abs(share) >= LEAST_CORRELATION:
+            yield [filled[one].bench, filled[other].bench, round(max(-1.0, min(1.0, share)), 3)]
+
+
+def _identified(found: Identification, command: str) -> dict[str, str]:
+    return {
+        "run": found.chosen.name,
+        "digest": found.chosen.run.identity,
+        "program": f"campaign {__version__}",
+        "command": command,
+    }
+
+
+def _edited(text: str, values: Mapping[str, Any], stale: Sequence[str]) -> str:
+    """Each value where its key is, or in a table that is made for it; without what is stale."""
+    import tomlkit
+
+    newline = "\r\n" if "\r\n" in text else "\n"
+    document = tomlkit.parse(text.replace("\r\n", "\n"))
+    for path in stale:
+        _without(document, path)
+    for path, value in values.items():
+        *tables, key = path.split(".")
+        here: Any = document
+        for depth, name in enumerate(tables):
+            if name not in here:
+                here[name] = tomlkit.table(is_super_table=depth + 1 < len(tables))
+            here = here[name]
+        here[key] = value
+    return document.as_string().replace("\n", newline)

@@ -1,0 +1,257 @@
+"""Compensations with identified values: of each that a bench has, a twin that holds them.
+
+A compensation has a model of all friction together, however many interfaces a rig has, so that it
+takes what goes to no interface of the bench: the curve of sliding, in both directions. The twin
+stands beside what it is the twin of, so that both can be tried in one test; whatever was not
+identified (gains above all) is as it was there.
+
+Which stiffness belongs to one bristle for all friction? Where all of it yields at one time, that at
+rest. Where some interfaces slip before the others, as torque ramps show, one bristle can have that
+at rest or that of the strongest interface, and is wrong in either case. The twin then has two: the
+strongest with its own stiffness and its own share of the torque, and one for all weaker ones with
+what is left of both. Damping is known as a sum; all of it goes to the strongest, which is the last
+to slip.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from campaign.estimate import Estimate, Origin
+from campaign.identify.identification import Identification, Section
+from campaign.identify.method import Parameter
+from campaign.identify.written import amount, known_of
+from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
+from campaign.physics.loop import at_load
+
+WEAKER = "weaker"
+"""What the interface is called that stands for all which slip before the strongest."""
+TORQUES = ("coulomb_torque", "static_torque")
+CURVE = (*TORQUES, "stribeck_velocity", "viscous_friction")
+"""What a curve needs to replace another; its exponent is 2 where none was found."""
+EXPONENT, VISCOUS = "stribeck_exponent", "viscous_friction"
+STIFFNESS, DAMPING = "bristle_stiffness", "bristle_damping"
+DIRECTIONS = ("", "negative.")
+INERTIA = "axis.inertia"
+Number = Estimate | float
+
+
+@dataclass(frozen=True)
+class Entries:
+    """What goes into a bench's file, by dotted path.
+
+    Attributes:
+        values: as they are written.
+        known: how well they are known.
+    """
+
+    values: dict[str, Any] = field(default_factory=dict)
+    known: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the compensations."""
+        return tuple(dict.fromkeys(path.split(".")[1] for path in self.values))
+
+
+@dataclass(frozen=True)
+class Bristles:
+    """Stiffness and damping of all friction together, and how it comes apart; None: unknown."""
+
+    at_rest: Estimate | None = None
+    damping: Estimate | None = None
+    strongest: Estimate | None = None
+    weaker: Estimate | None = None
+
+    @property
+    def apart(self) -> tuple[Estimate, Estimate, Estimate] | None:
+        """At rest, the strongest, the weaker: where some slip before it and it is known how."""
+        if self.at_rest is None or self.strongest is None or self.weaker is None:
+            return None
+        if not self.strongest.value < self.at_rest.value:
+            return None
+        return self.at_rest, self.strongest, self.weaker
+
+
+def identified_compensations(found: Identification, text: str) -> Entries:
+    """Twins of the compensations of a bench's file `text`, each that any identified value goes to.
+
+    Twins that the file has already are left out of account: see `without_identified`.
+    """
+    import tomlkit
+
+    stated = tomlkit.parse(text).unwrap().get("compensation", {})
+    entries = Entries()
+    for name, options in found.bench.compensation.items():
+        if stated_name(name) or name not in stated:
+            continue
+        if options.method == "observer":
+            own = dict(_of_observer(found.sections))
+        elif options.method == "friction-model" and len(options.friction) == 1:
+            ((key, friction),) = options.friction.items()
+            own = dict(_of_friction(key, friction, found))
+        else:
+            continue
+        if own:
+            _add(entries, name, {"method": options.method, **stated[name]}, own)
+    return entries
+
+
+def without_identified(text: str) -> str:
+    """A bench's file without the twins that an earlier identification left there."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    compensations: Any = document.get("compensation", {})
+    old = [name for name in compensations if name.endswith(ENDING)]
+    if not old:
+        return text
+    for name in old:
+        del compensations[name]
+    known: Any = document.get("known", {})
+    begins = tuple(f"compensation.{name}." for name in old)
+    for path in [each for each in known.get("values", {}) if each.startswith(begins)]:
+        del known["values"][path]
+    return document.as_string()
+
+
+def _add(
+    entries: Entries, name: str, stated: Mapping[str, Any], own: Mapping[str, Number | str]
+) -> None:
+    """The twin of a compensation: what is stated of it, with its own values in place of that."""
+    twin = f"compensation.{identified_name(name)}"
+    replaced = {path.rpartition(".")[0] for path in own if path.endswith(".coulomb_torque")}
+    for path, value in _flat(stated):
+        table, _, key = path.rpartition(".")
+        if key in (*CURVE, EXPONENT) and table.removesuffix(".negative") in replaced:
+            continue  # a curve is replaced whole
+        entries.values[f"{twin}.{path}"] = value
+    for path, number in own.items():
+        if isinstance(number, Estimate):
+            entries.values[f"{twin}.{path}"] = amount(number.value, number.unit)
+            entries.known[f"{twin}.{path}"] = known_of(number)
+        else:
+            entries.values[f"{twin}.{path}"] = number
+
+
+def _flat(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _of_observer(sections: Sequence[Section]) -> Iterator[tuple[str, Number]]:
+    """The inertia, as the bench gets it: of the last method that found one."""
+    found = [each for each in _measured(sections) if each.bench == INERTIA]
+    if found:
+        yield "inertia", found[-1].estimate
+
+
+def _of_friction(key: str, options: Any, found: Identification) -> Iterator[tuple[str, Any]]:
+    """Values of a friction model of all interfaces together, below the compensation's table."""
+    fields = type(options).model_fields
+    if at_load(options, found.bench) != (1.0, 1.0) or not set(CURVE) <= set(fields):
+        return
+    curve = _curve(found.sections)
+    bristles = _bristles(found) if STIFFNESS in fields else Bristles()
+    path = f"friction.{key}."
+    if bristles.apart is not None and curve:
+        yield from _two_bristles(path, curve, bristles.apart, bristles.damping, options.model)
+        return
+    yield from ((path + name, number) for name, number in curve.items())
+    if bristles.at_rest is not None:
+        yield path + STIFFNESS, bristles.at_rest
+    if bristles.damping is not None:
+        yield path + DAMPING, bristles.damping
+
+
+def _two_bristles(
+    path: str,
+    curve: Mapping[str, Number],
+    apart: tuple[Estimate, Estimate, Estimate],
+    damping: Estimate | None,
+    model: str,
+) -> Iterator[tuple[str, Any]]:
+    rest, strongest, weaker = apart
+    other = f"friction.{WEAKER}."
+    yield other + "model", model
+    for name, number in curve.items():
+        kind = name.removeprefix("negative.")
+        if kind in TORQUES and isinstance(number, Estimate):
+            yield path + name, _part(number, weaker, own=False)
+            yield other + name, _part(number, weaker, own=True)
+            continue
+        yield path + name, number
+        if kind != VISCOUS:
+            yield other + name, number
+    yield path + STIFFNESS, strongest
+    yield other + STIFFNESS, _less(rest, strongest)
+    if damping is not None:
+        yield path + DAMPING, damping
+        yield other + DAMPING, amount(0.0, damping.unit)
+
+
+def _curve(sections: Sequence[Section]) -> dict[str, Number]:
+    """The last that was found whole in both directions; nothing where there is none."""
+    for section in reversed(sections):
+        found = {e.lumped: e.estimate for e in _measured([section]) if e.lumped}
+        if all(way + name in found for way in DIRECTIONS for name in CURVE):
+            told: dict[str, Number] = {}
+            for way in DIRECTIONS:
+                told |= {way + name: found[way + name] for name in CURVE}
+                told[way + EXPONENT] = found.get(way + EXPONENT, 2.0)
+            return told
+    return {}
+
+
+def _bristles(found: Identification) -> Bristles:
+    of_motions = _named(found.sections, "presliding")
+    of_ramps = _named(found.sections, "ramps")
+    known = Bristles(
+        of_motions.get("stiffness_at_rest"),
+        of_motions.get("bristle_damping"),
+        of_ramps.get("strongest_stiffness"),
+        of_ramps.get("weaker_share"),
+    )
+    # Nobody knows whether several interfaces yield at one time: their sum is no single bristle's.
+    several = len(found.bench.friction) > 1
+    return replace(known, at_rest=None) if several and known.apart is None else known
+
+
+def _named(sections: Sequence[Section], method: str) -> dict[str, Estimate]:
+    own = [each for each in sections if each.method.name == method]
+    return {e.estimate.name: e.estimate for e in _measured(own) if e.estimate.value > 0.0}
+
+
+def _measured(sections: Sequence[Section]) -> list[Parameter]:
+    """Parameters that are known with an interval; positive ones and others."""
+    return [
+        each
+        for section in sections
+        for each in section.parameters
+        if each.estimate.origin is Origin.MEASURED and each.estimate.has_interval
+    ]
+
+
+def _part(whole: Estimate, weaker: Estimate, *, own: bool) -> Estimate:
+    """The weaker interfaces' own share of a torque, or what is left of it."""
+    share = weaker.value if own else 1.0 - weaker.value
+    half = math.hypot(share * whole.half_width, whole.value * weaker.half_width)
+    return _around(whole, share * whole.value, half)
+
+
+def _less(whole: Estimate, part: Estimate) -> Estimate:
+    half = math.hypot(whole.half_width, part.half_width)
+    return _around(whole, whole.value - part.value, half)
+
+
+def _around(one: Estimate, value: float, half: float) -> Estimate:
+    """With another value, and an interval that has all in it."""
+    return replace(
+        one, value=value, low=value - half, high=value + half, standard_error=None, systematic=()
+    )

@@ -1,0 +1,362 @@
+"""A rig identified from a run: every method that its trials suffice for, and what changed since."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from campaign.axis_kind import speaking_of, unit_here, words_here
+from campaign.entry_points import one_line
+from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.difference import Difference, difference_of
+from campaign.experiments.interface import bench_of
+from campaign.experiments.preparing.axis_units import estimate_here, of_its_axis
+from campaign.identify.material import Chosen, same_recordings
+from campaign.identify.method import (
+    Identified,
+    Material,
+    Method,
+    Parameter,
+    no_progress,
+    say_at,
+)
+from campaign.physics.bench import Bench
+from campaign.plugins import Kinds
+from campaign.protocol.files import Overridden
+from campaign.protocol.overrides import parse_overrides
+from campaign.protocol.problems import find_faults
+from campaign.reason import Reason
+
+FRICTION = "friction."
+WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
+"""Tables that a bench has with all of these keys, or not at all."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter of two runs.
+
+    Attributes:
+        adjusted: p value by Benjamini and Hochberg over all that were tested; None untested.
+    """
+
+    before: Estimate
+    after: Estimate
+    difference: Difference
+    adjusted: float | None = None
+
+
+@dataclass(frozen=True)
+class Section:
+    """What one method made of the run.
+
+    Attributes:
+        trials: numbers of those that it used.
+        identified: None where it could not, and `problem` says why.
+        changes: against the run that it is compared with; empty without any.
+    """
+
+    method: Method
+    options: Any
+    trials: tuple[int, ...] = ()
+    identified: Identified | None = None
+    problem: str = ""
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """None where nothing was identified."""
+        return self.identified.parameters if self.identified is not None else ()
+
+    @property
+    def warnings(self) -> tuple[Reason, ...]:
+        """What a reader has to know before the parameters."""
+        return self.identified.warnings if self.identified is not None else ()
+
+
+@dataclass(frozen=True)
+class Identification:
+    """All that was found; numbers are of the bench's axis.
+
+    Attributes:
+        chosen, validation, compared: which trials of which runs.
+        bench: what was stated of the rig.
+        sections: one for each method, those that found nothing last.
+    """
+
+    chosen: Chosen
+    validation: Chosen | None
+    compared: Chosen | None
+    bench: Bench
+    sections: tuple[Section, ...]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All of them."""
+        return tuple(parameter for each in self.sections for parameter in each.parameters)
+
+
+def identify(
+    chosen: Chosen,
+    methods: Kinds[Method],
+    *,
+    models: Sequence[str] = (),
+    validation: Chosen | None = None,
+    compared: Chosen | None = None,
+    settings: Sequence[str] = (),
+    say: Callable[[str], None] = no_progress,
+) -> Identification:
+    """Identify the rig of a run.
+
+    Args:
+        models: names of methods; none: all that the trials suffice for.
+        settings: `METHOD.option=value`, as for `--set`.
+        say: is told what is being done.
+
+    Raises UsageError for unknown methods, for trials of several benches and for a run that would
+    be held against itself, and ProtocolError for settings that are wrong.
+    """
+    unknown = [name for name in models if name not in methods]
+    if unknown:
+        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(methods)}")
+    for option, other in (("--validate", validation), ("--compare", compared)):
+        if other is not None:
+            _refuse_same(chosen, other, option)
+    bench = _bench(chosen)
+    given = _options(settings, methods, bench)
+    sections = []
+    names = list(models or methods)
+    for number, name in enumerate(names, 1):
+        say_of = partial(say_at, say, f"method {number} of {len(names)}")
+        section = _section(methods[name], given[name], bench, chosen, validation, say_of)
+        if compared is not None and section.identified is not None:
+            section = _compared(section, section.identified, bench, compared, say_of)
+        sections.append(section)
+    sections.sort(key=lambda each: each.identified is None)
+    return Identification(chosen, validation, compared, bench, tuple(_adjusted(sections)))
+
+
+def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
+    """Raises UsageError where recordings would be held against themselves."""
+    both, what = [], "trials that the model is fitted to"
+    if chosen.run.identity == other.run.identity:
+        own = {each.trial.number for each in chosen.trials}
+        both = sorted(own & {each.trial.number for each in other.trials})
+    if not both:
+        both = same_recordings(chosen, other)
+        what = f"the same samples as {chosen.name} in trials"
+    if both:
+        told = ", ".join(str(number) for number in both[:5]) + (" ..." if len(both) > 5 else "")
+        raise UsageError(
+            f"{option}: {other.name} has {what} ({told}), so that it "
+            "says nothing; name another run, or another test of this one, as in RUN:TEST"
+        )
+
+
+def _bench(chosen: Chosen) -> Bench:
+    tests: dict[str, dict[str, None]] = {}
+    for each in chosen.trials:
+        tests.setdefault(str(each.trial.bench.get("name", "")), {})[each.trial.test] = None
+    if len(tests) > 1:
+        told = "; ".join(f"{bench}: {', '.join(own)}" for bench, own in tests.items())
+        first = next(iter(next(iter(tests.values()))))
+        raise UsageError(
+            f"{chosen.name} has tests of several benches ({told}); name one, as in "
+            f"{chosen.run.name}:{first}"
+        )
+    return bench_of(chosen.trials[0].trial)
+
+
+def _options(settings: Sequence[str], methods: Kinds[Method], bench: Bench) -> dict[str, Any]:
+    """Each method's options, validated; in the units of the bench's axis."""
+    overrides, problems = parse_overrides(settings)
+    trees: dict[str, dict[str, Any]] = {name: {} for name in methods}
+    texts: dict[str, str] = {}
+    for override in overrides:
+        name, *keys = override.keys
+        if name not in methods or len(keys) != 1:
+            told = f"write METHOD.option=value; methods are {', '.join(methods)}"
+            problems.append(Overridden(override.text).problem((), "key", told))
+            continue
+        trees[str(name)][str(keys[0])] = override.value
+        texts[str(name)] = override.text
+    found: dict[str, Any] = {}
+    with speaking_of(bench.sides):
+        for name, tree in trees.items():
+            made = find_faults(methods[name].options, tree)
+            if isinstance(made, list):
+                problems += list(_placed(made, texts.get(name, name)))
+            else:
+                found[name] = made
+    if problems:
+        raise ProtocolError(problems)
+    return found
+
+
+def _placed(faults: Sequence[tuple[Any, Any, str]], text: str) -> Iterator[Problem]:
+    for keys, _, message in faults:
+        yield Overridden(text).problem((), "value", f"{'.'.join(map(str, keys))}: {message}")
+
+
+def _section(
+    method: Method,
+    options: Any,
+    bench: Bench,
+    chosen: Chosen,
+    validation: Chosen | None,
+    say: Callable[[str], None],
+) -> Section:
+    told = f"{method.name}, {chosen.name}"
+    say(told)
+    trials, why = method.suits(chosen.trials)
+    if not trials:
+        return Section(method, options, problem=why)
+    numbers = tuple(each.trial.number for each in trials)
+    unseen = validation.trials if validation is not None else ()
+    material = Material(bench, tuple(trials), tuple(unseen), lambda text: say(f"{told}: {text}"))
+    try:
+        with speaking_of(bench.sides):
+            found = method.identify(material, options)
+            return Section(method, options, numbers, _with_place(_of_its_axis(found), bench))
+    except ValueError as error:
+        return Section(method, options, numbers, problem=str(error))
+    except ArithmeticError as error:  # numbers of these recordings that no float holds
+        explain_in_debug()
+        problem = f"it failed: {one_line(error)}"
+        return Section(method, options, numbers, problem=problem)
+
+
+def _of_its_axis(found: Identified) -> Identified:
+    parameters = tuple(
+        replace(
+            each,
+            estimate=estimate_here(each.estimate),
+            meaning=words_here(each.meaning),
+            display=unit_here(each.display),
+            advice=words_here(each.advice),
+        )
+        for each in found.parameters
+    )
+    unseen = found.unseen and replace(found.unseen, what=words_here(found.unseen.what))
+    return replace(found, parameters=parameters, result=of_its_axis(found.result), unseen=unseen)
+
+
+def fitted_again(
+    section: Section, bench: Bench, chosen: Chosen, say: Callable[[str], None] = no_progress
+) -> Section:
+    """The model that a section settled on, fitted to other trials of the same rig."""
+    again = section.identified.again if section.identified is not None else {}
+    options = section.options.model_copy(update=dict(again))
+    return _section(section.method, options, bench, chosen, None, say)
+
+
+def _with_place(found: Identified, bench: Bench) -> Identified:
+    """As found, without a place in the bench file for what makes no bench there."""
+    return _with_whole_tables(_with_own_friction(found, bench), bench)
+
+
+def _with_whole_tables(found: Identified, bench: Bench) -> Identified:
+    """Without keys of a table that the bench has not, and that would lack others."""
+    told = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
+    for table, keys in WHOLE.items():
+        needed = {f"{table}.{key}" for key in keys}
+        missing = sorted(needed - told)
+        if not needed & told or not missing or getattr(bench, table) is not None:
+            continue
+        what = f"Without {', '.join(missing)} there is no [{table}] to write"
+        note = f"{what}: the file gets none of it."
+        parameters = (
+            replace(each, bench="") if each.bench in needed else each for each in found.parameters
+        )
+        found = replace(
+            found,
+            parameters=tuple(parameters),
+            result=replace(found.result, notes=(*found.result.notes, note)),
+        )
+    return found
+
+
+def _with_own_friction(found: Identified, bench: Bench) -> Identified:
+    """Friction of all interfaces together is that of none: it goes to no bench with several.
+
+    What compensates it has a model of all together, and takes it.
+    """
+    found = replace(found, parameters=tuple(map(_lumped, found.parameters)))
+    others = [name for name in bench.friction if name != "load"]
+    if not others or not any(each.bench.startswith(FRICTION) for each in found.parameters):
+        return found
+    note = (
+        f"Friction is that of all interfaces together, and the bench has some besides the load's "
+        f"({', '.join(others)}): of the bench file it goes to compensations only."
+    )
+    return replace(
+        found,
+        parameters=tuple(
+            replace(each, bench="") if each.bench.startswith(FRICTION) else each
+            for each in found.parameters
+        ),
+        settings={k: v for k, v in found.settings.items() if not k.startswith(FRICTION)},
+        result=replace(found.result, notes=(*found.result.notes, note)),
+    )
+
+
+def _lumped(parameter: Parameter) -> Parameter:
+    key = parameter.bench.removeprefix(f"{FRICTION}load.")
+    return parameter if key == parameter.bench else replace(parameter, lumped=key)
+
+
+def _compared(
+    section: Section,
+    identified: Identified,
+    bench: Bench,
+    compared: Chosen,
+    say: Callable[[str], None],
+) -> Section:
+    """The same model of another run, and how its parameters differ."""
+    other = fitted_again(section, bench, compared, say)
+    if other.identified is None:
+        return replace(section, problem=f"{compared.name}: {other.problem}")
+    after = {each.estimate.name: each.estimate for each in other.identified.parameters}
+    pairs = [
+        (each.estimate, after[each.estimate.name])
+        for each in identified.parameters
+        if each.estimate.name in after
+    ]
+    changes = tuple(Change(one, two, difference_of(one, two, _shared(one))) for one, two in pairs)
+    return replace(section, changes=changes)
+
+
+def _shared(estimate: Estimate) -> list[str]:
+    """What is the same for both runs of one rig."""
+    return [part.source for part in estimate.systematic if part.of_rig]
+
+
+def _adjusted(sections: Sequence[Section]) -> Iterator[Section]:
+    """With p values of all changes as one family."""
+    from scipy.stats import false_discovery_control
+
+    tested = [c.difference.p for s in sections for c in s.changes if c.difference.p is not None]
+    adjusted = iter(false_discovery_control(tested, method="bh")) if tested else iter(())
+    for section in sections:
+        changes = tuple(
+            each if each.difference.p is None else replace(each, adjusted=float(next(adjusted)))
+            for each in section.changes
+        )
+        yield replace(section, changes=changes)
+
+
+def widest(parameters: Sequence[Parameter]) -> Parameter | None:
+    """The parameter whose interval is widest as a share of it; None where none has any.
+
+    One whose interval holds zero is not known to be there at all, and is not asked for.
+    """
+    shares: Mapping[int, float] = {
+        index: share
+        for index, each in enumerate(parameters)
+        if each.estimate.value != 0.0
+        and (share := abs(each.estimate.half_width / each.estimate.value)) < 1.0
+    }
+    return parameters[max(shares, key=lambda index: shares[index])] if shares else None

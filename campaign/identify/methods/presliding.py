@@ -1,0 +1,291 @@
+"""Presliding: stiffness and damping of the bristles, and inertia, from motions below breakaway.
+
+The simulation of the whole motion is fitted to all trials at once: of `presliding_multisine`, or
+else of whatever stays below breakaway (`identifying.presliding.small_motions`). What
+is found is the sum over all interfaces, before any of them slips: with one interface that is a
+number of the bench, with several only their sum is known, and no bench file has a place for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from campaign.archive import ArchivedTrial
+from campaign.channels import DRIVE_TORQUE
+from campaign.estimate import Estimate
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import shifted_by
+from campaign.estimation.presliding_dynamics.prediction import unexplained
+from campaign.estimation.presliding_dynamics.presliding_fit import (
+    PreslidingDynamics,
+    identify_presliding_dynamics,
+)
+from campaign.estimation.presliding_dynamics.record import Record
+from campaign.experiments.presliding_multisine.dynamics import (
+    BY_TORQUE,
+    assumed_of,
+    damping_figure,
+    estimates_of,
+    figures_of,
+    remarks,
+    viscous_of,
+    with_torques_known,
+)
+from campaign.experiments.shared.imported_scale import with_scale
+from campaign.identify.method import Identified, Material, Method, Parameter, Unseen
+from campaign.identify.presliding.small_motions import (
+    is_planned,
+    small_motion,
+    span_of,
+    usable,
+)
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.reason import Cause
+from campaign.result import Amount, Column, Conclusion, Finding, Result, Table
+from campaign.units import RotationalDamping
+
+WITH_NOISE = Cause("noise of the sensor", "noise of the sensor is in it")
+MEANINGS = {
+    "stiffness_at_rest": "Slope of friction over angle before any interface slips, of all of them.",
+    "damping_at_rest": "Damping of small motions, bristles' and viscous friction's together.",
+    "bristle_damping": "Damping of the bristles: that of small motions less viscous friction.",
+    "inertia": "What resists acceleration.",
+    "damping_ratio": "Damping of small motions over the critical one.",
+    "natural_frequency": "Frequency at which the load swings on its bristles.",
+    "appendage_frequency": "Frequency of the elastic part when the load is held.",
+    "appendage_inertia": "Inertia of the elastic part.",
+    "appendage_damping_ratio": "Damping ratio of the elastic part when the load is held.",
+}
+KEYS = {
+    "inertia": "axis.inertia",
+    "appendage_frequency": "appendage.frequency",
+    "appendage_inertia": "appendage.inertia",
+    "appendage_damping_ratio": "appendage.damping_ratio",
+}
+ADVICE = {
+    "inertia": "shake with more lines above the resonance, or longer",
+    "stiffness_at_rest": "shake with more lines below the resonance, or longer",
+    "damping": "shake with more lines around the resonance, or longer",
+    "bristle_damping": "know viscous friction better, by a velocity map",
+    "appendage": "shake with more lines around its frequency, or longer",
+    "natural_frequency": "shake with more lines around it, or longer",
+}
+"""By the beginning of a name: what tells the number better."""
+
+
+class PreslidingOptions(Options):
+    """Options of presliding."""
+
+    viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
+    """sigma2 at the load, to be taken off the damping of small motions; absent: the bench's."""
+    damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
+    """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
+
+
+def _identify(material: Material, options: PreslidingOptions) -> Identified:
+    records = [small_motion(each) for each in material.trials]
+    records = with_torques_known(material.trials, records)
+    unseen = _unseen(material.validation)
+    found = identify_presliding_dynamics(
+        records, assumed_of(material.bench, _span(material.trials, records))
+    )
+    told = estimates_of(found, material.bench)
+    for name in BY_TORQUE:
+        if name in told and told[name].has_interval:
+            told[name] = with_scale(told[name], material.trials[0], DRIVE_TORQUE)
+    told |= _bristle_damping(told, material.bench, options)
+    missed = [unexplained(found.fit, each) for each in unseen]
+    planned = all(map(is_planned, material.trials))
+    parameters = tuple(_parameters(told, material.bench, planned or _gives_way(found)))
+    shown = tuple(each.trial.number for each in material.trials)
+    figures = list(figures_of(found, "", shown))
+    if "damping_at_rest" in told and told["damping_at_rest"].has_interval:
+        sizes = np.array([record.amplitude for record in found.fit.records])
+        figures.append(damping_figure(sizes, [], told, options.damping_ratio, "", shown))
+    return Identified(
+        parameters,
+        Result(
+            tables=tuple(_tables(found, told, unseen, missed)),
+            figures=tuple(figures),
+            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+            notes=(*remarks(found), *_notes(material.bench, found, planned)),
+            conclusions=tuple(_conclusions(told)),
+        ),
+        correlations=_correlations(found),
+        unseen=Unseen(max(missed), "motion") if missed else None,
+    )
+
+
+def _unseen(trials: Sequence[ArchivedTrial]) -> list[Record]:
+    """Of a validation, what stays below breakaway. Raises ValueError where nothing does."""
+    if not trials:
+        return []
+    chosen, why = usable(trials)
+    if why:
+        raise ValueError(f"of the validation {why}")
+    return with_torques_known(chosen, [small_motion(each) for each in chosen])
+
+
+def _span(trials: Sequence[ArchivedTrial], records: Sequence[Record]) -> tuple[float, float]:
+    """Lowest and highest frequency of all trials (Hz)."""
+    spans = [span_of(*each) for each in zip(trials, records, strict=True)]
+    return min(low for low, _ in spans), max(high for _, high in spans)
+
+
+def _bristle_damping(
+    told: dict[str, Estimate], bench: Bench, options: PreslidingOptions
+) -> dict[str, Estimate]:
+    """sigma1: the damping of small motions less what is known of viscous friction."""
+    whole = told.get("damping_at_rest")
+    if whole is None:
+        return {}
+    viscous = viscous_of(bench) if options.viscous_friction is None else options.viscous_friction
+    own = replace(
+        whole,
+        name="bristle_damping",
+        value=whole.value - viscous,
+        low=None if whole.low is None else whole.low - viscous,
+        high=None if whole.high is None else whole.high - viscous,
+    )
+    if not own.has_interval:
+        return {own.name: own}
+    key = _interface(bench)
+    known = bench.known_uncertainty(f"friction.{key}.viscous_friction") if key else None
+    return {own.name: admitted(shifted_by(own, "viscous friction", known))}
+
+
+def _interface(bench: Bench) -> str:
+    """The only interface of a bench, where it acts at the load and has bristles; else ""."""
+    if len(bench.friction) != 1:
+        return ""
+    ((name, options),) = bench.friction.items()
+    at_load = bench.at_load(options) == (1.0, 1.0)
+    return name if at_load and hasattr(options, "bristle_stiffness") else ""
+
+
+def _gives_way(found: PreslidingDynamics) -> bool:
+    """Whether the spring surely softens towards a torque, as bristles do and a spring does not."""
+    yielding = found.estimates.get("yielding")
+    if yielding is None or not yielding.has_interval:
+        return False
+    low, _ = yielding.combined
+    return low is not None and low > 0
+
+
+def _parameters(told: dict[str, Estimate], bench: Bench, bristles: bool) -> Iterator[Parameter]:
+    """`bristles`: whether what holds the load is known to be friction."""
+    keys, own = dict(KEYS), _interface(bench)
+    if own and bristles:
+        keys["stiffness_at_rest"] = f"friction.{own}.bristle_stiffness"
+        keys["bristle_damping"] = f"friction.{own}.bristle_damping"
+    for name, meaning in MEANINGS.items():
+        if name not in told or math.isnan(told[name].value):
+            continue
+        one = told[name]
+        key = keys.get(name, "") if one.has_interval else ""
+        advice = next((text for part, text in ADVICE.items() if name.startswith(part)), "")
+        yield Parameter(one, meaning, bench=key, advice=advice)
+
+
+def _tables(
+    found: PreslidingDynamics,
+    told: dict[str, Estimate],
+    unseen: Sequence[Record],
+    missed: Sequence[float],
+) -> Iterator[Table]:
+    yield Table(
+        "presliding",
+        "What small motions tell",
+        (Column("number", "Number"), Column("unit", "Unit"), Column("value", "Value")),
+        tuple(
+            {"number": name.replace("_", " "), "unit": each.unit, "value": each}
+            for name, each in told.items()
+        ),
+        note="Stiffness and damping at rest are the sums over all interfaces of the axis.",
+    )
+    fitted = found.fit.records
+    rows = [(each, "fitted", unexplained(found.fit, each)) for each in fitted]
+    rows += [(each, "unseen", share) for each, share in zip(unseen, missed, strict=True)]
+    yield Table(
+        "presliding-missed",
+        "What the fitted model misses of each trial",
+        (
+            Column("trial", "Trial"),
+            Column("use", "Use"),
+            Column("amplitude", "Largest torque", "N m", "N m", exact=True),
+            Column("missed", "Missed", "", "percent", reason=WITH_NOISE()),
+        ),
+        tuple(
+            {
+                "trial": record.named,
+                "use": use,
+                "amplitude": record.amplitude,
+                "missed": share,
+            }
+            for record, use, share in rows
+        ),
+        note="Rms of measured less simulated motion over that of the motion. Of unseen trials "
+        "nothing was fitted but the sensor's offset and drift.",
+    )
+
+
+def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[str]:
+    if not planned:
+        yield (
+            "Nobody planned these as small motions. The torque is taken as it was recorded: noise "
+            "in it makes everything stiffer, more damped and heavier by about its share of the "
+            "torque's power."
+        )
+    if not planned and not _gives_way(found):
+        yield (
+            "What holds the load is not seen to give way as bristles do: a spring, a cable or "
+            "gravity would look the same. Stiffness and damping go to no bench file."
+        )
+    if len(bench.friction) > 1:
+        yield (
+            f"The bench states {len(bench.friction)} interfaces. Before the first of them slips a "
+            "motion shows only the sum of their stiffness and of their damping; what each of them "
+            "has goes to no bench file."
+        )
+
+
+def _conclusions(told: dict[str, Estimate]) -> Iterator[Conclusion]:
+    names = ("inertia", "stiffness_at_rest", "damping_at_rest")
+    if not all(name in told and told[name].has_interval for name in names):
+        yield Conclusion(("Small motions tell no stiffness and no damping here.",))
+        return
+    inertia, stiffness, damping = (Amount(told[name]) for name in names)
+    yield Conclusion(
+        (
+            "Before it slips, an inertia of ",
+            inertia,
+            " is held by ",
+            stiffness,
+            " and ",
+            damping,
+            ".",
+        )
+    )
+
+
+def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
+    """By the names of the parameters; the damping of the bristles is the whole one's twin."""
+    names = {"bristle_stiffness": "stiffness_at_rest", "damping": "bristle_damping"}
+    matrix = found.spread.correlation
+    own = [names.get(each, each) for each in found.fit.parameters.names]
+    return {(own[i], own[j]): float(matrix[i, j]) for i in range(len(own)) for j in range(i)}
+
+
+METHOD = Method(
+    name="presliding",
+    summary="stiffness, damping and inertia from small motions below breakaway",
+    options=PreslidingOptions,
+    suits=usable,
+    identify=_identify,
+)

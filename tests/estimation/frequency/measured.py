@@ -1,0 +1,37 @@
+"""Exact responses with noise of a known size, as measurements of few realisations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.measured import MeasuredResponse
+
+Array = np.ndarray
+
+
+def noisy(
+    frequency: Array, truth: Array, sigma: Array | float, random: np.random.Generator, of: int = 7
+) -> MeasuredResponse:
+    """The mean of `of` realisations, sigma the deviation of either part of that mean."""
+    n = len(frequency)
+    parts = random.standard_normal((2, of, n)) * sigma * np.sqrt(of)
+    errors = parts[0] + 1j * parts[1]
+    variance = np.var(errors, axis=0, ddof=1) / of
+    freedom = np.full(n, 2.0 * (of - 1))
+    ones = np.ones(n)
+    return MeasuredResponse(
+        frequency, truth + errors.mean(axis=0), variance, freedom, ones, 0.0 * ones
+    )
+
+
+def scatter_as_told(told: Sequence[Estimate]) -> float:
+    """Deviation of the values of repeated measurements over the standard error they tell."""
+    values = [each.value for each in told]
+    errors = [each.standard_error for each in told]
+    assert all(error is not None for error in errors)
+    return float(
+        np.std(values, ddof=1) / np.sqrt(np.mean(np.square(np.array(errors, dtype=float))))
+    )
