@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 COEFFICIENTS = np.linspace(0.0, 0.95, 20)
 """Of AR(1) that are tried; residuals that avoid their neighbours count as white."""
+MOST_AT_ONCE = 1 << 18
+"""Numbers of whitened designs that are in memory together."""
 MISFIT = 1.5
 """Residual variance over what neighbouring residuals differ by, above which what is left over is
 the model's own error: no interval can be built on it."""
@@ -53,7 +55,10 @@ def errors_of(jacobian: Array, residuals: Array) -> FitErrors:
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0):
         raise ValueError("a parameter of the fit changes nothing")
-    best = int(np.argmax(_likelihoods(jacobian / scale, residuals, COEFFICIENTS)[0]))
+    count = min(len(COEFFICIENTS), 1 + len(COEFFICIENTS) * jacobian.size // MOST_AT_ONCE)
+    blocks = np.array_split(COEFFICIENTS, count)
+    tried = [_likelihoods(jacobian / scale, residuals, block)[0] for block in blocks]
+    best = int(np.argmax(np.concatenate(tried)))
     _, triangles, variances = _likelihoods(jacobian / scale, residuals, COEFFICIENTS[[best]])
     triangle, variance = triangles[0], float(variances[0])
     if np.linalg.cond(triangle) > 1e8:
