@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from campaign.archive import RunReader, open_run
-from campaign.archive.reading import guarded, heaps
+from campaign.archive.reading import global_heap_check, guarded
 from campaign.errors import ArchiveError
 from tests.archive.test_kept import KEPT
 
@@ -78,14 +78,16 @@ def test_what_is_known_of_heaps_is_told_another_process(
 ) -> None:
     path = Path(shutil.copy(KEPT / SEALED, tmp_path))
     looked: list[Path] = []
-    original = heaps._sound
-    monkeypatch.setattr(heaps, "_sound", lambda *of: (looked.append(of[0]), original(*of))[1])
-    monkeypatch.setattr(heaps, "_known", {})
+    original = global_heap_check._sound
+    monkeypatch.setattr(
+        global_heap_check, "_sound", lambda *of: (looked.append(of[0]), original(*of))[1]
+    )
+    monkeypatch.setattr(global_heap_check, "_known", {})
     run = open_run(path)
     assert looked == [path]
-    known = heaps.known_heaps()
-    heaps._known.clear()  # as in a process that has just begun
-    heaps.told_of_heaps(known)
+    known = global_heap_check.known_heaps()
+    global_heap_check._known.clear()  # as in a process that has just begun
+    global_heap_check.told_of_heaps(known)
     read_all(run)
     assert looked == [path]
     path.touch()  # it may be another file by now

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -108,19 +105,13 @@ def test_a_part_says_whether_it_had_to_be_compiled() -> None:
     assert not make(part).compiled
 
 
-def test_all_is_made_until_a_source_is_touched(tmp_path, monkeypatch) -> None:
-    cache, sources = tmp_path / "cache", tmp_path / "sources"
-    cache.mkdir()
-    shutil.copytree(Path(machine_code.__file__).parent, sources)
-    monkeypatch.setattr(machine_code, "folder", lambda: cache)
-    monkeypatch.setattr(machine_code, "_SOURCES", sources)
+def test_all_is_made_for_one_width_and_one_processor(tmp_path, monkeypatch) -> None:
+    """Of one folder, which is that of the sources (`compiled.digest_of_sources`)."""
+    monkeypatch.setattr(machine_code, "folder", lambda: tmp_path)
     assert not is_made(1)
     note_made(1)
     assert is_made(1)
     assert not is_made(LANES)
-    os.utime(sources / "friction" / "lugre.py", ns=(0, 1 << 62))
-    assert not is_made(1)
-    note_made(1)
     monkeypatch.setattr(machine_code.binding, "get_host_cpu_name", lambda: "another")
     assert not is_made(1)
 
