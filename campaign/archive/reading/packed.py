@@ -52,12 +52,12 @@ def packed_entry(path: Path, entry: str) -> PackedTrial:
         groups: dict[str, tuple[PackedSeries, ...]] = {}
         for group, name, length, _ in series_of(parse_record(path, f"/{entry}/record", text)):
             data = guarded.inner_group(there, group)
-            series = series_at(data, name, length)
+            dataset, series = series_at(data, name, length)
             told = PackedSeries(
                 name=name,
                 chunk=series.chunk,
                 shuffled=series.shuffled,
-                chunks=layout_of(guarded.own_id(data, name)),
+                chunks=layout_of(dataset),
             )
             groups[group] = (*groups.get(group, ()), told)
         return PackedTrial(record=text, trees=trees, groups=groups)

@@ -96,7 +96,9 @@ class RecordedSamples:
 
             def series(group: str, name: str, length: int, unit: str) -> Series:
                 with guarded.guarded(self.path, f"/{self.entry}/{group}/{name}"):
-                    return series_at(inner(group), name, length, units=unit)
+                    dataset, found = series_at(inner(group), name, length)
+                    guarded.check_attribute(dataset, "units", unit)
+                    return found
 
             yield series
 

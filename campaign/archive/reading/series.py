@@ -16,7 +16,7 @@ from h5py import h5d, h5t
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import SeriesDigest, series_digest
 from campaign.archive.layout.packed_trial import PackedSeries, Place
-from campaign.archive.reading.guarded import check_attribute, own_id
+from campaign.archive.reading.guarded import own_id
 from campaign.errors import ArchiveError
 from campaign.recording import Array
 
@@ -80,10 +80,8 @@ class Series:
 MISMATCH = "does not match its checksum; it was damaged or changed"
 
 
-def series_at(parent: h5py.Group, name: str, length: int, **attributes: str) -> Series:
-    """A series of `length` samples that `parent` itself holds, with text attributes as they were
-    recorded. Raises ArchiveError.
-    """
+def series_at(parent: h5py.Group, name: str, length: int) -> tuple[h5d.DatasetID, Series]:
+    """A dataset that `parent` itself holds, and its `length` samples. Raises ArchiveError."""
     found = own_id(parent, name)
     plan = found.get_create_plist() if isinstance(found, h5d.DatasetID) else None
     shape: tuple[int, ...] = found.shape if plan is not None else ()
@@ -101,9 +99,7 @@ def series_at(parent: h5py.Group, name: str, length: int, **attributes: str) -> 
     if stated != length:
         what = f"has {stated} samples, and {length} were recorded"
         raise ArchiveError(f"{_place(parent, name)}: {what}")
-    for attribute, told in attributes.items():
-        check_attribute(found, attribute, told)
-    return dataset_series(found, parent, name, length, chunk, filters == _SHUFFLED)
+    return found, dataset_series(found, parent, name, length, chunk, filters == _SHUFFLED)
 
 
 def dataset_series(

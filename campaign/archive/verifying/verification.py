@@ -45,6 +45,7 @@ from campaign.archive.verifying.result import (
 from campaign.archive.writing import nexus
 from campaign.archive.writing.default_plot import Aim
 from campaign.errors import ArchiveError
+from campaign.recording import ChannelInfo
 
 _HASH = "outcome/file_sha256"
 _REQUIRED = frozenset(
@@ -300,13 +301,14 @@ class _Check:
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
         """The samples, each series against its digest, and that there are no others."""
         aim = Aim.of_tree(record.trial)
+        infos = {info.name: info for info in (TIME, *record.series)}
         for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), guarded.guarded(self.path, f"{place}/{inner}"):
                 data = guarded.group_at(group, inner, "NXdata")
                 told = {name: (length, digest) for _, name, length, digest in series}
                 for name, (length, digest) in told.items():
                     with self.problems.noting():
-                        self._one_series(data, f"{place}/{inner}", name, length, digest, record)
+                        self._one_series(data, f"{place}/{inner}", infos[name], length, digest)
                 for name in sorted(set(guarded.names(data)) - told.keys() - {"title"}):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
                 with self.problems.noting():
@@ -320,20 +322,14 @@ class _Check:
                     self.problems.add(f"{place}/{inner}@axes", "is not the time")
 
     def _one_series(
-        self,
-        data: h5py.Group,
-        place: str,
-        name: str,
-        length: int,
-        digest: str,
-        record: TrialRecord,
+        self, data: h5py.Group, place: str, info: ChannelInfo, length: int, digest: str
     ) -> None:
-        with guarded.guarded(self.path, f"{place}/{name}"):
-            series = series_at(data, name, length)
+        with guarded.guarded(self.path, f"{place}/{info.name}"):
+            dataset, series = series_at(data, info.name, length)
             self.progress(series.check(digest))
             self.datasets += 1
-            [info] = (info for info in (TIME, *record.series) if info.name == name)
-            series_at(data, name, length, units=info.unit, long_name=info.long_name)
+            guarded.check_attribute(dataset, "units", info.unit)
+            guarded.check_attribute(dataset, "long_name", info.long_name)
 
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str
