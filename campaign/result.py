@@ -318,7 +318,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class RecordingDoubt:
     """What is wrong with the recording of a trial.
 
     Attributes:
@@ -350,7 +350,7 @@ class Result:
     notes: tuple[str, ...] = ()
     conclusions: tuple[Conclusion, ...] = ()
     telling: str = ""
-    doubts: tuple[Doubt, ...] = ()
+    doubts: tuple[RecordingDoubt, ...] = ()
 
     @property
     def is_empty(self) -> bool:
@@ -358,6 +358,6 @@ class Result:
         return not (self.figures or self.findings or any(each.rows for each in self.tables))
 
     @property
-    def left_out(self) -> tuple[Doubt, ...]:
+    def left_out(self) -> tuple[RecordingDoubt, ...]:
         """Of the trials that it does without."""
         return tuple(each for each in self.doubts if each.fatal)

@@ -108,7 +108,7 @@ class AnalysedTest:
 
 
 @dataclass(frozen=True)
-class Found:
+class TestAnalysis:
     """What the analysis of one test comes to.
 
     Attributes:
@@ -128,7 +128,7 @@ def analyse_run(
     experiments: Mapping[str, Experiment],
     *,
     measure_anew: bool = False,
-    found: Mapping[str, Found] | None = None,
+    found: Mapping[str, TestAnalysis] | None = None,
 ) -> tuple[AnalysedTest, ...]:
     """Analyse every test of a run, in the protocol's order; a failing analysis is one problem.
 
@@ -174,7 +174,7 @@ def one_line(error: BaseException) -> str:
 
 def find(
     run: RunReader, test: Tree, experiments: Mapping[str, Experiment], *, measure_anew: bool
-) -> Found:
+) -> TestAnalysis:
     """What the analysis of one test finds in its trials; see `analyse_run`."""
     name, kind = name_of(test), str(test.get("kind", ""))
     trials = run.trials_of(name)
@@ -198,7 +198,7 @@ def find(
     if problem == NOT_EXECUTED and (damaged or _has_unreadable(run, name)):
         problem = NOT_READABLE
     numbers = tuple(archived.trial.number for archived in trials)
-    return Found(result, numbers, unusable or problem, (*records, *damaged))
+    return TestAnalysis(result, numbers, unusable or problem, (*records, *damaged))
 
 
 def _has_unreadable(run: RunReader, test: str) -> bool:
@@ -224,7 +224,7 @@ def title_of(title: str, source: str) -> str:
 
 
 def _analysed(
-    run: RunReader, test: Tree, experiments: Mapping[str, Experiment], found: Found
+    run: RunReader, test: Tree, experiments: Mapping[str, Experiment], found: TestAnalysis
 ) -> AnalysedTest:
     name, kind = name_of(test), str(test.get("kind", ""))
     reproduces, numbers = test.get("reproduces"), frozenset(found.trials)

@@ -278,14 +278,14 @@ class FilesBackend:
         try:
             recording = read_returned(trial, files, layout, wanted)
         except OtherRateError as error:
-            raise Refused(checks.Found("another rate", str(error))) from None
+            raise Refused(checks.RecordingProblem("another rate", str(error))) from None
         except RecordingError as error:
-            raise Refused(checks.Found("unreadable", str(error))) from None
+            raise Refused(checks.RecordingProblem("unreadable", str(error))) from None
         except MappingError as error:
             if error.of_columns and not error.defect:
                 raise
             name = DEFECTS.get(error.defect, error.defect or "no even clock")
-            raise Refused(checks.Found(name, str(error))) from None
+            raise Refused(checks.RecordingProblem(name, str(error))) from None
         return as_asked(trial, recording, others, accepted)
 
     def _check_whose(
@@ -303,11 +303,11 @@ class FilesBackend:
             if came.trial == trial.number and came.columns != read_by:
                 continue
             told = f"{name} is, to the last byte, what came back for {came.attempt}"
-            raise Refused(checks.Found("the same file", told))
+            raise Refused(checks.RecordingProblem("the same file", told))
         said = read_json(attempt.returned / MANIFEST)
         if said is not None and said.get("fingerprint") != trial.fingerprint:
             told = f"the manifest beside it is that of {said.get('name')}"
-            raise Refused(checks.Found("another trial", told))
+            raise Refused(checks.RecordingProblem("another trial", told))
 
     def _judge(self, attempt: Attempt, verdict: Verdict) -> None:
         attempt.judge(verdict)

@@ -11,7 +11,7 @@ from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import BOTH_ROTARY, speaking_of, words_here
 from campaign.comparing.circumstances import Change, changes
-from campaign.comparing.judging import Pair, Verdict, judged, pairs_of
+from campaign.comparing.judging import Pair, Verdict, pairs_of, with_verdicts
 from campaign.comparing.pairing import Pairing, pair_tests
 from campaign.comparing.shared import shared_sources, source_called
 from campaign.errors import UsageError
@@ -134,7 +134,7 @@ def compare_runs(
     )
     others = [_exchanged(sides[0], name) for name in exchanged]
     found = [_against(sides[0], other, others) for other in sides[1:]]
-    verdicts = iter(judged([pair for each in found for pair in each.pairs]))
+    verdicts = iter(with_verdicts([pair for each in found for pair in each.pairs]))
     against = (replace(each, pairs=tuple(next(verdicts) for _ in each.pairs)) for each in found)
     return Comparison(sides, tuple(against))
 

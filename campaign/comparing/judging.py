@@ -109,7 +109,7 @@ def pairs_of(tested: PairedTest, shared: Collection[str] = ()) -> Iterator[Pair]
         )
 
 
-def judged(pairs: Sequence[Pair], rate: float = RATE) -> tuple[Pair, ...]:
+def with_verdicts(pairs: Sequence[Pair], rate: float = RATE) -> tuple[Pair, ...]:
     """The pairs with their verdicts: one family, however many runs and tests they are of."""
     from scipy.stats import false_discovery_control
 

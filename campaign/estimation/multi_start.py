@@ -113,7 +113,7 @@ class Lowest:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """What a search found.
 
     Attributes:
@@ -172,7 +172,7 @@ class Found:
         }
 
 
-def search(objective: Objective, settings: Settings, display: Display = no_display) -> Found:
+def search(objective: Objective, settings: Settings, display: Display = no_display) -> SearchResult:
     """Fit from every start, then linearise at the best point.
 
     A KeyboardInterrupt after the first evaluation ends it with the best point so far.
@@ -196,7 +196,7 @@ def search(objective: Objective, settings: Settings, display: Display = no_displ
         )
     except KeyboardInterrupt:
         interrupted = True
-    return Found(
+    return SearchResult(
         unknowns=objective.unknowns,
         settings=settings,
         shares=lowest.shares,

@@ -24,7 +24,7 @@ from campaign.estimation.inverse.regression import (
 from campaign.estimation.least_squares import covariance
 from campaign.estimation.multi_start import (
     Display,
-    Found,
+    SearchResult,
     Settings,
     fit_from,
     no_display,
@@ -60,7 +60,7 @@ class ModelFit:
         free: which unknowns these are.
     """
 
-    found: Found
+    found: SearchResult
     estimates: dict[str, Estimate]
     values: Values
     residuals: tuple[Array, ...]
@@ -182,7 +182,7 @@ def _estimate(
     unknown: Unknown,
     unit: str,
     index: int,
-    found: Found,
+    found: SearchResult,
     regression: Regression | None,
     free: NDArray[np.bool_],
     left_open: bool,

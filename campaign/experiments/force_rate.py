@@ -25,7 +25,7 @@ from campaign.experiments.shared.captions import amount, sentence, setting, tria
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
-    Place,
+    ConditionGroup,
     combined,
     in_models,
     model_series,
@@ -136,7 +136,7 @@ class _Breakaway:
     applied: Estimate
 
 
-def _breakaways(place: Place, notes: list[str]) -> Iterator[_Breakaway]:
+def _breakaways(place: ConditionGroup, notes: list[str]) -> Iterator[_Breakaway]:
     for rate, trials in place.by("torque_rate").items():
         slid = []
         for item in trials:
@@ -182,7 +182,7 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), (_figure(rows),), findings, tuple(notes), conclusions)
 
 
-def _figure(rows: dict[str, tuple[Place, list[_Breakaway]]]) -> Figure:
+def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
     peaks: list[Curve] = []
     histories: dict[str, list[Curve]] = {}
     told: list[str] = []
@@ -260,7 +260,7 @@ def _ramps(histories: dict[str, list[Curve]]) -> str:
 
 
 def _histories(
-    place: Place, rows: list[_Breakaway], label: str, series: str
+    place: ConditionGroup, rows: list[_Breakaway], label: str, series: str
 ) -> Iterator[tuple[str, Curve]]:
     """Friction over applied torque of the slowest and of the fastest ramp, each with its panel.
 
@@ -281,7 +281,7 @@ def _histories(
 
 
 def force_rate_conclusions(
-    rows: Rows, places: Sequence[Place], settings: parts.Settings
+    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings
 ) -> tuple[Conclusion, ...]:
     """Breakaway torque on the slowest and on the fastest ramp, of each model."""
 

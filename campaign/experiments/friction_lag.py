@@ -25,7 +25,7 @@ from campaign.experiments.shared.captions import amount, listed, sentence, surel
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
-    Place,
+    ConditionGroup,
     combined,
     in_models,
     places,
@@ -259,7 +259,7 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), (figure,), findings, failures_note(data), conclusions)
 
 
-def _what_shows(place: Place, loops: list[Loop]) -> str:
+def _what_shows(place: ConditionGroup, loops: list[Loop]) -> str:
     """How wide the loops are at the mean rate, where friction lags at all: true of the figure."""
     start = f"{place.label}: " if place.label else ""
     told = [loop for loop in loops if math.isfinite(loop.width.value)]
@@ -286,7 +286,7 @@ def _flat(loop: Loop, level: float) -> bool:
     return abs(loop.widest.value) <= FLAT * level
 
 
-def _panel(place: Place, loops: list[Loop]) -> Panel:
+def _panel(place: ConditionGroup, loops: list[Loop]) -> Panel:
     level = _level(loops)
     curves = [
         Curve(
@@ -317,7 +317,7 @@ def _rates(display: str) -> Axis:
 
 
 def friction_lag_conclusions(
-    rows: Rows, places: Sequence[Place], settings: parts.Settings
+    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings
 ) -> tuple[Conclusion, ...]:
     """Width of the loops at the slowest and the fastest swing, of each model."""
 

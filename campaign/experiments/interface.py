@@ -24,7 +24,7 @@ from campaign.physics.complete import IncompleteBenchError
 from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
-from campaign.result import Doubt, Result
+from campaign.result import RecordingDoubt, Result
 from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
 
 NOT_TOLD = Cause("not told by the recording", "the recording does not tell it")
@@ -226,10 +226,12 @@ def _analysed(experiment: Experiment, data: TestData) -> Result:
     return replace(result, doubts=doubts)
 
 
-def _measurable(experiment: Experiment, data: TestData) -> tuple[TestData, tuple[Doubt, ...]]:
+def _measurable(
+    experiment: Experiment, data: TestData
+) -> tuple[TestData, tuple[RecordingDoubt, ...]]:
     """The trials that can be measured, each with what that found; and why the others cannot."""
     good: list[TrialData] = []
-    doubts: list[Doubt] = []
+    doubts: list[RecordingDoubt] = []
     completed = {item.trial.number for item in data.completed()}
     for item in data.trials:
         estimates = item.estimates
@@ -277,7 +279,7 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
         return tuple(map(estimate_here, experiment.measure(data)))
 
 
-def _doubt(experiment: Experiment, data: TrialData) -> Doubt | None:
+def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
     """Why a recording is not analysed; of one that is too long no sample is read to find out."""
     most, task = experiment.most_samples, data.trial.task
     samples = task.duration * task.sample_rate

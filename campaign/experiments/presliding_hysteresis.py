@@ -22,7 +22,7 @@ from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared import fitting_ramps
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
 from campaign.experiments.shared.common import failures_note
-from campaign.experiments.shared.friction_models import Place, in_models, places
+from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
 from campaign.experiments.shared.model_clauses import Rows, amount_of, at_ends, each_model
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -228,7 +228,10 @@ def _analyse(data: TestData) -> Result:
 
 
 def _what_shows(
-    place: Place, items: Sequence[tuple[TrialData, Mapping[str, Estimate]]], unit: str, energy: str
+    place: ConditionGroup,
+    items: Sequence[tuple[TrialData, Mapping[str, Estimate]]],
+    unit: str,
+    energy: str,
 ) -> str:
     """Energy and loss factor of the smallest and the largest loop."""
     told = [each for each in items if math.isfinite(each[1]["hysteresis_energy"].value)]
@@ -244,13 +247,13 @@ def _what_shows(
     return sentence(f"{start} {listed(list(dict.fromkeys(parts)))}")
 
 
-def _small(place: Place) -> list[float]:
+def _small(place: ConditionGroup) -> list[float]:
     """Amplitudes (rad) of the loops that a panel of all of them shows too small to be read."""
     known = [_amplitude_of(item) for item in place.trials]
     return [each for each in known if each <= READABLE * max(known)]
 
 
-def _panels(place: Place, display: str) -> Iterator[Panel]:
+def _panels(place: ConditionGroup, display: str) -> Iterator[Panel]:
     """All loops, and beside them the small ones again, on axes of their own."""
     whole = _panel(place, display)
     yield whole
@@ -262,7 +265,7 @@ def _panels(place: Place, display: str) -> Iterator[Panel]:
         yield replace(whole, curves=curves, title=title)
 
 
-def _panel(place: Place, display: str) -> Panel:
+def _panel(place: ConditionGroup, display: str) -> Panel:
     curves = [
         Curve(loop.displacement, loop.friction, label, label, "loop")
         for item in place.trials
@@ -284,7 +287,7 @@ def _amplitude(amplitude: float, display: str) -> str:
 
 
 def hysteresis_conclusions(
-    rows: Rows, places: Sequence[Place], settings: parts.Settings, units: tuple[str, str]
+    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings, units: tuple[str, str]
 ) -> tuple[Conclusion, ...]:
     """Energy and loss factor of the smallest and the largest loop, of each model.
 

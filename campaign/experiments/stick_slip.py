@@ -23,7 +23,7 @@ from campaign.experiments.shared.captions import amount, sentence, setting, tria
 from campaign.experiments.shared.common import COUNTED, failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
-    Place,
+    ConditionGroup,
     combined,
     in_models,
     model_series,
@@ -183,7 +183,7 @@ def _count(slips: float) -> int | float:
     return int(slips) if slips.is_integer() else slips
 
 
-def _shown(place: Place) -> dict[str, Estimate]:
+def _shown(place: ConditionGroup) -> dict[str, Estimate]:
     """What the pulls of a place show, by name; what they did not come to is not determined."""
     found = {
         name.removeprefix(PREFIX): each for name, each in combined(place.trials, _measure).items()
@@ -196,7 +196,7 @@ def _shown(place: Place) -> dict[str, Estimate]:
     return found
 
 
-def _figure(measured: Sequence[tuple[Place, Mapping[str, Estimate]]]) -> Figure:
+def _figure(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure:
     time = Axis("Time", "s", "s")
     torque, rate, angle = [], [], []
     marks: list[Mark] = []
@@ -245,7 +245,7 @@ def _how(item: TrialData) -> str:
     return f"The load is pulled at {pull} through a spring of {spring}."
 
 
-def _what_shows(place: Place, found: Mapping[str, Estimate]) -> str:
+def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
     """How often the load slipped, if it did, and how fast it then was."""
     who, slips = place.label or "the load", found["slips"].value
     if math.isnan(slips):
@@ -261,7 +261,7 @@ def _what_shows(place: Place, found: Mapping[str, Estimate]) -> str:
 
 def stick_slip_conclusions(
     rows: Rows,
-    places: Sequence[Place],
+    places: Sequence[ConditionGroup],
     settings: parts.Settings,
     stiffness: float,
     pull_rate: float,

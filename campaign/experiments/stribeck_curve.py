@@ -24,7 +24,7 @@ from campaign.experiments.shared.captions import amount, listed, sentence, surel
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
-    Place,
+    ConditionGroup,
     combined,
     in_models,
     places,
@@ -143,7 +143,7 @@ class _Points:
         return np.array([each.value for each in self.rates])
 
 
-def _points(place: Place) -> _Points:
+def _points(place: ConditionGroup) -> _Points:
     """Those that moved and told a torque: without a rate the model promises no friction."""
     read = (combined(trials, _measure) for trials in place.by("speed").values())
     found = [each for each in read if each["rate"].value and _told(each)]
@@ -236,7 +236,7 @@ def _least(fine: Array, torque: Array) -> int | None:
     return at if torque[0] > low and torque[-1] > low else None
 
 
-def _what_shows(place: Place, points: _Points) -> str:
+def _what_shows(place: ConditionGroup, points: _Points) -> str:
     """How friction goes from the slowest to the fastest speed, as the points have it."""
     speed = np.abs(points.rate)
     torques = [
@@ -264,7 +264,7 @@ def _higher(one: Estimate, other: Estimate) -> bool:
     return surely_above(one, other.value if high is None else high, LEVEL * abs(other.value))
 
 
-def _panels(place: Place, points: _Points) -> Iterator[Panel]:
+def _panels(place: ConditionGroup, points: _Points) -> Iterator[Panel]:
     """A panel for each direction that was measured: in one, both would lie on one another."""
     bench = bench_of(place.trials[0].trial)
     speed = np.abs(points.rate)
@@ -320,7 +320,7 @@ def _signed(torque: Estimate, sign: float) -> Estimate:
 
 def stribeck_conclusions(
     rows: Rows,
-    places: Sequence[Place],
+    places: Sequence[ConditionGroup],
     deviations: Mapping[str, Estimate],
     settings: parts.Settings,
 ) -> tuple[Conclusion, ...]:

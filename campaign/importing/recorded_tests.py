@@ -84,7 +84,7 @@ def _of_file(what: Problem, at: Origin, paths: Sequence[Path], entry: RecordingE
 
 
 @dataclass(frozen=True)
-class Found:
+class TestRecording:
     """One recording of a test: what its entry says, and what its files hold."""
 
     entry: RecordingEntry
@@ -122,10 +122,12 @@ class _Loader:
         ]
         return replace(test, experiment=_kind(test.experiment, found))
 
-    def _found(self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts) -> list[Found]:
+    def _found(
+        self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts
+    ) -> list[TestRecording]:
         layout, folder = self._layout(at, entry), self.protocol.path.parent
         wanted = {*test.experiment.requires, *test.experiment.can_use}
-        found: list[Found] = []
+        found: list[TestRecording] = []
         for written in self._files(at, entry):
             paths = [folder / each for each in written]
             try:
@@ -141,7 +143,7 @@ class _Loader:
                 self.problems += (self._placed(at, entry, each) for each in every)
                 continue
             self.stack.enter_context(opened)
-            found += (Found(entry, *both, opened) for both in trials)
+            found += (TestRecording(entry, *both, opened) for both in trials)
         return found
 
     def _placed(self, at: Origin, entry: RecordingEntry, error: MappingError) -> Problem:
@@ -199,7 +201,7 @@ def _matching(folder: Path, pattern: str) -> list[str]:
     return sorted(found)
 
 
-def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> ExperimentKind:
+def _kind(experiment: ExperimentKind, found: Sequence[TestRecording]) -> ExperimentKind:
     planned = any(each.entry.trial is not None for each in found)
 
     def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
@@ -229,7 +231,7 @@ def _kind(experiment: ExperimentKind, found: Sequence[Found]) -> ExperimentKind:
     )
 
 
-def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
+def _planned(found: TestRecording, asked: Sequence[TrialRequest]) -> TrialRequest:
     """The planned trial that a recording answers. Raises ValueError where it is none."""
     number, told = found.entry.trial or 0, found.described
     if number > len(asked):
@@ -247,7 +249,7 @@ def _planned(found: Found, asked: Sequence[TrialRequest]) -> TrialRequest:
 
 
 def _offered(
-    found: Found, experiment: ExperimentKind, options: Any, bench: Bench
+    found: TestRecording, experiment: ExperimentKind, options: Any, bench: Bench
 ) -> Iterator[TrialRequest]:
     """The trials that a recording holds which nobody planned. Raises ValueError for none."""
     told = found.described
@@ -284,7 +286,7 @@ def _offered(
 
 
 def _served(
-    found: Found, request: TrialRequest, told: Described, point: Mapping[str, JsonValue]
+    found: TestRecording, request: TrialRequest, told: Described, point: Mapping[str, JsonValue]
 ) -> TrialRequest:
     """The trial that is served from what is told of a recording."""
     rate = told.sample_rate
@@ -307,7 +309,7 @@ def _part(told: Described, part: tuple[float, float] | None) -> Described:
     )
 
 
-def _conditions(found: Found) -> dict[str, JsonValue]:
+def _conditions(found: TestRecording) -> dict[str, JsonValue]:
     """What was set for a recording, SI where it has a unit; and what tells its stretch apart."""
     told: dict[str, JsonValue] = dict(found.stretch.conditions)
     for name, value in found.entry.conditions.items():

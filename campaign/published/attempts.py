@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from campaign.published.evidence import same
-from campaign.published.provenance import Place
+from campaign.published.provenance import SweepPoint
 from campaign.result import Value
 
 COMPENSATION = "compensation"
 
 
-def in_vain(places: Sequence[Place], conditions: Mapping[str, Value]) -> bool:
+def in_vain(places: Sequence[SweepPoint], conditions: Mapping[str, Value]) -> bool:
     """Whether trials were executed for a cell with these conditions, and some that it needs failed.
 
     What the plan tells: a number of the sweep or of the options that is not the cell's excludes a
@@ -37,7 +37,7 @@ def in_vain(places: Sequence[Place], conditions: Mapping[str, Value]) -> bool:
     return tried and any(place.failed for place in near)
 
 
-def _other_number(place: Place, conditions: Mapping[str, Value]) -> bool:
+def _other_number(place: SweepPoint, conditions: Mapping[str, Value]) -> bool:
     numbers = {k: v for k, v in {**place.numbers, **place.point}.items() if _is_number(v)}
     return any(
         _is_number(conditions[name]) and not same(numbers[name], conditions[name])
@@ -45,12 +45,12 @@ def _other_number(place: Place, conditions: Mapping[str, Value]) -> bool:
     )
 
 
-def _words_of(place: Place) -> dict[str, str]:
+def _words_of(place: SweepPoint) -> dict[str, str]:
     swept = {name: value for name, value in place.point.items() if isinstance(value, str)}
     return {COMPENSATION: place.compensation, **swept}
 
 
-def _words(places: Sequence[Place]) -> dict[str, set[str]]:
+def _words(places: Sequence[SweepPoint]) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for place in places:
         for name, word in _words_of(place).items():

@@ -31,7 +31,7 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Place:
+class SweepPoint:
     """The trials at one point of a test's sweep with one compensation.
 
     Attributes:
@@ -53,7 +53,7 @@ class Place:
 class Provenance:
     """What a test's trials ran on, place by place; where there is none, nothing is altered."""
 
-    places: tuple[Place, ...] = ()
+    places: tuple[SweepPoint, ...] = ()
 
     def why_altered(self, conditions: Mapping[str, Value]) -> str:
         """Why a finding with these conditions is of no described bench; "" when it is.
@@ -66,7 +66,7 @@ class Provenance:
         """Whether every bench behind such a finding says what it was made from."""
         return all(place.described for place in self._behind(conditions))
 
-    def _behind(self, conditions: Mapping[str, Value]) -> Sequence[Place]:
+    def _behind(self, conditions: Mapping[str, Value]) -> Sequence[SweepPoint]:
         behind = [place for place in self.places if _may_be_behind(place, conditions)]
         return behind or self.places
 
@@ -105,7 +105,7 @@ def provenance_of(
     if len({canonical_json(_description(trial.bench)) for trial in measured}) > 1:
         changed = changed or DESCRIBED_TWICE
     known: dict[str, tuple[str, bool]] = {}
-    places: dict[str, Place] = {}
+    places: dict[str, SweepPoint] = {}
     drawn = {trial.point.get(SEED) for trial in measured}
     own = _own_seed(described)
     for trial in measured:
@@ -121,7 +121,7 @@ def provenance_of(
             known[key] = OF_A_TRUTH if trial.truth else why, described_at_all
         numbers = {name: v for name, v in trial.options.items() if isinstance(v, int | float)}
         lost = trial.number in failed
-        place = Place(dict(trial.point), compensation, *known[key], numbers, lost)
+        place = SweepPoint(dict(trial.point), compensation, *known[key], numbers, lost)
         places.setdefault(canonical_json([place.point, compensation, *known[key], lost]), place)
     found = tuple(places.values())
     if perturbs_bench and described is None and any(not place.altered for place in found):
@@ -178,7 +178,7 @@ def _replaced(tree: Mapping[str, Any], keys: list[str], value: Any) -> dict[str,
     return {**tree, keys[0]: value if len(keys) == 1 else _replaced(inside, keys[1:], value)}
 
 
-def _may_be_behind(place: Place, conditions: Mapping[str, Value]) -> bool:
+def _may_be_behind(place: SweepPoint, conditions: Mapping[str, Value]) -> bool:
     if conditions.get("compensation", place.compensation) != place.compensation:
         return False
     shared = place.point.keys() & conditions.keys()

@@ -27,7 +27,7 @@ from campaign.archive.reading.global_heap_check import known_heaps, told_of_heap
 from campaign.trial import Tree
 
 if TYPE_CHECKING:
-    from campaign.access.analysis import Found
+    from campaign.access.analysis import TestAnalysis
     from campaign.report.drawing.drawn import Drawn
     from campaign.report.page.drawings import Drawable, Key
 
@@ -67,7 +67,7 @@ class Workers:
     measure_anew: bool = False
 
     @cached_property
-    def found(self) -> Mapping[str, Found]:
+    def found(self) -> Mapping[str, TestAnalysis]:
         """What the analysis of each test finds, by test; it is waited for where it is asked for.
 
         Analysing begins when this is first asked for. Only with the experiments of this
@@ -97,13 +97,13 @@ class Workers:
 
 
 @dataclass(frozen=True, eq=False)
-class _Awaited(Mapping[str, "Found"]):
+class _Awaited(Mapping[str, "TestAnalysis"]):
     """What processes find; what one died of is missing."""
 
     begun: Mapping[str, Future[Any]]
 
-    def __getitem__(self, name: str) -> Found:
-        found: Found | None = _result(self.begun[name])
+    def __getitem__(self, name: str) -> TestAnalysis:
+        found: TestAnalysis | None = _result(self.begun[name])
         if found is None:
             raise KeyError(name)
         return found
@@ -167,7 +167,7 @@ def _begin(handed: bytes) -> None:
     gc.freeze()
 
 
-def _find(test: Tree, measure_anew: bool) -> Found:
+def _find(test: Tree, measure_anew: bool) -> TestAnalysis:
     from campaign.access.analysis import find
     from campaign.experiments import experiments
 

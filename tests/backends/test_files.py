@@ -128,7 +128,7 @@ def test_the_documentation_has_every_option_and_every_refusal() -> None:
         ROOT / "campaign/backends/files.py",
     ]
     text = "".join(path.read_text(encoding="utf-8") for path in sources)
-    names = {*re.findall(r'Found\(\s*"([a-z ]+)"', text), *DEFECTS.values()}
+    names = {*re.findall(r'RecordingProblem\(\s*"([a-z ]+)"', text), *DEFECTS.values()}
     assert {"wrong sign", "too short", "clipped", "another rate", "the same file"} <= names
     for name in (*names, *BACKEND.options.model_fields):
         assert f"`{name}`" in told, name

@@ -10,7 +10,7 @@ from typing import Any
 
 from campaign.access.analysis import AnalysedTest
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.comparing.judging import Pair, judged, pairs_of
+from campaign.comparing.judging import Pair, pairs_of, with_verdicts
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.shared import shared_sources
 from campaign.experiments import experiments
@@ -124,7 +124,7 @@ def analysed(data: TestData, result: Any, **more: Any) -> AnalysedTest:
 
 def compared(reference: Run, other: Run) -> tuple[Pair, ...]:
     """All pairs of two runs, judged as one family."""
-    return judged(
+    return with_verdicts(
         [
             pair
             for tested in pair_tests(reference, other).tests

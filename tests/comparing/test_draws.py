@@ -10,7 +10,7 @@ from typing import Any
 from campaign.access.analysis import AnalysedTest
 from campaign.cli import compare as command
 from campaign.comparing.draws import common_draws
-from campaign.comparing.judging import Pair, judged, pairs_of
+from campaign.comparing.judging import Pair, pairs_of, with_verdicts
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.tables import bare_differing, change_of
 from campaign.physics.bench import Bench
@@ -63,7 +63,7 @@ def compared(source: str, bench: Bench) -> tuple[Pair, ...]:
         return replace(made_up(found, [{}], bench), source=source)
 
     tests = pair_tests([run([10.0, 20.0])], [run([10.05, 20.0])]).tests
-    return judged(list(pairs_of(tests[0])))
+    return with_verdicts(list(pairs_of(tests[0])))
 
 
 def test_simulated_numbers_without_an_interval_are_listed_where_they_differ(platform: Bench):

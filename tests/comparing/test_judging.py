@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.judging import RATE, Verdict, judged, pairs_of
+from campaign.comparing.judging import RATE, Verdict, pairs_of, with_verdicts
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.tables import change_of
 from campaign.comparing.words import condition_words
@@ -75,7 +75,7 @@ def test_what_is_declared_is_what_the_step_up_procedure_rejects(platform: Bench)
     for _ in range(8):
         before = [found(10.0, 0.1, place) for place in range(1, 25)]
         after = [found(10.0 + draw.normal(0, 0.3), 0.1, place) for place in range(1, 25)]
-        told = judged(pairs(before, after, platform))
+        told = with_verdicts(pairs(before, after, platform))
         rejected = step_up([pair.found.p or 0.0 for pair in told], RATE)
         assert [pair.verdict is Verdict.DIFFERENT for pair in told] == rejected
         assert 0 < sum(rejected) < 24
@@ -85,20 +85,22 @@ def test_what_is_declared_is_what_the_step_up_procedure_rejects(platform: Bench)
 
 def test_a_difference_that_would_stand_alone_may_not_in_a_family(platform: Bench):
     alone = [found(10.0, 0.1, 1)], [found(10.35, 0.1, 1)]
-    assert judged(pairs(*alone, platform))[0].verdict is Verdict.DIFFERENT
+    assert with_verdicts(pairs(*alone, platform))[0].verdict is Verdict.DIFFERENT
     many = [found(10.0, 0.1, place) for place in range(1, 11)]
-    among = judged(pairs(many, [*alone[1], *many[1:]], platform))
+    among = with_verdicts(pairs(many, [*alone[1], *many[1:]], platform))
     assert [pair.verdict for pair in among] == [Verdict.NOT_SHOWN] * 10
     assert among[0].adjusted == pytest.approx(10 * (among[0].found.p or 0.0))
 
 
 def test_a_number_of_one_trial_is_not_judged_however_small_its_error(platform: Bench):
-    one = judged(pairs([found(10.0, 0.001)], [found(10.1, 0.001)], platform, repeat=1))[0]
+    one = with_verdicts(pairs([found(10.0, 0.001)], [found(10.1, 0.001)], platform, repeat=1))[0]
     assert one.found.p < 1e-10
     assert one.verdict is Verdict.NOT_JUDGED
     assert "one trial each" in str(one.reason)
     assert one.found.difference.has_interval  # told all the same
-    assert judged(pairs([found(10.0, 0.001)], [found(10.1, 0.001)], platform, repeat=2))[0].testable
+    assert with_verdicts(pairs([found(10.0, 0.001)], [found(10.1, 0.001)], platform, repeat=2))[
+        0
+    ].testable
 
 
 def test_one_side_of_one_trial_is_said_to_be_it(platform: Bench):
@@ -124,16 +126,16 @@ def test_a_failed_trial_is_none_of_those_behind_a_number(platform: Bench):
 def test_a_bound_that_excludes_equality_is_told_without_a_test(platform: Bench):
     least = Finding.of(Estimate("torque", 20.0, "N m", kind="at least"), {"position": 0.0})
     before, after = [found(10.0, 0.1), found(5.0, 0.1, 2)], [least, found(5.0, 0.1, 2)]
-    told = judged(pairs(before, after, platform))
+    told = with_verdicts(pairs(before, after, platform))
     assert [pair.verdict for pair in told] == [Verdict.BEYOND_BOUND, Verdict.NOT_SHOWN]
     assert told[0].adjusted is None
     below = [Finding.of(Estimate("torque", 9.0, "N m", kind="at least"), {"position": 0.0})]
-    assert judged(pairs(before[:1], below, platform))[0].verdict is Verdict.NOT_JUDGED
+    assert with_verdicts(pairs(before[:1], below, platform))[0].verdict is Verdict.NOT_JUDGED
 
 
 def test_nothing_to_test_is_no_error(platform: Bench):
     bare = [Finding("torque", 10.0, "N m", {"position": 0.0})]
-    told = judged(pairs(bare, bare, platform))
+    told = with_verdicts(pairs(bare, bare, platform))
     assert [pair.verdict for pair in told] == [Verdict.NOT_JUDGED]
     assert "no interval" in str(told[0].reason)
 
@@ -152,7 +154,7 @@ def shares(platform: Bench, count: int) -> tuple[float, float]:
             for place, value in enumerate(truth, start=1)
         ]
         runs = [[replace(test, result=Result(findings=tuple(own)))] for own in (before, after)]
-        told = judged(list(pairs_of(pair_tests(*runs).tests[0])))
+        told = with_verdicts(list(pairs_of(pair_tests(*runs).tests[0])))
         declared = [pair.verdict is Verdict.DIFFERENT for pair in told]
         false.append(sum(declared[:30]) / max(sum(declared), 1))
         power.append(sum(declared[30:]) / 10)
@@ -176,18 +178,18 @@ def test_what_follows_from_other_numbers_is_not_of_the_family_and_leads_no_list(
         ratio = with_error("error_reduction", 2 * value, "", 0.01, 10.0, "")
         return [found(value, 0.1), Finding.of(ratio, {"position": 0.0})]
 
-    base, derived = judged(pairs(both(10.0), both(20.0), platform))
+    base, derived = with_verdicts(pairs(both(10.0), both(20.0), platform))
     assert base.verdict is Verdict.DIFFERENT
     assert base.adjusted == base.found.p  # a family of one
     assert derived.verdict is Verdict.NOT_JUDGED
     assert "follows from other numbers" in str(derived.reason)
     least = Finding.of(Estimate("error_growth", 90.0, "", kind="at least"), {"position": 0.0})
     known = Finding.of(with_error("error_growth", 2.0, "", 0.1, 9.0, ""), {"position": 0.0})
-    assert judged(pairs([known], [least], platform))[0].verdict is Verdict.NOT_JUDGED
+    assert with_verdicts(pairs([known], [least], platform))[0].verdict is Verdict.NOT_JUDGED
 
 
 def test_a_number_that_changes_its_sign_is_told_in_its_unit_not_in_percent(platform: Bench):
-    (pair,) = judged(pairs([found(1.0, 0.1)], [found(-2.81, 0.1)], platform))
+    (pair,) = with_verdicts(pairs([found(1.0, 0.1)], [found(-2.81, 0.1)], platform))
     assert np.isnan(pair.found.change.value)
     assert pair.found.change.reason.text == "its sign changes"
     assert "%" not in change_of(pair)

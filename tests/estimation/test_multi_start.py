@@ -17,8 +17,8 @@ from campaign.estimation.linear_uncertainty import INTERRUPTED, NOT_DETERMINED
 from campaign.estimation.losses import cost
 from campaign.estimation.multi_start import (
     Array,
-    Found,
     Progress,
+    SearchResult,
     Settings,
     Start,
     agreeing,
@@ -218,7 +218,7 @@ def test_the_example_of_the_page_finds_what_most_fits_miss() -> None:
 # Interruption
 
 
-def interrupted_at(step: int) -> tuple[Found, list[Progress]]:
+def interrupted_at(step: int) -> tuple[SearchResult, list[Progress]]:
     shown: list[Progress] = []
 
     def press(progress: Progress) -> None:

@@ -29,7 +29,7 @@ from campaign.experiments.shared.conclusion_parts import (
     ratio_of,
     setting,
 )
-from campaign.experiments.shared.friction_models import Place
+from campaign.experiments.shared.friction_models import ConditionGroup
 from campaign.experiments.stabilization.conclusions import stabilization_conclusions
 from campaign.protocol import load_protocol, make_plan
 from campaign.result import Amount, Conclusion, Factor, Finding, Result
@@ -593,7 +593,7 @@ def test_what_a_faster_ramp_does_to_breakaway(fast: float, word: str) -> None:
         {"torque_rate": rate, "breakaway": known("breakaway_torque", value, 0.02)}
         for rate, value in ((0.1, 1.49), (50.0, fast))
     ]
-    (told,) = said(force_rate_conclusions(rows, [Place({}, "", ())], SETTINGS))
+    (told,) = said(force_rate_conclusions(rows, [ConditionGroup({}, "", ())], SETTINGS))
     assert f" N·m at 50 N·m/s, {word}" in told
 
 

@@ -6,13 +6,15 @@ import pytest
 
 from campaign.published.attempts import in_vain
 from campaign.published.evidence import Evidence
-from campaign.published.provenance import Place, Provenance
+from campaign.published.provenance import Provenance, SweepPoint
 from campaign.published.scoreboard import score
 from campaign.published.values import read_published
 from campaign.result import Finding, Value
 
 SWEEP = [
-    Place({"frequency": f, "compensation": c}, c, "", numbers={"acceleration": 0.3}, failed=lost)
+    SweepPoint(
+        {"frequency": f, "compensation": c}, c, "", numbers={"acceleration": 0.3}, failed=lost
+    )
     for f, c, lost in ((0.4, "none", False), (0.4, "lugre", True), (2.0, "none", False))
 ]
 """Without compensation at 0.4 and 2 Hz, with LuGre at 0.4 Hz, which failed."""
@@ -44,8 +46,8 @@ def test_numbers_and_words(conditions: dict[str, Value], tried: bool) -> None:
 )
 def test_a_word_of_no_trial_may_stand_for_several(direction: str, tried: bool) -> None:
     places = [
-        Place({"direction": "positive"}, "none", ""),
-        Place({"direction": "negative"}, "none", "", failed=True),
+        SweepPoint({"direction": "positive"}, "none", ""),
+        SweepPoint({"direction": "negative"}, "none", "", failed=True),
     ]
     assert in_vain(places, {"direction": direction}) is tried
     assert not in_vain([places[0]], {"direction": direction}), "nothing failed"

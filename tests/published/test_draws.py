@@ -12,7 +12,7 @@ import pytest
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.published.draws import SEED, place_in, spread, together
 from campaign.published.evidence import Evidence
-from campaign.published.provenance import Place, Provenance
+from campaign.published.provenance import Provenance, SweepPoint
 from campaign.published.scoreboard import Line, score, to_csv
 from campaign.published.values import read_published
 from campaign.result import Finding
@@ -106,7 +106,7 @@ def draw(seed: int, value: float, **more: object) -> Finding:
 
 
 def line_of(*findings: Finding, executed: tuple[int, ...] = (), **more: object) -> Line:
-    places = tuple(Place({SEED: seed}, "none", "") for seed in executed)
+    places = tuple(SweepPoint({SEED: seed}, "none", "") for seed in executed)
     evidence = Evidence("t", ("1",), findings, provenance=Provenance(places), **more)
     (line,) = score(PUBLISHED, [evidence]).lines
     return line
@@ -197,6 +197,6 @@ def test_only_what_differs_in_nothing_else_is_a_draw() -> None:
 
 
 def test_one_altered_draw_alters_the_line() -> None:
-    places = tuple(Place({SEED: n}, "none", "changed" if n == 5 else "") for n in range(1, 8))
+    places = tuple(SweepPoint({SEED: n}, "none", "changed" if n == 5 else "") for n in range(1, 8))
     evidence = Evidence("t", ("1",), SEVEN, provenance=Provenance(places))
     assert [line.status for line in score(PUBLISHED, [evidence]).lines] == ["altered"]

@@ -10,7 +10,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.published.evidence import Evidence
-from campaign.published.provenance import OF_A_TRUTH, Place, Provenance
+from campaign.published.provenance import OF_A_TRUTH, Provenance, SweepPoint
 from campaign.published.scoreboard import COLUMNS, Line, Scoreboard, score, to_csv
 from campaign.published.values import read_published
 from campaign.reason import Reason
@@ -54,7 +54,7 @@ rise_time = [40]
 )
 SHAKEN = {"acceleration": math.radians(18), "compensation": "none", "frequency": 0.5}
 ERROR = Finding("error", 0.55e-3, "rad", SHAKEN)
-ALTERED = Provenance((Place({}, "none", "somebody changed it"),))
+ALTERED = Provenance((SweepPoint({}, "none", "somebody changed it"),))
 
 
 def board(*findings: Finding, **more: object) -> Scoreboard:
@@ -287,7 +287,7 @@ def test_an_altered_bench_is_told_with_the_reason() -> None:
 
 def test_a_reason_that_several_tests_share_is_told_once() -> None:
     """And nobody is advised to describe a bench anew which was not simulated."""
-    truth = Provenance((Place({}, "none", OF_A_TRUTH),))
+    truth = Provenance((SweepPoint({}, "none", OF_A_TRUTH),))
     claim = Finding("rise_time", 0.03, "s", {})
     evidence = [
         Evidence("first", ("1.1",), [ERROR], provenance=truth),

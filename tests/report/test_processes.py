@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.access.analysis import Found, analyse_run
+from campaign.access.analysis import TestAnalysis, analyse_run
 from campaign.archive import open_run
 from campaign.archive.reading import run_reader
 from campaign.experiments import experiments
@@ -112,7 +112,7 @@ def test_what_is_found_is_waited_for_when_it_is_asked_for(
         found = two.found
         assert len(begun) == 2
         for each in begun:
-            each.set_result(Found(Result(), (), "", ()))
+            each.set_result(TestAnalysis(Result(), (), "", ()))
         assert set(found) == {"calm", "steps"}
 
 
@@ -120,12 +120,12 @@ def test_a_test_that_is_found_is_gone_on_with_before_the_last_is(archive: Path) 
     run = open_run(archive)
     asked: list[str] = []
 
-    class Awaited(Mapping[str, Found]):
+    class Awaited(Mapping[str, TestAnalysis]):
         """As of processes: it has a length when all of them are ready."""
 
-        def __getitem__(self, name: str) -> Found:
+        def __getitem__(self, name: str) -> TestAnalysis:
             asked.append(name)
-            return Found(Result(), (), "", ())
+            return TestAnalysis(Result(), (), "", ())
 
         def __iter__(self) -> Iterator[str]:
             raise AssertionError("all are waited for")
@@ -202,7 +202,7 @@ def test_processes_are_begun_before_what_makes_a_page_is_imported() -> None:
 STRANDED = """
 import multiprocessing, os, signal, sys, time
 from pathlib import Path
-from campaign.access.analysis import Found
+from campaign.access.analysis import TestAnalysis
 from campaign.archive import open_run
 from campaign.report.processes import _pool
 

@@ -60,7 +60,7 @@ def plain(channel: str, value: float) -> str:
 
 
 @dataclass(frozen=True)
-class Found:
+class RecordingProblem:
     """What is wrong with a recording: its name, and what was seen."""
 
     name: str
@@ -70,24 +70,26 @@ class Found:
         return f"{self.name}: {self.text}"
 
 
-def wrong_length(task: Task, samples: int, stopped: bool) -> Found | None:
+def wrong_length(task: Task, samples: int, stopped: bool) -> RecordingProblem | None:
     """A recording that ends too soon; `stopped`: at the rate that ends its trial."""
     wanted = task.duration * task.sample_rate
     if stopped or samples >= wanted - 1:
         return None
     had = samples / task.sample_rate
     share = f"{samples / wanted:.0%} of it"
-    return Found(
+    return RecordingProblem(
         "too short", f"it lasts {had:.6g} s and was asked to last {task.duration:.6g} s ({share})"
     )
 
 
-def wrong_start(task: Task, angle: Array, within: float, told: Told = plain) -> Found | None:
+def wrong_start(
+    task: Task, angle: Array, within: float, told: Told = plain
+) -> RecordingProblem | None:
     """A trial that began elsewhere: `angle` (n,) as recorded, `within` what it may be off by."""
     off = float(angle[0]) - task.start_angle
     if abs(off) <= within:
         return None
-    return Found(
+    return RecordingProblem(
         "another place",
         f"{RELATIVE_ANGLE} begins at {told(RELATIVE_ANGLE, float(angle[0]))} instead of "
         f"{told(RELATIVE_ANGLE, task.start_angle)}; 'offset' of its column is for an encoder that "
@@ -97,7 +99,7 @@ def wrong_start(task: Task, angle: Array, within: float, told: Told = plain) -> 
 
 def wrong_command(
     got: Array, asked: Array, rate: float, others: Mapping[str, Array], told: Told = plain
-) -> Found | None:
+) -> RecordingProblem | None:
     """Why a recorded command is not the one that was asked; both (n,), at `rate` (Hz).
 
     `others`: what was asked of other trials, by name.
@@ -108,30 +110,30 @@ def wrong_command(
         largest = max((float(np.max(np.abs(o))) for o in others.values()), default=0.0)
         if worst <= TOLERANCE * largest or worst == 0.0:
             return None
-        return Found(
+        return RecordingProblem(
             "another command", f"nothing was to be commanded, and {told(COMMAND, worst)} was"
         )
     if _off(got, asked) <= TOLERANCE:
         return None
     if _rms(got) <= TOLERANCE * size:
-        return Found("no command", "nothing was commanded in all of the recording")
+        return RecordingProblem("no command", "nothing was commanded in all of the recording")
     if _off(-got, asked) <= TOLERANCE:  # before its delay: out and back is back and out, later
-        return Found("wrong sign", "the command is the negative of what was asked")
+        return RecordingProblem("wrong sign", "the command is the negative of what was asked")
     lag = _lag(asked, got)
     if abs(lag) > HELD and _off(got, asked, lag, lag) <= TOLERANCE:
         word = "late" if lag > 0 else "early"
         shift = f"the command is {word} by {abs(lag) / rate:.4g} s ({abs(lag)} samples)"
-        return Found(word, f"{shift}; the recording begins with the excitation")
+        return RecordingProblem(word, f"{shift}; the recording begins with the excitation")
     for name, other in others.items():
         if len(other) == len(asked) and _off(got, other) <= TOLERANCE < _off(asked, other):
-            return Found("another trial", f"the command is that of {name}")
+            return RecordingProblem("another trial", f"the command is that of {name}")
     scale = float(got @ asked / (asked @ asked))
     if scale != 0.0 and _off(got / scale, asked) <= TOLERANCE:
         what = "wrong sign and scale" if scale < 0 else "wrong scale"
-        return Found(what, f"the command is {_factor(scale)} times what was asked")
+        return RecordingProblem(what, f"the command is {_factor(scale)} times what was asked")
     off = np.abs(got - asked)
     first = int(np.argmax(off > 10 * TOLERANCE * size)) or int(np.argmax(off))
-    return Found(
+    return RecordingProblem(
         "another command",
         f"the command is {told(COMMAND, float(got[first]))} instead of "
         f"{told(COMMAND, float(asked[first]))} at {first / rate:.4g} s, "
@@ -144,7 +146,7 @@ def late_by(got: Array, asked: Array) -> int:
     return min(range(-HELD, HELD + 1), key=lambda lag: (_off(got, asked, lag, lag), abs(lag)))
 
 
-def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> Found | None:
+def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> RecordingProblem | None:
     """What moves against what was asked, or is far larger or smaller. `series` by channel, (n,)."""
     still = task.base_acceleration.shape == "zero"
     for name in _following(task, still=still):
@@ -154,12 +156,12 @@ def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> Found
         angle = series[RELATIVE_ANGLE] - series[RELATIVE_ANGLE][0]
         turned = np.cumsum(series[RELATIVE_RATE]) / task.sample_rate
         if _correlation(angle, turned) < AGAINST and _rms(turned) > 0.1 * _rms(angle):
-            return Found("wrong sign", f"{RELATIVE_ANGLE} runs against {RELATIVE_RATE}")
+            return RecordingProblem("wrong sign", f"{RELATIVE_ANGLE} runs against {RELATIVE_RATE}")
     if still and RELATIVE_RATE in series:
         for name in TORQUES[:2]:
             if name in series and _brakes(series[name], series[RELATIVE_RATE]):
                 told = f"{name} brakes in both directions what it is to move"
-                return Found("wrong sign", told)
+                return RecordingProblem("wrong sign", told)
     return None
 
 
@@ -169,7 +171,7 @@ def clipped(
     asked: Array,
     limits: Mapping[str, float],
     told: Told = plain,
-) -> Found | None:
+) -> RecordingProblem | None:
     """A torque or current that stays at one extreme value while it would have gone on.
 
     Told from one that is steady by how it gets there, as steeply as before and then not at all; or
@@ -192,7 +194,7 @@ def clipped(
             stays = (
                 f"{name} stays at {told(name, float(level))} for {count} of {len(values)} samples"
             )
-            return Found("clipped", f"{stays}, while the trial goes on")
+            return RecordingProblem("clipped", f"{stays}, while the trial goes on")
     return None
 
 
@@ -209,15 +211,19 @@ def _following(task: Task, *, still: bool) -> tuple[str, ...]:
     return RATES if still else (GYRO_RATE,)
 
 
-def _against_command(name: str, got: Array, asked: Array) -> Found | None:
+def _against_command(name: str, got: Array, asked: Array) -> RecordingProblem | None:
     if _rms(asked) == 0.0 or _rms(got) == 0.0:
         return None
     alike = _correlation(got, asked)
     if alike < AGAINST:
-        return Found("wrong sign", f"{name} runs against the command (correlation {alike:.2f})")
+        return RecordingProblem(
+            "wrong sign", f"{name} runs against the command (correlation {alike:.2f})"
+        )
     scale = float(got @ asked / (asked @ asked))
     if alike > ALIKE and not 1 / LOUDER <= scale <= LOUDER:
-        return Found("wrong scale", f"{name} is {_factor(scale)} times what was commanded")
+        return RecordingProblem(
+            "wrong scale", f"{name} is {_factor(scale)} times what was commanded"
+        )
     return None
 
 

@@ -47,7 +47,7 @@ class Refused(Exception):  # noqa: N818 - of a recording, not of this program
         recording: what there is of it, None when it cannot be read.
     """
 
-    def __init__(self, found: checks.Found, recording: Returned | None = None) -> None:
+    def __init__(self, found: checks.RecordingProblem, recording: Returned | None = None) -> None:
         self.found = found
         self.recording = recording
         super().__init__(str(found))
@@ -73,9 +73,11 @@ def as_asked(
         if not np.isfinite(values).all():
             first = int(np.argmax(~np.isfinite(recording[name]) & good))
             told = f"{name} has no value at {recording.time[first]:.6g} s"
-            raise Refused(checks.Found("undefined", told), recording)
+            raise Refused(checks.RecordingProblem("undefined", told), recording)
     if not good.any():
-        raise Refused(checks.Found("undefined", "all of its samples are missing"), recording)
+        raise Refused(
+            checks.RecordingProblem("undefined", "all of its samples are missing"), recording
+        )
     asked = asked[good]
     found, limits, words = None, _limits(trial), partial(shown, trial)
     if limits is not None and RELATIVE_ANGLE in series:

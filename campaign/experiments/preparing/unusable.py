@@ -16,7 +16,7 @@ from campaign.entry_points import one_line
 from campaign.estimate import Estimate
 from campaign.reason import Cause, Reason
 from campaign.recording import Ending, Outcome, Recording
-from campaign.result import Doubt
+from campaign.result import RecordingDoubt
 from campaign.signals import Zero
 from campaign.trial import Role, Trial
 
@@ -47,7 +47,7 @@ NEVER_CHANGED = Cause("never changed", "{channels} never changed")
 NOT_MEASURED = Cause("not measured", "{error}")
 
 
-def doubt(data: Finished) -> Doubt | None:
+def doubt(data: Finished) -> RecordingDoubt | None:
     """What is wrong with the recording of a completed measurement.
 
     Nothing where it was measured when the trial ended, as its samples are not read again then, nor
@@ -63,7 +63,7 @@ def doubt(data: Finished) -> Doubt | None:
     return _doubt(data.recording(), trial)
 
 
-def _doubt(recording: Recording, trial: Trial) -> Doubt | None:
+def _doubt(recording: Recording, trial: Trial) -> RecordingDoubt | None:
     if len(recording.time) < FEWEST:
         return doubted(trial, TOO_SHORT(samples=len(recording.time)))
     samples = {name: recording[name] for name in trial.requires}
@@ -81,20 +81,20 @@ def _doubt(recording: Recording, trial: Trial) -> Doubt | None:
     )
 
 
-def not_measured(trial: Trial, error: BaseException) -> Doubt:
+def not_measured(trial: Trial, error: BaseException) -> RecordingDoubt:
     """That the analysis of one trial failed; a ValueError has a message for the user."""
     told = str(error) if isinstance(error, ValueError) else ""
     return doubted(trial, NOT_MEASURED(error=told.partition("\n")[0][:300] or one_line(error)))
 
 
-def doubted(trial: Trial, reason: Reason, *, fatal: bool = True) -> Doubt:
+def doubted(trial: Trial, reason: Reason, *, fatal: bool = True) -> RecordingDoubt:
     """A doubt of the recording of a trial."""
-    return Doubt(trial.number, trial.label, reason, fatal)
+    return RecordingDoubt(trial.number, trial.label, reason, fatal)
 
 
-def notes_on(doubts: Iterable[Doubt], trials: int) -> tuple[str, ...]:
+def notes_on(doubts: Iterable[RecordingDoubt], trials: int) -> tuple[str, ...]:
     """A sentence for each thing that was wrong, with those of all `trials` it was wrong with."""
-    groups: dict[tuple[Reason, bool], list[Doubt]] = {}
+    groups: dict[tuple[Reason, bool], list[RecordingDoubt]] = {}
     for each in doubts:
         groups.setdefault((each.reason, each.fatal), []).append(each)
     return tuple(
@@ -104,7 +104,7 @@ def notes_on(doubts: Iterable[Doubt], trials: int) -> tuple[str, ...]:
     )
 
 
-def _listed(group: Sequence[Doubt]) -> str:
+def _listed(group: Sequence[RecordingDoubt]) -> str:
     told = f"{group[0].label} (trial {group[0].number})"
     more = len(group) - 1
     return f"{told} and {more} more trial{'s' if more > 1 else ''}" if more else told

@@ -76,7 +76,7 @@ def with_model(bench: Bench, name: str) -> Tree:
 
 
 @dataclass(frozen=True)
-class Place:
+class ConditionGroup:
     """Trials that differ only in what their experiment varies itself.
 
     Attributes:
@@ -131,7 +131,7 @@ def combined(
     return Metrics({name: together([found[name] for found in each]) for name in names})
 
 
-def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[Place, ...]:
+def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[ConditionGroup, ...]:
     """Trials by model and sweep, in plan order; `own` is what the experiment varies itself."""
     found = []
     for group in grouped(trials, own).values():
@@ -144,5 +144,5 @@ def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[Place, ...]
             model_label(str(value)) if path == "model" else f"{path} = {value}"
             for path, value in point.items()
         ]
-        found.append(Place(point, ", ".join(words), group))
+        found.append(ConditionGroup(point, ", ".join(words), group))
     return tuple(found)

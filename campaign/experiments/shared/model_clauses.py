@@ -14,7 +14,7 @@ from campaign.experiments.shared.conclusion_parts import (
     listed,
     setting,
 )
-from campaign.experiments.shared.friction_models import Place, model_label
+from campaign.experiments.shared.friction_models import ConditionGroup, model_label
 from campaign.result import Amount, Cell
 
 Rows = Sequence[Mapping[str, Cell]]
@@ -26,7 +26,7 @@ MOST = 4
 
 def each_model(
     rows: Rows,
-    places: Sequence[Place],
+    places: Sequence[ConditionGroup],
     settings: Settings,
     tell: Callable[[list[Mapping[str, Cell]]], Parts],
 ) -> Parts:
@@ -81,7 +81,7 @@ def at_ends(
     return listed(told)
 
 
-def _name(place: Place, settings: Settings) -> Parts:
+def _name(place: ConditionGroup, settings: Settings) -> Parts:
     """`LuGre model: `; empty for the bench's own friction."""
     point = dict(place.point)
     model = point.pop("model", None)

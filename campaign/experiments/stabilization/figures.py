@@ -45,7 +45,7 @@ NUMBERS: Mapping[tuple[float, float], Mapping[str, tuple[str, ...]]] = {
 
 
 @dataclass(frozen=True)
-class Place:
+class Condition:
     """One condition of the sweep: a trial of each method, and where that is.
 
     Attributes:
@@ -98,7 +98,7 @@ def _places(
     rows: Sequence[Mapping[str, Cell]],
     paths: Sequence[str],
     options: type[Options],
-) -> list[Place]:
+) -> list[Condition]:
     """The conditions of the sweep, with every method that was tried there."""
     trials: dict[str, dict[str, TrialData]] = {}
     errors: dict[str, dict[str, Estimate]] = {}
@@ -110,7 +110,7 @@ def _places(
             errors.setdefault(key, {}).setdefault(method, error)
     alone = {COMPENSATION, "frequency", "acceleration"} >= set(paths)
     return [
-        Place(
+        Condition(
             each,
             errors.get(key, {}),
             _condition_words(next(iter(each.values())), options, len(trials)),
@@ -141,7 +141,7 @@ def _numbers(item: TrialData) -> Mapping[str, tuple[str, ...]]:
     return {}
 
 
-def _telling_place(places: Sequence[Place]) -> Place:
+def _telling_place(places: Sequence[Condition]) -> Condition:
     """Of the conditions with most methods the one that the thesis draws, else of largest error."""
     most = max(len(place.trials) for place in places)
     whole = [place for place in places if len(place.trials) == most]
@@ -156,7 +156,7 @@ def _cut(data: TrialData) -> Recording:
     return Recording(cut.time - window.start, cut.channels, cut.events, cut.ending)
 
 
-def _rate_figure(place: Place) -> Iterator[Figure]:
+def _rate_figure(place: Condition) -> Iterator[Figure]:
     cuts = {name: _cut(item) for name, item in place.trials.items()}
     if not all(can_be_shown(cut) for cut in cuts.values()):
         return
@@ -178,7 +178,7 @@ def _rate_figure(place: Place) -> Iterator[Figure]:
     )
 
 
-def _error_figure(place: Place) -> Figure:
+def _error_figure(place: Condition) -> Figure:
     panels, turned, largest = [], False, 0.0
     for name, item in place.trials.items():
         measured, window = measured_part(item), whole_cycles_shown(item.trial)
@@ -271,7 +271,7 @@ def _chatter_words(windows: Sequence[float]) -> str:
     )
 
 
-def _torque_figure(place: Place) -> Iterator[Figure]:
+def _torque_figure(place: Condition) -> Iterator[Figure]:
     """A panel for each method: what it adds, and the friction that acted in the same trial.
 
     All have one scale.

@@ -19,7 +19,7 @@ from campaign.estimation.frequency.distortion import (
 )
 from campaign.estimation.frequency_response import Array
 from campaign.estimation.intervals import LEVEL
-from campaign.identify.frequency.frequency_fit import Found
+from campaign.identify.frequency.frequency_fit import FrequencyFit
 from campaign.identify.frequency.tables import NAME, SENSOR
 from campaign.reason import Cause
 from campaign.result import Column, Table
@@ -30,7 +30,7 @@ NOT_FROM_ZERO = Cause("not told from zero", "not told from zero")
 ONE_REALISATION = Cause("distortion not shown", "a single realisation does not show it")
 
 
-def distortion_tables(found: Sequence[Found]) -> Iterator[Table]:
+def distortion_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
     """Of the whole band, and of each line; nothing where no repeated multisine shows any."""
     rows: list[dict[str, Any]] = []
     lines: list[dict[str, Any]] = []

@@ -11,7 +11,7 @@ from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Level
 from campaign.estimation.frequency.measured import MeasuredResponse
 from campaign.estimation.frequency_response import Array, ComplexArray
-from campaign.identify.frequency.frequency_fit import Found, Masses
+from campaign.identify.frequency.frequency_fit import FrequencyFit, Masses
 from campaign.identify.frequency.tables import drive_name
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
@@ -23,7 +23,7 @@ FINE = 800
 TORQUE = "Gain, dB of 1 rad/s per N·m"
 
 
-def figures(found: Sequence[Found], masses: Masses) -> Iterator[Figure]:
+def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
     """All of them, the most telling first."""
     for number, each in enumerate(found, start=1):
         for side, measured in each.source.responses.items():
@@ -39,7 +39,7 @@ def figures(found: Sequence[Found], masses: Masses) -> Iterator[Figure]:
 
 
 def _bode_of(
-    key: str, each: Found, side: str, measured: MeasuredResponse, masses: Masses
+    key: str, each: FrequencyFit, side: str, measured: MeasuredResponse, masses: Masses
 ) -> Figure:
     lines: list[tuple[str, Array, ComplexArray]] = []
     fit = each.fits.get(side)  # type: ignore[call-overload]
@@ -122,7 +122,7 @@ def _left(measured: MeasuredResponse, model: ComplexArray) -> Panel:
     )
 
 
-def _loop(key: str, each: Found, loop: MeasuredResponse) -> Figure:
+def _loop(key: str, each: FrequencyFit, loop: MeasuredResponse) -> Figure:
     lines = []
     if each.loop_fit is not None and not each.loop_fit.fit.misfit:
         fit = each.loop_fit.fit
@@ -143,7 +143,7 @@ def _loop(key: str, each: Found, loop: MeasuredResponse) -> Figure:
     )
 
 
-def _distortion(key: str, each: Found, side: str, best: BestLinear) -> Figure:
+def _distortion(key: str, each: FrequencyFit, side: str, best: BestLinear) -> Figure:
     distortion = best.distortion
     if distortion is None:
         raise ValueError("there is no distortion to draw")

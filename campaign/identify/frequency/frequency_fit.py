@@ -60,7 +60,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Found:
+class FrequencyFit:
     """What one source comes to.
 
     Attributes:
@@ -109,7 +109,7 @@ class Masses:
         return self.axis is not self.drive
 
 
-def found_in(source: Source, band: Band) -> Found:
+def found_in(source: Source, band: Band) -> FrequencyFit:
     """Fits, modes and margins of one source."""
     fits: dict[Side, Chosen] = {}
     remarks: list[str] = []
@@ -141,7 +141,7 @@ def found_in(source: Source, band: Band) -> Found:
         margins, loop_fit, why = _margins(source.loop, source.every, band)
         if why:
             remarks.append(f"{source.name}: {why}.")
-    return Found(source, fits, modes, local, margins, loop_fit, tuple(remarks))
+    return FrequencyFit(source, fits, modes, local, margins, loop_fit, tuple(remarks))
 
 
 def too_few(source: Source) -> Reason:
@@ -180,7 +180,7 @@ def _margins(
         return None, None, f"no margins: {error}"
 
 
-def best_source(found: Sequence[Found]) -> Found | None:
+def best_source(found: Sequence[FrequencyFit]) -> FrequencyFit | None:
     """From which parameters are told: one that fits, multisines before sines before the rest.
 
     Of several multisines the strongest: the share of friction in it is the least.
@@ -190,7 +190,7 @@ def best_source(found: Sequence[Found]) -> Found | None:
         return None
     ranks = {"multisine": 0, "sines": 1, "records": 2}
 
-    def rank(each: Found) -> tuple[bool, int, int, float]:
+    def rank(each: FrequencyFit) -> tuple[bool, int, int, float]:
         misfit = all(fit.fit.misfit for fit in each.fits.values())
         return misfit, -len(each.fits), ranks[each.source.kind], -each.source.rms
 
@@ -198,12 +198,12 @@ def best_source(found: Sequence[Found]) -> Found | None:
 
 
 def masses(
-    found: Found | None,
+    found: FrequencyFit | None,
     bench: Bench,
     place: str,
     band: Band,
     torque: float | None,
-    others: Sequence[Found] = (),
+    others: Sequence[FrequencyFit] = (),
 ) -> Masses:
     """The two-mass drive of the best source.
 

@@ -10,14 +10,14 @@ from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.one_inertia import METHOD as RIGID_METHOD
 from campaign.estimation.frequency.orders import order_of
 from campaign.estimation.frequency.two_mass import METHOD
-from campaign.identify.frequency.frequency_fit import Found, Masses
+from campaign.identify.frequency.frequency_fit import FrequencyFit, Masses
 from campaign.result import Column, Table
 
 NAME = Column("source", "Response", exact=True)
 SENSOR = Column("side", "Sensor", exact=True)
 
 
-def sources_table(found: Sequence[Found]) -> Table:
+def sources_table(found: Sequence[FrequencyFit]) -> Table:
     """What each response was measured with: a best linear approximation belongs to that."""
     rows: list[dict[str, Any]] = [
         {
@@ -42,7 +42,7 @@ def sources_table(found: Sequence[Found]) -> Table:
     )
 
 
-def fits_table(found: Sequence[Found], masses: Masses) -> Table:
+def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
     """The function chosen for each response, and the two masses beside it."""
     rows: list[dict[str, Any]] = []
     for each in found:
@@ -100,7 +100,7 @@ def fits_table(found: Sequence[Found], masses: Masses) -> Table:
     )
 
 
-def modes_table(found: Sequence[Found]) -> Table | None:
+def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
     """Resonances and antiresonances."""
     rows: list[dict[str, Any]] = [
         {
@@ -145,7 +145,7 @@ def modes_table(found: Sequence[Found]) -> Table | None:
     )
 
 
-def margins_table(found: Sequence[Found]) -> Table | None:
+def margins_table(found: Sequence[FrequencyFit]) -> Table | None:
     """Bandwidth and margins of each loop."""
     rows: list[dict[str, Any]] = [
         {

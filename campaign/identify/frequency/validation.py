@@ -19,7 +19,7 @@ from campaign.estimation.frequency.output_error import (
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array, ComplexArray
-from campaign.identify.frequency.frequency_fit import Band, Found, Masses
+from campaign.identify.frequency.frequency_fit import Band, FrequencyFit, Masses
 from campaign.identify.frequency.signals import Signals, signals, whole_stretches
 from campaign.identify.frequency.sources import Reading, Source, fitted_part, sources
 from campaign.identify.frequency.tables import drive_name
@@ -90,7 +90,7 @@ class Validation:
     remarks: tuple[str, ...] = ()
 
 
-def models(found: Sequence[Found], told: Masses, band: Band) -> Iterator[Model]:
+def models(found: Sequence[FrequencyFit], told: Masses, band: Band) -> Iterator[Model]:
     """All that were fitted, those of the two masses after the functions of their source."""
     for each in found:
         for side, chosen in each.fits.items():

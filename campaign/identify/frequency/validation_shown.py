@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.estimation.frequency.measured import MeasuredResponse
 from campaign.identify.frequency.figures import FREQUENCY, TORQUE, decibel, panels
-from campaign.identify.frequency.frequency_fit import Found
+from campaign.identify.frequency.frequency_fit import FrequencyFit
 from campaign.identify.frequency.tables import NAME, SENSOR
 from campaign.identify.frequency.validation import Model, Prediction, Validation, apart
 from campaign.reason import Cause
@@ -227,7 +227,7 @@ def _over_time(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fi
     )
 
 
-def residual_figures(found: Sequence[Found], fits: Sequence[Model]) -> Iterator[Figure]:
+def residual_figures(found: Sequence[FrequencyFit], fits: Sequence[Model]) -> Iterator[Figure]:
     """What fits leave of the response they were fitted to, over frequency and from line to line."""
     for number, each in enumerate(found, start=1):
         for side in each.source.responses:
@@ -236,7 +236,7 @@ def residual_figures(found: Sequence[Found], fits: Sequence[Model]) -> Iterator[
                 yield _residuals(f"residuals-{number}-{side}", each, side, own)
 
 
-def _residuals(key: str, each: Found, side: str, own: Sequence[Model]) -> Figure:
+def _residuals(key: str, each: FrequencyFit, side: str, own: Sequence[Model]) -> Figure:
     real, imaginary, alike = [], [], []
     widest = 0.0
     for model in own:

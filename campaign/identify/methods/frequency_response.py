@@ -26,7 +26,7 @@ from campaign.identify.frequency.distortion_tables import distortion_tables
 from campaign.identify.frequency.figures import figures
 from campaign.identify.frequency.frequency_fit import (
     Band,
-    Found,
+    FrequencyFit,
     Masses,
     best_source,
     found_in,
@@ -190,7 +190,7 @@ def _torque_uncertainty(bench: Bench) -> float | None:
     return known / bench.motor.torque_constant
 
 
-def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
+def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
     hangs_on_load = dict(told.places) == {"load": "motor"}
     if told.drive is None or told.drive.misfit:
         few = too_few(best.source)
@@ -212,7 +212,7 @@ def _parameters(told: Masses, best: Found) -> Iterator[Parameter]:
         yield Parameter(passed[name], meaning, unit, key, AMPLITUDES if told.bent else advice)
 
 
-def _local(told: Masses, best: Found) -> dict[str, Estimate]:
+def _local(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
     """Numbers of a mode where no model of the whole drive fits, by name: extrema, of too few
     realisations, and else a mode on top of a smooth response.
 
@@ -232,13 +232,13 @@ def _local(told: Masses, best: Found) -> dict[str, Estimate]:
     return {name: replace(each, name=name) for name, each in found.items()}
 
 
-def _local_of_axis(told: Masses, best: Found) -> dict[str, Estimate]:
+def _local_of_axis(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
     """The same, with friction's part, which extrema have."""
     odd = 0.0 if too_few(best.source) else odd_distortion(best.source)
     return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
 
 
-def _findings(found: Sequence[Found], parameters: Sequence[Parameter]) -> Iterator[Finding]:
+def _findings(found: Sequence[FrequencyFit], parameters: Sequence[Parameter]) -> Iterator[Finding]:
     for each in parameters:
         yield Finding.of(each.estimate, {})
     for one in found:
@@ -248,7 +248,7 @@ def _findings(found: Sequence[Found], parameters: Sequence[Parameter]) -> Iterat
                 yield Finding.of(getattr(one.margins, margin), conditions)
 
 
-def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iterator[str]:
+def _notes(found: Sequence[FrequencyFit], told: Masses, remarks: Sequence[str]) -> Iterator[str]:
     yield from remarks
     for each in found:
         yield from each.source.remarks
@@ -280,7 +280,7 @@ def _notes(found: Sequence[Found], told: Masses, remarks: Sequence[str]) -> Iter
     )
 
 
-def _early(found: Sequence[Found]) -> Iterator[str]:
+def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
     """Of rates that answer before their torque, which no drive does."""
     for each in found:
         for side, chosen in each.fits.items():
@@ -297,7 +297,7 @@ def _early(found: Sequence[Found]) -> Iterator[str]:
             )
 
 
-def _conclusions(best: Found, told: Masses) -> Iterator[Conclusion]:
+def _conclusions(best: FrequencyFit, told: Masses) -> Iterator[Conclusion]:
     drive = told.drive if told.bent else told.axis
     local = {name: admitted(each) for name, each in _local_of_axis(told, best).items()}
     stands_out = [name for name, each in local.items() if each.origin is Origin.MEASURED]

@@ -24,7 +24,7 @@ from campaign.experiments.preparing.unusable import not_measured, notes_on
 from campaign.identify.method import Identified, Material, Method, Parameter
 from campaign.options import Options
 from campaign.reason import Cause
-from campaign.result import Amount, Cell, Column, Conclusion, Doubt, Finding, Result, Table
+from campaign.result import Amount, Cell, Column, Conclusion, Finding, RecordingDoubt, Result, Table
 
 BREAKAWAY = "breakaway_torque"
 STRONGEST = "strongest_stiffness"
@@ -59,7 +59,7 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
 def _identify(material: Material, options: RampsOptions) -> Identified:
     found: dict[str, list[Estimate]] = {name: [] for name in OF_A_RAMP}
     shares: list[float] = []
-    doubts: list[Doubt] = []
+    doubts: list[RecordingDoubt] = []
     rows: list[dict[str, Cell]] = []
     for trial in material.trials:
         try:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from campaign.access.analysis import (
     AnalysedTest,
-    Found,
+    TestAnalysis,
     analyse_run,
     published_of,
     source_of,
@@ -113,7 +113,7 @@ def document_of(
     experiments: Mapping[str, Experiment],
     *,
     measure_anew: bool = False,
-    found: Mapping[str, Found] | None = None,
+    found: Mapping[str, TestAnalysis] | None = None,
     shown: Collection[int] = (),
 ) -> Document:
     """Analyse a run and say what there is to say of it.
