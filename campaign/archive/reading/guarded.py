@@ -23,14 +23,13 @@ from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
 from numpy.typing import NDArray
 
 from campaign.archive.layout.files import why
-from campaign.archive.layout.storage import CHECKSUM, LARGEST_CHUNK, SAMPLE
+from campaign.archive.layout.storage import CHECKSUM, SAMPLE
 from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
 
 Array = NDArray[np.float64]
 
 _ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
-_MOST_EXPANSION = 1100  # deflate cannot shrink anything by more than 1032
 _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 _TEXT = h5py.string_dtype()
 
@@ -190,25 +189,6 @@ def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
     else:
         _check(dataset.id, str(int(value)).encode(), digest)
     return int(value)
-
-
-def read_whole(parent: h5py.Group, name: str) -> Array:
-    """A series that has no checksum of its own: whoever asks has checked the file. Shape (n,)."""
-    dataset, plan = _dataset_id(parent, name)
-    shape = dataset.shape
-    chunks = plan.get_chunk() if plan.get_layout() == h5d.CHUNKED else None
-    if len(shape) != 1 or dataset.dtype != SAMPLE or chunks is None:
-        raise ArchiveError(f"{_place(parent, name)}: is not a chunked series of float64")
-    if not 0 < chunks[0] <= LARGEST_CHUNK:
-        raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunks[0]} samples")
-    stored = dataset.get_storage_size()
-    if shape[0] * SAMPLE.itemsize > stored * _MOST_EXPANSION:
-        what = f"states {shape[0]} samples but stores {stored} bytes"
-        raise ArchiveError(f"{_place(parent, name)}: {what}")
-    values = np.empty(shape, dtype=SAMPLE)
-    if len(values):
-        dataset.read(h5s.ALL, h5s.ALL, values)
-    return values.astype(np.float64, copy=False)
 
 
 def attribute(item: h5py.HLObject, name: str) -> str:

@@ -16,6 +16,7 @@ from campaign.archive.layout.results import ENTRY, FORMAT, HASH, RECORD, RunResu
 from campaign.archive.layout.results_text import from_text
 from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import guarded
+from campaign.archive.reading.series import series_at
 from campaign.errors import ArchiveError
 from campaign.result import Array
 
@@ -96,7 +97,7 @@ def _record(path: Path, entry: h5py.Group) -> RunResults:
             parent = entry
             for group in groups:
                 parent = guarded.inner_group(parent, group)
-            known[where] = guarded.read_whole(parent, name)
+            known[where] = series_at(parent, name)[1].read()
         values = known[where]
         return values[slice(*map(int, cut))].copy() if cut else values.copy()
 

@@ -43,11 +43,12 @@ class Series:
     packed: Callable[[int], bytes | None]
     place: Callable[[], str]
 
-    def read(self, digest: str) -> Array:
-        """All samples, shape (length,). Raises ArchiveError unless they have the digest."""
+    def read(self, digest: str | None = None) -> Array:
+        """All samples, shape (length,). Raises ArchiveError unless they have the digest, if any."""
         found = [samples for samples, _ in self._blocks()]
         values = found[0] if len(found) == 1 else np.concatenate(found or [np.empty(0)])
-        self._compare(series_digest(values), digest)
+        if digest is not None:
+            self._compare(series_digest(values), digest)
         return values
 
     def check(self, digest: str) -> int:
@@ -80,8 +81,13 @@ class Series:
 MISMATCH = "does not match its checksum; it was damaged or changed"
 
 
-def series_at(parent: h5py.Group, name: str, length: int) -> tuple[h5d.DatasetID, Series]:
-    """A dataset that `parent` itself holds, and its `length` samples. Raises ArchiveError."""
+def series_at(
+    parent: h5py.Group, name: str, length: int | None = None
+) -> tuple[h5d.DatasetID, Series]:
+    """A dataset that `parent` itself holds, and its samples: `length`, where that is known.
+
+    Raises ArchiveError.
+    """
     found = own_id(parent, name)
     plan = found.get_create_plist() if isinstance(found, h5d.DatasetID) else None
     shape: tuple[int, ...] = found.shape if plan is not None else ()
@@ -96,10 +102,10 @@ def series_at(parent: h5py.Group, name: str, length: int) -> tuple[h5d.DatasetID
         raise ArchiveError(f"{_place(parent, name)}: {_NO_SERIES}")
     if not 0 < chunk <= storage.LARGEST_CHUNK:
         raise ArchiveError(f"{_place(parent, name)}: has chunks of {chunk} samples")
-    if stated != length:
+    if length is not None and stated != length:
         what = f"has {stated} samples, and {length} were recorded"
         raise ArchiveError(f"{_place(parent, name)}: {what}")
-    return found, dataset_series(found, parent, name, length, chunk, filters == _SHUFFLED)
+    return found, dataset_series(found, parent, name, stated, chunk, filters == _SHUFFLED)
 
 
 def dataset_series(
