@@ -18,8 +18,6 @@ from campaign.estimation.difference import BOUNDS, in_unit
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import interval, pretty_unit
 
-JUDGED = (Verdict.DIFFERENT, Verdict.BEYOND_BOUND, Verdict.NOT_SHOWN)
-
 
 def pair_table(
     key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str], note: str = ""

@@ -141,11 +141,6 @@ def wrong_command(
     )
 
 
-def late_by(got: Array, asked: Array) -> int:
-    """Samples, within `HELD`, by which a command fits best."""
-    return min(range(-HELD, HELD + 1), key=lambda lag: (_off(got, asked, lag, lag), abs(lag)))
-
-
 def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> RecordingProblem | None:
     """What moves against what was asked, or is far larger or smaller. `series` by channel, (n,)."""
     still = task.base_acceleration.shape == "zero"

@@ -141,7 +141,7 @@ def best_series(
     Rate and acceleration begin at zero, so that a bench at rest is not jerked.
 
     Args:
-        terms: names of the model's terms (`identification.inverse.terms`).
+        terms: names of the model's terms (`estimation.inverse.terms`).
         middle: angle around which it swings (rad): gravity depends on it.
 
     Raises ValueError for fewer than two harmonics, no room, a term that there is not, and terms

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.estimation.frequency.measured import ALIKE, LEAST_FREEDOM, MeasuredResponse
 from campaign.estimation.frequency_response import Array, ComplexArray
@@ -363,8 +362,3 @@ def judged_fit(residuals: ComplexArray, parameters: int, weights: Weights) -> tu
 def thinned(measured: MeasuredResponse, every: int) -> MeasuredResponse:
     """Every so many points: lines of a window whose neighbours know of each other (Hann: 2)."""
     return measured.at(slice(None, None, max(every, 1)))
-
-
-def in_band(frequency: float, fit: RationalFit) -> NDArray[np.bool_] | bool:
-    """Whether a frequency lies within those that were measured."""
-    return fit.lowest <= frequency <= fit.highest

@@ -20,7 +20,6 @@ from campaign.estimation.trends.scatter import Fits, Mixture, fits
 
 Array = NDArray[np.float64]
 
-LEAST_FOR_A_TREND = 3
 LEAST_FOR_A_JUMP = 5
 """With fewer, no place has a second point on both sides that shows how runs scatter."""
 ON_EACH_SIDE = 2

@@ -1,6 +1,6 @@
 """Inverse dynamics of any motion: inertia and friction by regression of the force.
 
-The force of a motion is a sum of terms (`identification.inverse.terms`); their coefficients follow
+The force of a motion is a sum of terms (`estimation.inverse.terms`); their coefficients follow
 from least squares on filtered rows, with deviations that know of autocorrelation, and are held
 against instruments from a simulated motion. Delay first, then structure.
 """

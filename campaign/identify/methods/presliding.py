@@ -1,7 +1,7 @@
 """Presliding: stiffness and damping of the bristles, and inertia, from motions below breakaway.
 
 The simulation of the whole motion is fitted to all trials at once: of `presliding_multisine`, or
-else of whatever stays below breakaway (`identifying.presliding.small_motions`). What
+else of whatever stays below breakaway (`identify.presliding.small_motions`). What
 is found is the sum over all interfaces, before any of them slips: with one interface that is a
 number of the bench, with several only their sum is known, and no bench file has a place for it.
 """
