@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import zlib
 from pathlib import Path
@@ -10,10 +11,15 @@ import numpy as np
 import pytest
 
 from campaign.archive import ArchivedTrial, RunWriter, open_run
+from campaign.archive.layout.journal import read_journal
 from campaign.archive.reading.folder import read_trial_file
 from campaign.archive.reading.packed import read_packed
+from campaign.archive.writing import trial_writer
 from campaign.archive.writing.packed_file import copy_packed
+from campaign.archive.writing.sealed_file import SealedFile
+from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.errors import ArchiveError
+from campaign.recording import Ending, Outcome
 
 COUNT = 70_000  # two chunks and a part of one, and a preview
 
@@ -88,7 +94,7 @@ def test_a_file_that_was_cut_off_is_refused(path, writer, left):
 @pytest.mark.parametrize("start", [0, 16, 1 << 40, (1 << 64) - 1])
 def test_a_description_that_lies_elsewhere_is_refused(path, writer, start):
     path.write_bytes(path.read_bytes()[:-8] + start.to_bytes(8, "little"))
-    with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial: its end is damaged"):
         read(path, writer)
 
 
@@ -105,12 +111,8 @@ def exchange(told: dict) -> None:
     first["name"], second["name"] = second["name"], first["name"]
 
 
-def elsewhere(told: dict) -> None:
-    told["groups"]["data"][1]["chunks"][0] = [1 << 60, 1 << 60]
-
-
-def everything(told: dict) -> None:
-    told["groups"]["data"][1]["chunks"][0] = [17, 1 << 60]
+def repeat_chunk(told: dict) -> None:
+    told["groups"]["data"][1]["chunks"].append([17, 0])
 
 
 def smaller(told: dict) -> None:
@@ -122,7 +124,7 @@ def plain(told: dict) -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [lose_series, lose_chunk, exchange, elsewhere, everything, smaller, plain]
+    "change", [lose_series, lose_chunk, exchange, repeat_chunk, smaller, plain]
 )
 def test_samples_that_are_not_the_recorded_ones_are_named_and_the_others_are_read(
     path, writer, kit, change
@@ -150,6 +152,11 @@ def test_samples_that_are_not_the_recorded_ones_are_named_and_the_others_are_rea
         lambda told: told["groups"]["data"][0].update(chunk=0),
         lambda told: told["groups"]["data"][0].update(chunk=1 << 30),
         lambda told: told["groups"]["data"][0].update(chunks=[[-1, 4]]),
+        lambda told: told["groups"]["data"][1]["chunks"].append([1 << 60, 1 << 60]),
+        lambda told: told["groups"]["data"][1]["chunks"].append([17, 1 << 60]),
+        lambda told: told["groups"]["data"][1].update(chunks=told["groups"]["data"][0]["chunks"]),
+        lambda told: told["groups"]["data"][1]["chunks"].append([3, 8]),
+        lambda told: told.update(trees=told["trees"].splitlines()[0] + "\n"),
     ],
 )
 def test_a_description_that_is_none_is_refused(path, writer, change):
@@ -158,3 +165,65 @@ def test_a_description_that_is_none_is_refused(path, writer, change):
     put(path, before, told)
     with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
         read(path, writer)
+
+
+def test_trees_that_are_nested_too_deeply_are_refused(path, writer):
+    before, told = parts(path.read_bytes())
+    tree = '{"a":' * 100_000 + "1" + "}" * 100_000
+    told["trees"] += f'{{"sha256":"{hashlib.sha256(tree.encode()).hexdigest()}","tree":{tree}}}\n'
+    put(path, before, told)
+    with pytest.raises(ArchiveError, match="is nested too deeply"):
+        read(path, writer)
+
+
+def test_series_of_one_trial_may_have_chunks_of_different_lengths(tmp_path, kit, writer, path):
+    """No trial file of this program has; sealing reads what the file says."""
+    before, told = parts(path.read_bytes())
+    record = json.loads(told["record"])
+    first = told["groups"]["data"][1]
+    samples = kit.samples(COUNT)[1][0]
+    padded = np.concatenate((samples, np.zeros(-COUNT % 10_000)))
+    first.update(chunk=10_000, shuffled=False, chunks=[])
+    for chunk in padded.reshape(-1, 10_000):
+        packed = zlib.compress(chunk.astype("<f8").tobytes())
+        first["chunks"].append([len(before), len(packed)])
+        before += packed
+    assert record["channels"][0]["name"] == first["name"]
+    put(path, before, told)
+    journal = writer.folder / "journal.jsonl"
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    journal.write_text(journal.read_text().replace(writer._last[1].sha256, digest))
+    sealer = SealedFile(tmp_path / "sealed.part")
+    sealer.copy(writer.folder, read_journal(journal).files[0], "trial_00001")
+    assert sealer._file["trial_00001/data"][first["name"]][:].tobytes() == samples.tobytes()
+    sealer.discard()
+
+
+def test_a_trial_without_one_of_its_series_is_not_sealed(tmp_path, writer, path):
+    before, told = parts(path.read_bytes())
+    lose_series(told)
+    put(path, before, told)
+    finished = writer._last[1].model_copy(
+        update={"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    )
+    sealer = SealedFile(tmp_path / "sealed.part")
+    with pytest.raises(ArchiveError, match=r"trial-00001\.trial"):
+        sealer.copy(writer.folder, finished, "trial_00001")
+    sealer.discard()
+
+
+def test_a_batch_that_cannot_be_published_leaves_no_file(tmp_path, kit, monkeypatch):
+    writer = FolderWriter(tmp_path, {1: 1, 2: 1})
+    for number in (1, 2):
+        recorder = writer.begin(kit.trial(number))
+        recorder.start(kit.CHANNELS)
+        recorder.append(*kit.samples(10))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+
+    def full(files):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(trial_writer, "publish_all", full)
+    with pytest.raises(ArchiveError, match="2 trials are not archived, those before are"):
+        writer.publish()
+    assert list(tmp_path.iterdir()) == []

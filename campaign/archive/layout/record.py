@@ -195,7 +195,10 @@ def parse_trees(text: str) -> dict[str, Tree]:
         # The text of a tree is hashed as it stands: what was written is canonical.
         if match is None or text_digest(match[2]) != match[1]:
             raise ValueError(f"line {number} does not match its digest")
-        trees[match[1]] = json.loads(match[2])
+        try:
+            trees[match[1]] = json.loads(match[2])
+        except RecursionError:
+            raise ValueError(f"line {number} is nested too deeply") from None
     return trees
 
 

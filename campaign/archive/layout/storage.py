@@ -72,6 +72,6 @@ def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
     if len(raw) != size or more or not inflating.eof or inflating.unused_data:
         return None
     if not shuffled:
-        return np.frombuffer(raw, dtype=SAMPLE)
+        return np.frombuffer(bytearray(raw), dtype=SAMPLE)  # writable, as the others
     planes = np.frombuffer(raw, dtype=np.uint8).reshape(SAMPLE.itemsize, count)
     return np.ascontiguousarray(planes.T).view(SAMPLE).reshape(count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from pathlib import Path
 
 from campaign.archive.layout.checksums import text_digest
@@ -13,6 +14,9 @@ from campaign.archive.layout.run_folder import first_line
 from campaign.archive.reading import guarded
 from campaign.archive.reading.series import MISMATCH, layout_of, series_at
 from campaign.errors import ArchiveError
+
+LARGEST_DESCRIPTION = 1 << 26
+"""Bytes of what tells of a trial's samples."""
 
 
 def read_packed(path: Path, entry: str) -> PackedTrial:
@@ -33,14 +37,26 @@ def _read(path: Path) -> PackedTrial:
             raise ArchiveError(f"{path}: is not the file of a trial, or its beginning is damaged")
         file.seek(end)
         start = int.from_bytes(file.read(POINTER), "little")
-        if False:
+        if not len(MAGIC) <= start <= end or end - start > LARGEST_DESCRIPTION:
             raise ArchiveError(f"{path}: its end is damaged")
         file.seek(start)
-        return PackedTrial.model_validate_json(file.read(end - start))
+        trial = PackedTrial.model_validate_json(file.read(end - start))
+    _check_places(path, trial, start)
+    return trial
+
+
+def _check_places(path: Path, trial: PackedTrial, end: int) -> None:
+    """ArchiveError unless every chunk has bytes of its own before `end`."""
+    places = sorted(
+        place for series in trial.groups.values() for each in series for place in each.chunks
+    )
+    for (offset, size), (following, _) in pairwise([*places, (end, 0)]):
+        if offset < len(MAGIC) or offset + size > following:
+            raise ArchiveError(f"{path}: its chunks lie where they cannot")
 
 
 def packed_entry(path: Path, entry: str) -> PackedTrial:
-    """The same of a trial in an HDF5 file. Raises ArchiveError."""
+    """The same of a trial in an HDF5 file: a sealed run, or a file of its own. ArchiveError."""
     with guarded.open_file(path) as file, guarded.guarded(path, f"/{entry}"):
         there = guarded.inner_group(file, entry)
         kept = guarded.inner_group(there, "record")
@@ -71,9 +87,12 @@ def packed_record(
         raise ArchiveError(f"{path}: /{entry}/record/json: {MISMATCH}")
     record = parse_record(path, f"/{entry}/record", packed.record)
     try:
-        return record, parse_trees(packed.trees)
+        trees = parse_trees(packed.trees)
     except ValueError as error:
         raise ArchiveError(f"{path}: /{entry}/record/trees: {error}") from None
+    if not record.tree_names <= trees.keys():
+        raise ArchiveError(f"{path}: /{entry}/record/trees: its bench or its options are missing")
+    return record, trees
 
 
 def parse_record(path: Path, place: str, text: str) -> TrialRecord:

@@ -145,14 +145,13 @@ class MemorySamples(PackedSamples):
     rows: Array = field(kw_only=True, repr=False)
 
     def _time(self) -> Array:
-        time: Array = self.rows[0]
-        return time
+        return np.array(self.rows[0])
 
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
         """From memory."""
         places = {told.name: place for place, told in enumerate(self.record.channels, 1)}
         for told in channels:
-            yield told.info.with_samples(self.rows[places[told.name]])
+            yield told.info.with_samples(self.rows[places[told.name]].copy())
 
 
 class _Named(Protocol):

@@ -124,15 +124,12 @@ def file_series(file: BinaryIO, place: str, length: int, told: PackedSeries) -> 
     """A series of a trial's own file."""
 
     def packed(number: int) -> bytes | None:
-        if number >= len(told.chunks):
-            return None
         offset, size = told.chunks[number]
-        try:
-            file.seek(offset)
-            return file.read(size)
-        except (OSError, OverflowError, MemoryError):
-            return None
+        file.seek(offset)
+        return file.read(size)
 
+    if len(told.chunks) != -(-length // told.chunk):
+        raise ArchiveError(f"{place}: has {len(told.chunks)} chunks of {told.chunk} samples")
     return Series(length, told.chunk, told.shuffled, packed, lambda: place)
 
 

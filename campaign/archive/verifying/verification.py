@@ -193,7 +193,7 @@ class _Check:
         path, name = self.path / finished.file, entry_name(finished.trial)
         known = len(self.problems.found)
         self.unreadable.add(entry)
-        with self.problems.noting():
+        with self.problems.noting(), guarded.guarded(path, f"/{name}"):
             packed = read_packed(path, name)
             record, trees = packed_record(path, name, packed, finished.record)
             self._record(f"{path.name}/{name}", entry, record, trees)

@@ -82,27 +82,25 @@ class _Form:
 
     Attributes:
         signal, others: the channels that viewers plot.
-        length, chunk: samples of a series, and of its chunks.
-        series: the channel, and whether its chunks are shuffled.
+        length: samples of a series.
+        series: the channel, samples of a chunk, and whether chunks are shuffled.
     """
 
     signal: str
     others: tuple[str, ...]
     length: int
-    chunk: int
-    series: tuple[tuple[ChannelInfo, bool], ...]
+    series: tuple[tuple[ChannelInfo, int, bool], ...]
 
     @classmethod
     def of(cls, group: str, record: TrialRecord, series: Sequence[PackedSeries]) -> Self:
         infos = {info.name: info for info in (TIME, *record.series)}
-        told = tuple((infos[each.name], each.shuffled) for each in series)
-        chunk = series[0].chunk
+        told = tuple((infos[each.name], each.chunk, each.shuffled) for each in series)
         if group == "preview" and record.preview is not None:
-            return cls(record.preview.channel, (), record.preview.samples, chunk, told)
+            return cls(record.preview.channel, (), record.preview.samples, told)
         names = [info.name for info in record.series]
         signal = Aim.of_tree(record.trial).channel(names)
         others = tuple(beside(infos[signal], record.series))
-        return cls(signal, others, record.samples or 0, chunk, told)
+        return cls(signal, others, record.samples or 0, told)
 
     def make(self, file: h5py.File, name: str) -> None:
         """Make the group, without samples."""
@@ -112,8 +110,8 @@ class _Form:
             group.attrs["auxiliary_signals"] = self.others
         group.attrs["axes"] = ["time"]
         group.attrs["time_indices"] = np.array([0], dtype="<i4")
-        for info, shuffled in self.series:
-            made = hdf5.create_series(group, info.name, self.length, self.chunk, shuffled)
+        for info, chunk, shuffled in self.series:
+            made = hdf5.create_series(group, info.name, self.length, chunk, shuffled)
             dataset = h5py.Dataset(made)
             hdf5.put_attribute(dataset, "units", info.unit)
             hdf5.put_attribute(dataset, "long_name", info.long_name)

@@ -76,15 +76,15 @@ class SealedFile:
         if packed.not_kept:
             self.not_kept[entry] = packed.not_kept
         else:
-            with path.open("rb") as source:
+            with guarded.guarded(path, f"/{entry}"), path.open("rb") as source:
                 written = self._entries.write(entry, record, packed, source)
-            self._describe(entry, record, trees)
-            for group, series, _, digest in series_of(record):
-                written[group, series][1].check(digest)
-            units = {info.name: info.unit for info in (TIME, *record.series)}
-            self.placed[entry] = {
-                key: (units[key[1]], layout_of(made)) for key, (made, _) in written.items()
-            }
+                self._describe(entry, record, trees)
+                for group, series, _, digest in series_of(record):
+                    written[group, series][1].check(digest)
+                units = {info.name: info.unit for info in (TIME, *record.series)}
+                self.placed[entry] = {
+                    key: (units[key[1]], layout_of(made)) for key, (made, _) in written.items()
+                }
         self._trees |= trees
         self._lines[entry] = packed.record
         self.copied[entry] = finished

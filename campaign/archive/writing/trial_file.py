@@ -51,7 +51,8 @@ class FinishedFile:
 
     Attributes:
         name: the file's real one.
-        archived: the trial as the file has it; a short recording is still in memory.
+        archived: the trial as the file has it, under the file's present name; a short recording is
+            still in memory.
         sha256: of the file.
         record: digest of the trial's record.
     """
@@ -64,7 +65,10 @@ class FinishedFile:
 
 
 class TrialFile:
-    """Takes a trial's samples as they come (a `Recorder`); closed, it is whole and published."""
+    """Takes a trial's samples as they come (a `Recorder`).
+
+    Closed, it is whole, and published at once or with others.
+    """
 
     def __init__(
         self,
@@ -207,15 +211,16 @@ def _publish_now(part: Path, final: Path) -> Path:
     return final
 
 
-def lost_trial(part: Path, error: Exception) -> ArchiveError:
-    """Why a trial could not be written, and what that means for the others."""
+def lost_trial(part: Path, error: Exception, count: int = 1) -> ArchiveError:
+    """Why trials could not be written, the first as `part`, and what that means for the others."""
     if not part.parent.is_dir():
         return ArchiveError(
             f"{part.parent}: is gone: it was moved or removed while the run went on; wherever it "
             "is now, it has the trials that had finished by then"
         )
+    lost = "this trial is" if count == 1 else f"{count} trials are"
     return ArchiveError(
-        f"{part}: cannot be written: {why(error)}; this trial is not archived, those before are"
+        f"{part}: cannot be written: {why(error)}; {lost} not archived, those before are"
     )
 
 

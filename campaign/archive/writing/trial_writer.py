@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -54,7 +55,7 @@ class FolderWriter:
         return TrialWriter.open(self._folder, trial, attempt, note, self._timing, publish=publish)
 
     def publish(self) -> None:
-        """Put the trials on the disk that were finished. Raises ArchiveError: none of them is."""
+        """Put the trials on the disk that were finished. Raises ArchiveError: none counts."""
         from campaign.archive.writing.trial_file import lost_trial
 
         files, self._files = self._files, []
@@ -62,7 +63,10 @@ class FolderWriter:
             with self._timing.span(Work.TRIAL_FILES):
                 publish_all(files)
         except OSError as error:
-            raise lost_trial(files[0][0], error) from None
+            for part, _ in files:
+                with contextlib.suppress(OSError):
+                    part.unlink(missing_ok=True)
+            raise lost_trial(files[0][0], error, count=len(files)) from None
 
     def take_entries(self) -> tuple[Entry, ...]:
         """The journal entries since the last call."""
@@ -141,7 +145,8 @@ class TrialWriter:
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
     ) -> None:
-        """Keep the trial. When this returns, no crash can lose it.
+        """Keep the trial. When this returns, no crash can lose it; of a `FolderWriter`, once that
+        has published it.
 
         Args:
             ending: however it ended: a failed trial is kept too.
@@ -172,7 +177,7 @@ class TrialWriter:
     def measure(self, measure: Measure) -> str:
         """Keep what `measure` finds in the samples of the trial, which is finished.
 
-        What is kept is a line of the journal: the trial's file is on the disk and stays as it is.
+        What is kept is a line of the journal: the trial's file is whole and stays as it is.
 
         Returns:
             Why nothing was measured, in one line; empty when something was, or nobody looked.

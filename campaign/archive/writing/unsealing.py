@@ -128,7 +128,9 @@ def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
 
     def line(entry: Entry, text: str) -> str:
         if isinstance(entry, TrialFinished):
-            return canonical_json(written[entry.file].model_dump(mode="json"))
+            new = written[entry.file]
+            told = {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
+            return canonical_json(entry.model_copy(update=told).model_dump(mode="json"))
         return text
 
     lines = story.text.splitlines()
