@@ -102,6 +102,10 @@ def lose_series(told: dict) -> None:
     del told["groups"]["data"][1]
 
 
+def lose_tree(told: dict) -> None:
+    told["trees"] = told["trees"].splitlines()[0] + "\n"
+
+
 def lose_chunk(told: dict) -> None:
     del told["groups"]["data"][1]["chunks"][1]
 
@@ -156,7 +160,7 @@ def test_samples_that_are_not_the_recorded_ones_are_named_and_the_others_are_rea
         lambda told: told["groups"]["data"][1]["chunks"].append([17, 1 << 60]),
         lambda told: told["groups"]["data"][1].update(chunks=told["groups"]["data"][0]["chunks"]),
         lambda told: told["groups"]["data"][1]["chunks"].append([3, 8]),
-        lambda told: told.update(trees=told["trees"].splitlines()[0] + "\n"),
+        lose_tree,
     ],
 )
 def test_a_description_that_is_none_is_refused(path, writer, change):
@@ -199,9 +203,10 @@ def test_series_of_one_trial_may_have_chunks_of_different_lengths(tmp_path, kit,
     sealer.discard()
 
 
-def test_a_trial_without_one_of_its_series_is_not_sealed(tmp_path, writer, path):
+@pytest.mark.parametrize("change", [lose_series, lose_tree])
+def test_a_trial_without_one_of_its_parts_is_not_sealed(tmp_path, writer, path, change):
     before, told = parts(path.read_bytes())
-    lose_series(told)
+    change(told)
     put(path, before, told)
     finished = writer._last[1].model_copy(
         update={"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
