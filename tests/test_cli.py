@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -15,6 +16,7 @@ from campaign.cli import output
 from campaign.cli.kinds import show_kind
 from campaign.cli.output import PlainConsole, bytes_text, print_line, print_table
 from campaign.cli.prepare import find_protocol
+from campaign.cli.status import Answers
 from campaign.errors import (
     ArchiveError,
     BackendError,
@@ -255,3 +257,11 @@ def test_a_thread_that_never_comes_back_does_not_keep_a_failed_command_from_endi
         [sys.executable, "-c", STUCK], capture_output=True, text=True, timeout=60, check=False
     )
     assert (ended.returncode, ended.stdout) == (3, "said\n"), ended.stderr
+
+
+@pytest.mark.parametrize("missing", ["status", "latch", "holder"])
+def test_a_status_is_whole_once_each_answer_has_come(missing: str) -> None:
+    answers = Answers(*[cast(Any, object())] * 3)
+    assert answers.whole
+    setattr(answers, missing, None)
+    assert not answers.whole

@@ -45,3 +45,14 @@ def test_a_program_that_was_stopped_gives_it_that_time_anew(clock: list[float]) 
     with pytest.raises(SilenceError):
         look_for_ever(session)
     assert clock[0] == pytest.approx(163.02, abs=0.05)
+
+
+def test_a_look_says_whether_anything_had_come(clock: list[float]) -> None:
+    """So that all that waits is taken before a command: `_drain` looks until nothing comes."""
+    line = Line(clock)
+    came = [b"\x00", b"\x00\x01", b""]
+    line.receive = lambda timeout: came.pop(0)  # type: ignore[method-assign]
+    session = Session(line, 3.0, 1, "test")  # type: ignore[arg-type]
+    session._drain()
+    assert came == []
+    assert session.traffic.received == 3
