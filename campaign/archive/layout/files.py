@@ -38,7 +38,7 @@ def keep_umask() -> None:
 
 def sync_file(path: Path) -> None:
     """Put the content of `path` on the disk."""
-    with path.open("rb") as file:
+    with path.open("r+b") as file:  # Windows puts nothing there that is open for reading alone
         os.fsync(file.fileno())
 
 
