@@ -213,7 +213,7 @@ def _publish_now(part: Path, final: Path) -> Path:
 
 def lost_trial(part: Path, error: Exception, count: int = 1) -> ArchiveError:
     """Why trials could not be written, the first as `part`, and what that means for the others."""
-    if not part.parent.is_dir():
+    if isinstance(error, FileNotFoundError) or not part.parent.is_dir():
         return ArchiveError(
             f"{part.parent}: is gone: it was moved or removed while the run went on; wherever it "
             "is now, it has the trials that had finished by then"
