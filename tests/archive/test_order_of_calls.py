@@ -17,6 +17,7 @@ from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
+from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason
 from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
@@ -74,6 +75,31 @@ def test_a_trial_is_on_the_disk_before_the_journal_says_so(
     (line,) = [call.data for call in calls.listed if call.path == journal and call.data]
     assert json.loads(line)["event"] == "trial finished"
     assert line.endswith(b"\n")
+
+
+def test_trials_of_a_batch_are_on_the_disk_before_their_lines_are_handed_over(
+    tmp_path: Path, trials: tuple[Trial, ...]
+) -> None:
+    """Every content, then every name, then the folder, once; only then `publish` ends."""
+    writer = FolderWriter(tmp_path, {trial.number: 1 for trial in trials[:2]})
+    with recorded() as calls:
+        for trial in trials[:2]:
+            recorder = writer.begin(trial)
+            recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
+            recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
+            recorder.finish(Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED), AT, AT)
+        before = end_of(calls)
+        writer.publish()
+    assert [call.name for call in calls.listed[:before] if call.name != "write"] == []
+    finals = [tmp_path / f"trial-0000{trial.number}.trial" for trial in trials[:2]]
+    parts = [final.with_name(final.name + PART) for final in finals]
+    assert [(call.name, call.to or call.path) for call in calls.listed[before:]] == [
+        *(("fsync", part) for part in parts),
+        *(("rename", final) for final in finals),
+        ("fsync", tmp_path),
+    ]
+    assert all(calls.synced_before(end_of(calls), part) for part in parts)
+    assert [entry.file for entry in writer.take_entries()] == [final.name for final in finals]  # type: ignore[union-attr]
 
 
 def test_a_trial_is_reported_before_it_is_measured(

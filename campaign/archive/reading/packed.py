@@ -15,9 +15,6 @@ from campaign.archive.reading import guarded
 from campaign.archive.reading.series import MISMATCH, layout_of, series_at
 from campaign.errors import ArchiveError
 
-LARGEST_DESCRIPTION = 1 << 26
-"""Bytes of what tells of a trial's samples."""
-
 
 def read_packed(path: Path, entry: str) -> PackedTrial:
     """A trial's own file. Programs before this one made it an HDF5 file, which holds `entry`.
@@ -37,7 +34,7 @@ def _read(path: Path) -> PackedTrial:
             raise ArchiveError(f"{path}: is not the file of a trial, or its beginning is damaged")
         file.seek(end)
         start = int.from_bytes(file.read(POINTER), "little")
-        if not len(MAGIC) <= start <= end or end - start > LARGEST_DESCRIPTION:
+        if not len(MAGIC) <= start <= end:
             raise ArchiveError(f"{path}: its end is damaged")
         file.seek(start)
         trial = PackedTrial.model_validate_json(file.read(end - start))

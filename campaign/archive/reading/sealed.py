@@ -17,6 +17,7 @@ from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.layout.journal import RunStarted, TrialFinished
 from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
 from campaign.archive.layout.run_folder import parse_plan
 from campaign.archive.layout.storage import storable
@@ -24,7 +25,7 @@ from campaign.archive.reading import guarded
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.measured import measured_in, with_metrics
-from campaign.archive.reading.packed import parse_record
+from campaign.archive.reading.packed import packed_record, parse_record
 from campaign.archive.reading.provenance import read_provenance
 from campaign.archive.reading.recorded import RecordedSamples, archived_trial
 from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
@@ -256,18 +257,13 @@ def _as_finished(record: TrialRecord) -> TrialFinished:
     )
 
 
-def read_entry(
-    path: Path, file: h5py.File, name: str, digest: str | None = None
-) -> tuple[TrialRecord, Trees]:
+def read_entry(path: Path, file: h5py.File, name: str, digest: str) -> tuple[TrialRecord, Trees]:
     """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
     with guarded.guarded(path, f"/{name}"):
         entry = guarded.inner_group(file, name)
         kept = guarded.inner_group(entry, "record")
-        record = parse_record(path, f"/{name}/record", guarded.text_at(kept, "json", digest))
-        try:
-            return record, parse_trees(guarded.unchecked_text_at(kept, "trees"))
-        except ValueError as error:
-            raise ArchiveError(f"{path}: /{name}/record/trees: {error}") from None
+        record, trees = (guarded.unchecked_text_at(kept, text) for text in ("json", "trees"))
+        return packed_record(path, name, PackedTrial(record=record, trees=trees), digest)
 
 
 def read_not_kept(texts: SealedTexts) -> dict[str, str]:
