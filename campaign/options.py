@@ -7,11 +7,16 @@ default and a meaning. Validation, error messages and documentation all come fro
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import inspect
 import re
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as attribute
+from functools import cache
+from itertools import pairwise
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import (
@@ -30,9 +35,7 @@ from campaign.units import Quantity
 class Options(BaseModel):
     """A frozen set of options: unknown names, NaN and infinity are errors."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def without_effect(self) -> frozenset[str]:
         """Names of options that do nothing as the others are; a report does not list them."""
@@ -135,10 +138,36 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
             accepts=_accepts(field.annotation, types, quantified=bool(quantities)),
             default=None if nested else default,
             required=field.is_required(),
-            meaning=" ".join((field.description or "").split()),
+            meaning=meaning_of(options, name),
         )
         key = "NAME." if dict in tuple(_origins(field.annotation)) else ""
         yield from _within(found, f"{prefix}{name}.{key}")
+
+
+def meaning_of(model: type[BaseModel], name: str) -> str:
+    """What a field is: its description, or else the docstring below it.
+
+    pydantic would read the source of every class at each start (`use_attribute_docstrings`).
+    """
+    text = model.model_fields[name].description
+    owners = (each for each in model.__mro__ if name in inspect.get_annotations(each))
+    return " ".join((text or _docstrings(next(owners)).get(name, "")).split())
+
+
+@cache
+def _docstrings(owner: type) -> Mapping[str, str]:
+    """Of a class' fields, from its source; empty where there is none at hand."""
+    try:
+        body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0].body  # type: ignore[attr-defined]
+    except (OSError, SyntaxError):
+        return {}
+    return {
+        field.target.id: text.value.value
+        for field, text in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }  # fmt: skip
 
 
 def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:

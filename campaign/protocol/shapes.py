@@ -15,6 +15,7 @@ from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
 
 from campaign.choice import Choice
+from campaign.options import meaning_of
 from campaign.protocol.positions import Keys
 from campaign.units import Quantity
 
@@ -27,15 +28,20 @@ class Shape:
         members: the types it may have, None left out.
         discriminator: the field that tells models apart, or "".
         quantity: the physical quantity it is, if it is one.
-        meaning: what the field's documentation says.
+        owner: model and name of the field, where it is one.
         choice: the tables among which the discriminator chooses, in place of members.
     """
 
     members: tuple[Any, ...]
     discriminator: str = ""
     quantity: Quantity | None = None
-    meaning: str = ""
+    owner: tuple[type[BaseModel], str] | None = None
     choice: Choice | None = None
+
+    @property
+    def meaning(self) -> str:
+        """What the field's documentation says."""
+        return meaning_of(*self.owner) if self.owner else ""
 
     @property
     def is_union(self) -> bool:
@@ -73,9 +79,8 @@ class Shape:
         """The shape of the value under `key`, or None when nothing is declared for it."""
         for member in self.members:
             if isinstance(member, type) and issubclass(member, BaseModel):
-                field = member.model_fields.get(str(key))
-                if field is not None:
-                    return _of_field(field)
+                if str(key) in member.model_fields:
+                    return _of_field(member, str(key))
                 continue
             arguments = get_args(member)
             if get_origin(member) in (dict, Mapping) and len(arguments) == 2:
@@ -152,7 +157,8 @@ def shape_at(root: type[BaseModel], tree: Any, keys: Keys) -> Shape | None:
     return shape
 
 
-def _of_field(field: FieldInfo) -> Shape:
+def _of_field(model: type[BaseModel], name: str) -> Shape:
+    field = model.model_fields[name]
     shape = shape_of(field.annotation)
     discriminator = field.discriminator if isinstance(field.discriminator, str) else ""
     quantity = next((m for m in field.metadata if isinstance(m, Quantity)), None)
@@ -160,7 +166,7 @@ def _of_field(field: FieldInfo) -> Shape:
         shape.members,
         discriminator or shape.discriminator,
         quantity or shape.quantity,
-        " ".join((field.description or "").split()),
+        (model, name),
         shape.choice,
     )
 

@@ -46,7 +46,7 @@ Timestamp = Annotated[str, AfterValidator(_timestamp)]
 class _Record(BaseModel):
     """Frozen, and tolerant of fields that a later program added."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="ignore", frozen=True)
 
 
 class Truth(_Record):
