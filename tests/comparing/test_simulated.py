@@ -11,7 +11,7 @@ from scipy import stats
 from campaign.comparing.judging import RATE, Verdict
 from tests.comparing.laboratory import PLATFORM, Run, compared, simulated
 
-TOGETHER = 20
+TOGETHER = 5
 """Runs whose samples are kept in memory at once."""
 CHANGES = tuple(
     f'{test}.bench.friction.load.{path}="{value} N m"'
