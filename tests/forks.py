@@ -44,8 +44,9 @@ LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
 import jinja2, matplotlib.backends.backend_svg, matplotlib.figure, rich.console, rich.progress
 import rich.table, scipy.interpolate, scipy.ndimage, scipy.special, scipy.spatial, tomlkit, typer
+numba.cfunc("float64(float64)")(lambda x: x)  # the compiler is ready
 """
-"""What imports nothing of the program, and looks for no plug-in of anything."""
+"""Imports nothing of the program, and looks for no plug-in of anything."""
 SERVER = """
 import atexit, contextlib, gc, importlib, json, os, signal, subprocess, sys, threading, time, types
 gc.freeze()  # a collection in a fork would copy every page
@@ -85,6 +86,9 @@ sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 def run():
     code = 0
     try:
+        if sys.argv[1:2] == ["-c"]:  # as `python -c`
+            exec(sys.argv[2], {"__name__": "__main__"})
+            leave(0)
         if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
             importlib.import_module(hook)
         from campaign.__main__ import main

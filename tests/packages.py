@@ -138,21 +138,19 @@ class Packages:
         return self.folder.parent / "cache"
 
     def python(self, code: str) -> subprocess.CompletedProcess[str]:
-        """Run `code` in a fresh interpreter; the folder with its metadata is on the path."""
-        return self._run("-c", code)
+        """Run `code` without any module of the program; the folder is on the path."""
+        return self.campaign("-c", code)
 
     def campaign(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a command beside the folder."""
+        beside, environment = self.folder.parent, self.environment()
         if sys.platform == "linux":
-            beside = self.folder.parent
-            return forks_of_libraries().run(beside, *arguments, environment=self.environment())
-        return self._run("-m", "campaign", *arguments)
-
-    def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+            return forks_of_libraries().run(beside, *arguments, environment=environment)
+        program = [] if arguments[0] == "-c" else ["-m", "campaign"]
         return subprocess.run(
-            [sys.executable, *arguments],
-            cwd=self.folder.parent,
-            env=self.environment(),
+            [sys.executable, *program, *arguments],
+            cwd=beside,
+            env=environment,
             capture_output=True,
             text=True,
             encoding="utf-8",

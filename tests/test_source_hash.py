@@ -46,6 +46,18 @@ def test_the_package_and_what_it_imports_from_folders_on_the_path(folder: Path) 
     assert not [name for name in sys.modules if name.startswith("hashed")]  # nothing is imported
 
 
+@pytest.mark.parametrize(
+    "before",
+    [
+        *("def f():", "class A:", "if 0: f\nelse:", "try: f\nexcept E:", "try: f\nfinally:"),
+        *("with f:", "for x in f:", "while f: f\nelse:", "match f:\n case 1:", "async def f():"),
+    ],
+)
+def test_an_import_counts_in_every_block(folder: Path, before: str) -> None:
+    (folder / "hashed_one/deep/part.py").write_text(f"{before}\n  import hashed_four")
+    assert "hashed_four.py" in sources_of(["hashed_one"])
+
+
 def test_every_edit_of_a_source_changes_it(folder: Path) -> None:
     before = digest(sources_of(["hashed_one"]))
     seen = {before}

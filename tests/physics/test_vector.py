@@ -189,7 +189,6 @@ def counted(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return parameters[0] * ((v > 0.0) + (end > 0.0)), 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "expected"),
     [
