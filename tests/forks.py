@@ -25,20 +25,22 @@ from typing import Self
 TIMEOUT = 600
 """s after which the system ends a command: the first one may compile the engine."""
 
-PROGRAM = """
+MODULES = """
 import importlib, pkgutil
 import matplotlib.pyplot
 import campaign
 for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
-    if not found.name.endswith("__main__"):
+    if not found.name.endswith(("__main__", "preloaded")):  # the latter looks for plug-ins
         importlib.import_module(found.name)
-from campaign.device.warm_up import warm_up
-from campaign.protocol.bench_file import simulable
-warm_up(simulable("simulink"))  # the engine is loaded, or compiled
 import functools, typer.main
 from campaign.cli.main import app
 typer.main.get_command = functools.cache(typer.main.get_command)
 typer.main.get_command(app)  # what can be typed, of all commands
+"""
+PROGRAM = f"""{MODULES}
+from campaign.device.warm_up import warm_up
+from campaign.protocol.bench_file import simulable
+warm_up(simulable("simulink"))  # the engine is loaded, or compiled
 """
 LIBRARIES = """
 import h5py, numba, numpy, pandas, scipy.linalg, scipy.optimize, scipy.signal, scipy.stats
@@ -81,6 +83,9 @@ if environment is not None:
     os.environ.update(environment)
     sys.path[1:1] = filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))
     sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
+    if "campaign" in sys.modules:  # as if it were imported now, with these packages
+        campaign.entry_points.installed.cache_clear()
+        campaign.physics.compiled._IMPORTED_AT = time.time()
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 def run():
@@ -278,8 +283,8 @@ class Begun:
 
 
 @cache
-def forks_of_libraries() -> Forks:
+def forks_of(imports: str) -> Forks:
     """The one of this process for commands that differ in what is installed."""
-    made = Forks(os.environ, LIBRARIES)
+    made = Forks(os.environ, imports)
     atexit.register(made.close)
     return made

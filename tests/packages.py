@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.physics.compiled import cache_folder
-from tests.forks import forks_of_libraries
+from tests.forks import LIBRARIES, MODULES, forks_of
 
 ROOT = Path(__file__).parents[1]
 
@@ -145,7 +145,8 @@ class Packages:
         """Run a command beside the folder."""
         beside, environment = self.folder.parent, self.environment()
         if sys.platform == "linux":
-            return forks_of_libraries().run(beside, *arguments, environment=environment)
+            imports = LIBRARIES if arguments[0] == "-c" else MODULES
+            return forks_of(imports).run(beside, *arguments, environment=environment)
         program = [] if arguments[0] == "-c" else ["-m", "campaign"]
         return subprocess.run(
             [sys.executable, *program, *arguments],

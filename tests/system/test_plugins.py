@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import open_run
+from tests.forks import MODULES
 from tests.packages import FILM, Packages
 from tests.system.user import SEA
 
@@ -94,6 +95,7 @@ def odd(lab: Laboratory) -> Laboratory:
 @pytest.mark.slow
 def test_a_broken_package_harms_nothing_that_does_not_name_it(odd: Laboratory) -> None:
     """`plan`, `kinds` and `report` ended with exit code 70, "This is a bug"."""
+    assert not odd.python(MODULES).stdout, "an import of the program imports no plug-in"
     odd.does("plan", "sea.toml")
     odd.does("check", "simulink")
     archive = odd.does("run", "sea.toml").stdout.splitlines()[-1]

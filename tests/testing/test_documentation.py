@@ -19,7 +19,7 @@ import pytest
 from campaign.archive import find_run, open_run
 from campaign.recording import Fault, Outcome, SafeState
 from campaign.testing import backend_checks
-from tests.forks import forks_of_libraries
+from tests.forks import MODULES, forks_of
 from tests.testing.drive import Drive
 
 ROOT = Path(__file__).parents[2]
@@ -117,9 +117,7 @@ seed = 1
 
 def campaign(package: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join([str(package), str(ROOT), os.environ.get("PYTHONPATH", "")])
-    return forks_of_libraries().run(
-        folder, *arguments, environment={**os.environ, "PYTHONPATH": path}
-    )
+    return forks_of(MODULES).run(folder, *arguments, environment={**os.environ, "PYTHONPATH": path})
 
 
 def test_a_whole_run(package: Path, tmp_path: Path) -> None:
