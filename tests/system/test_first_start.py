@@ -12,8 +12,9 @@ from tests.system.user import SEA, campaign, write
 
 @pytest.mark.slow
 def test_what_warmup_has_compiled_it_finds_again(tmp_path: Path) -> None:
-    first = campaign(tmp_path, "warmup")
-    again = campaign(tmp_path, "warmup")
+    again = first = campaign(tmp_path, "warmup")
+    if not first.out.startswith("nothing to compile: all "):  # else a process before it did
+        again = campaign(tmp_path, "warmup")
     assert again.out.startswith("nothing to compile: all ")
     assert COMPILING not in again.err
     kept = Path(again.last_line.removeprefix("kept in "))
