@@ -184,12 +184,13 @@ class Trial(Options):
 
         In canonical JSON.
         """
-        what = {"bench": self.bench, "task": self.task.model_dump(mode="json"), "seed": self.seed}
+        what = {"task": self.task.model_dump(mode="json"), "seed": self.seed}
         if self.truth:
             what["truth"] = self.truth
         if self.recording:
             what["recording"] = self.recording
-        return hashlib.sha256(canonical_json(what).encode()).hexdigest()
+        text = f'{{"bench":{tree_text(self.bench)},{canonical_json(what)[1:]}'  # keys are sorted
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with some fields changed, which works its fingerprint out anew."""
@@ -279,6 +280,21 @@ NONE_MORE = Most(0, 0.0, 0)
 def canonical_json(tree: Any) -> str:
     """JSON that is equal for equal content: sorted keys, no spaces, no NaN."""
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+_MOST_TEXTS = 64
+_TEXTS: dict[int, tuple[Tree, str]] = {}
+"""Trees and their texts, by the id of the tree."""
+
+
+def tree_text(tree: Tree) -> str:
+    """`canonical_json` of a tree that trials share and nothing changes; the last ones are kept."""
+    kept = _TEXTS.get(id(tree))  # the tree is kept, and so is its id
+    if kept is None:
+        if len(_TEXTS) >= _MOST_TEXTS:
+            _TEXTS.clear()
+        kept = _TEXTS[id(tree)] = tree, canonical_json(tree)
+    return kept[1]
 
 
 def trial_number(wanted: str) -> int:

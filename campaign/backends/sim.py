@@ -24,7 +24,7 @@ from campaign.physics.complete import PURPOSES, CompleteBench, IncompleteBenchEr
 from campaign.physics.truth import simulated
 from campaign.recording import Array, Ending, Recorder, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
-from campaign.trial import Tree, Trial
+from campaign.trial import Tree, Trial, tree_text
 from campaign.units import Time
 
 if TYPE_CHECKING:  # the engine takes its time to be imported
@@ -71,9 +71,9 @@ class SimBackend:
 
     def __init__(self, options: SimOptions) -> None:
         self._options = options
-        self._benches: dict[int, tuple[Tree, CompleteBench]] = {}
+        self._benches: dict[str, CompleteBench] = {}
         self._truths: dict[str, Tree] = {}
-        self._simulated: dict[tuple[int, str], CompleteBench] = {}
+        self._simulated: dict[tuple[str, str], CompleteBench] = {}
         self._known: dict[str, _Known] = {}
         self._groups: dict[Hashable, Hashable] = {}
         self.timing: Timing = UNTIMED
@@ -215,22 +215,22 @@ class SimBackend:
 
     def _simulated_instead(self, trial: Trial, stated: CompleteBench) -> CompleteBench:
         """The truth under the software of the stated bench."""
-        key = (id(trial.bench), trial.truth)  # the tree is kept as long as this is
+        key = (tree_text(trial.bench), trial.truth)
         bench = self._simulated.get(key)
         if bench is None:
             bench = self._simulated[key] = simulated(self._truths[trial.truth], stated)
         return bench
 
     def _bench(self, trial: Trial) -> CompleteBench:
-        kept = self._benches.get(id(trial.bench))  # it is kept, and so is its id
-        if kept is None:
-            bench = Bench.model_validate(trial.bench, context={"si": True})
-            kept = trial.bench, complete(bench, "the backend 'sim'")
+        text = tree_text(trial.bench)  # a worker process receives a copy of the tree each time
+        bench = self._benches.get(text)
+        if bench is None:
+            valid = Bench.model_validate(trial.bench, context={"si": True})
             if len(self._benches) >= MOST_BENCHES:
                 self._benches.clear()
                 self._simulated.clear()
-            self._benches[id(trial.bench)] = kept
-        return kept[1]
+            bench = self._benches[text] = complete(valid, "the backend 'sim'")
+        return bench
 
 
 _NAMES = frozenset(channel.name for channel in CHANNELS)

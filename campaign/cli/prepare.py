@@ -168,9 +168,9 @@ def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]
 
 
 def _refused(kind: BackendKind, backend: Backend, trial: Trial) -> str:
-    why = calls.refusal(backend, trial)
-    named = f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label})"
-    return f"{named}: {why}" if why else ""
+    if not (why := calls.refusal(backend, trial)):
+        return ""
+    return f"the backend {kind.name!r} cannot execute {trial.name} ({trial.label}): {why}"
 
 
 def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,19 +45,30 @@ class DryInterface:
     """What an interface has where the engine solves for its friction; see `DryFriction`.
 
     Attributes:
-        limits: torques (N m at the load) that it holds, forwards and backwards; and those of the
-            slowest sliding.
+        options, parameters: of the model.
+        torque: at the load of one N m of the interface (N m).
     """
 
-    sliding: Callable[..., float]
-    limits: tuple[float, float, float, float]
+    dry: DryFriction
+    options: Any
+    parameters: Array
+    torque: float
 
-    @classmethod
-    def of(cls, dry: DryFriction, options: Any, parameters: Array, torque: float) -> DryInterface:
+    @property
+    def sliding(self) -> Callable[..., float]:
+        return self.dry.sliding
+
+    @cached_property
+    def limits(self) -> tuple[float, float, float, float]:
+        """Torques (N m at the load) that it holds, forwards and backwards; and those of the slowest
+        sliding, whose compiled function is loaded for it.
+        """
         ways = (1.0, -1.0)
-        holds = [torque * dry.static_torque(options, way) for way in ways]
-        starts = [torque * single_sliding(dry.sliding, parameters, way, 0.0) for way in ways]
-        return cls(dry.sliding, (holds[0], holds[1], starts[0], starts[1]))
+        holds = [self.torque * self.dry.static_torque(self.options, way) for way in ways]
+        starts = [
+            self.torque * single_sliding(self.sliding, self.parameters, way, 0.0) for way in ways
+        ]
+        return holds[0], holds[1], starts[0], starts[1]
 
 
 @dataclass(frozen=True)
@@ -84,7 +96,7 @@ class Interface:
         parameters = np.asarray(model.parameters(options), dtype=float)
         dry = None
         if solved and model.dry is not None:
-            dry = DryInterface.of(model.dry, options, parameters, torque * gain)
+            dry = DryInterface(model.dry, options, parameters, torque * gain)
         return cls(
             step=model.step if model.step_for is None else model.step_for(options),
             parameters=parameters,

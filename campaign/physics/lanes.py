@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,8 @@ class Lane:
         bench: the one that is simulated, as it is in this trial.
         stated: whose numbers the software of the controller has: N, Kt, and what compensation is
             built for. The same bench, unless the simulation has a truth of its own.
-        f, g, h: the discretised loop; see `loop.discretise`.
+        f, g, h: the discretised loop; see `loop.discretise`. Made when it is first asked for: a
+            plan only asks for the step and the structure.
         inputs: those that act on the loop, in the order of their signals.
     """
 
@@ -74,9 +76,6 @@ class Lane:
     grid: Grid
     compensator: Compensator
     loop: Loop
-    f: Array
-    g: Array
-    h: Array
     inputs: tuple[int, ...]
     friction: tuple[Interface, ...]
     compensation: tuple[Interface, ...]
@@ -99,7 +98,6 @@ class Lane:
         grid = make_grid(bench, task, longest_step)
         compensator = make_compensator(stated, task.compensation)
         loop = _loop(bench, task, compensator, grid, stated)
-        f, g, h = discretise(loop.a, loop.b, grid.step)
         moves = task.mode != "prescribed"
         return cls(
             bench=bench,
@@ -109,9 +107,6 @@ class Lane:
             grid=grid,
             compensator=compensator,
             loop=loop,
-            f=f,
-            g=g,
-            h=h,
             inputs=_inputs(task, grid),
             friction=_plant(bench, moves=moves),
             compensation=tuple(
@@ -119,6 +114,27 @@ class Lane:
                 for each, gain in compensator.friction
             ),
         )
+
+    @cached_property
+    def _discrete(self) -> tuple[Array, Array, Array]:
+        return discretise(self.loop.a, self.loop.b, self.grid.step)
+
+    @property
+    def f(self) -> Array:
+        return self._discrete[0]
+
+    @property
+    def g(self) -> Array:
+        return self._discrete[1]
+
+    @property
+    def h(self) -> Array:
+        return self._discrete[2]
+
+    @property
+    def states(self) -> int:
+        """Of the loop."""
+        return len(self.loop.a)
 
     @property
     def prescribed(self) -> bool:
@@ -143,7 +159,7 @@ class Lane:
             grid.step,
             grid.every,
             grid.per_control,
-            len(self.f),
+            self.states,
             self.inputs,
             self.loop.seen,
             0 if block is None else len(block.c),
@@ -281,7 +297,7 @@ def _signal(task: Task, which: int, at: Array) -> Array:
 def _system(lanes: Sequence[Lane]) -> System:
     first = lanes[0]
     plant = [which for which in first.inputs if not (which == DRIVE and first.grid.per_control)]
-    columns = len(first.f) + 2 * len(plant) + (1 if first.grid.per_control else 0)
+    columns = first.states + 2 * len(plant) + (1 if first.grid.per_control else 0)
     padded = -(-columns // COLUMNS) * COLUMNS
     block = first.compensator.linear
     columns = max(columns, 0 if block is None else len(block.c))
@@ -290,7 +306,7 @@ def _system(lanes: Sequence[Lane]) -> System:
     acts = np.full(4, -1, dtype=np.int64)
     for row, which in enumerate(first.inputs):
         acts[which] = row
-    rows = len(first.f) if len(lanes) > 1 else -(-len(first.f) // ROWS) * ROWS
+    rows = first.states if len(lanes) > 1 else -(-first.states // ROWS) * ROWS
     by_friction = by_lane([_torque_columns(lane, FRICTION, rows) for lane in lanes])
     by_compensation = by_lane([_torque_columns(lane, COMPENSATION, rows) for lane in lanes])
     return System(
@@ -317,7 +333,7 @@ def _known(lane: Lane, plant: Sequence[int], columns: int, rows: int) -> Array:
     # A disturbance drives the load forwards, friction holds it back: the same input, negative.
     signs = np.array([-1.0 if which == FRICTION else 1.0 for which in plant])
     at_start, at_end = (lane.g - lane.h)[:, list(plant)] * signs, lane.h[:, list(plant)] * signs
-    held = lane.g[:, [DRIVE]] if lane.grid.per_control else np.zeros((len(lane.f), 0))
+    held = lane.g[:, [DRIVE]] if lane.grid.per_control else np.zeros((lane.states, 0))
     known = np.hstack([lane.f, at_start, at_end, held])
     return _filled_up(known.T, (columns, rows)).reshape(-1, COLUMNS, rows)
 
@@ -399,7 +415,7 @@ def _discrete_block(lane: Lane) -> tuple[Array, Array, Array, Array]:
 
 
 def _memory(lanes: Sequence[Lane], controller: Controller) -> Memory:
-    width, states = len(lanes), len(lanes[0].f)
+    width, states = len(lanes), lanes[0].states
     x = zeros(states, width)
     x[RATE if lanes[0].prescribed else RELATIVE_ANGLE] = [lane.task.start_angle for lane in lanes]
     ended = zeros(2, width)

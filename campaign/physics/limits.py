@@ -32,8 +32,8 @@ MOST_POINTS = 64_000
 """of such a sum that are looked at: of more than 1000 cycles fewer points each."""
 POINTS_OF_A_LINE = 1001
 """at which a polyline is looked at besides its knots."""
-SPEEDS = 121
-"""at which friction is looked at."""
+_SHARES = np.concatenate([side * np.geomspace(1e-12, 1.0, 121) for side in (-1.0, 1.0)])
+"""Of the largest rate, at which friction is looked at."""
 
 
 _CALLED = {("angle", "m"): "position", ("torque", "N"): "force"}
@@ -189,13 +189,12 @@ def worst_friction(bench: Bench, rate: float) -> float:
     from campaign.physics.friction import friction_models
     from campaign.physics.variation import of_its_day
 
-    shares = np.geomspace(1e-12, 1.0, SPEEDS)
     total = 0.0
     for friction in of_its_day(bench).friction.values():
         model = friction_models()[friction.model]
         ratio, rate_ratio = bench.at_load(friction)
         speed = rate * rate_ratio
-        speeds = np.concatenate([-shares, shares]) * speed
+        speeds = _SHARES * speed
         viscous = model.viscous(friction)
         dry = float(np.max(np.abs(model.steady_state(friction, speeds) - viscous * speeds)))
         torque = dry * (1.0 + friction.ripple.amplitude) + viscous * speed

@@ -88,7 +88,7 @@ AT_REST = 1e-9
 """rad/s; a sine that begins at its crest leaves this much by rounding."""
 STANDING = 1.0
 """1/s; slower poles are integrators and do not ring."""
-SPEEDS = np.logspace(-7.0, 2.0, 91)
+SPEEDS = np.concatenate([side * np.logspace(-7.0, 2.0, 91) for side in (-1.0, 1.0)])
 """rad/s at the interface, at which the least torque of steady sliding is looked for."""
 
 
@@ -212,7 +212,7 @@ def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench)
         if bristles is not None:
             model = friction_models()[options.model]  # type: ignore[attr-defined]
             torque, rate = at_load(options, bench)
-            sliding = model.steady_state(options, np.concatenate([-SPEEDS, SPEEDS]))
+            sliding = model.steady_state(options, SPEEDS)
             found.append(
                 _Contact(
                     place,
@@ -257,7 +257,10 @@ def stuck_poles(bench: CompleteBench, task: Task, compensator: Compensator) -> P
 
 def _load_poles(inertia: float, damping: float, stiffness: float) -> Poles:
     """Poles (1/s) of the load on its bristles, and on the spring that it is pulled through."""
-    return np.roots([inertia, damping, stiffness]).astype(complex)
+    # As `np.roots` has it, without its search for zeros: there are none.
+    return np.linalg.eigvals([[-damping / inertia, -stiffness / inertia], [1.0, 0.0]]).astype(
+        complex
+    )
 
 
 def _fastest(poles: Poles) -> float:

@@ -8,7 +8,9 @@ the same trial always meets the same friction.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
+from operator import mul
 from typing import TypeVar
 
 import numpy as np
@@ -21,6 +23,9 @@ from campaign.physics.scatter import TORQUES, Line
 _Bench = TypeVar("_Bench", bound=Bench)
 SMALLEST_FACTOR = 0.05
 """However wide the scatter, some friction is left."""
+_MOST_BENCHES = 64
+_OF_ITS_DAY: dict[int, tuple[Bench, Bench]] = {}
+"""Benches and what they are on their day, by the id of the bench."""
 _DAY, _TRIAL = 2, 3
 """What tells the streams of named draws from each other, and from the first two there were."""
 
@@ -37,6 +42,15 @@ def as_it_is(bench: _Bench, seed: int) -> _Bench:
 
 def of_its_day(bench: _Bench) -> _Bench:
     """`bench` with the friction of its day and its preload: what its trials scatter around."""
+    kept = _OF_ITS_DAY.get(id(bench))  # the bench is kept, and so is its id
+    if kept is None:
+        if len(_OF_ITS_DAY) >= _MOST_BENCHES:
+            _OF_ITS_DAY.clear()
+        kept = _OF_ITS_DAY[id(bench)] = bench, _of_its_day(bench)
+    return kept[1]  # type: ignore[return-value]
+
+
+def _of_its_day(bench: _Bench) -> _Bench:
     bench = preloaded(bench)
     variation = bench.variation
     if variation is None or variation.day == 0:
@@ -93,15 +107,15 @@ def _number(name: str) -> int:
 def _scaled(bench: _Bench, draws: Iterable[tuple[Line, float]]) -> _Bench:
     """`bench` with what each line names times 1 plus its share of its draw, line after line."""
     declared = {name: changeable(options) for name, options in bench.friction.items()}
-    friction = dict(bench.friction)
+    factors: dict[str, dict[str, list[float]]] = {}
     for line, draw in draws:
         factor = max(1.0 + line.relative * draw, SMALLEST_FACTOR)
         places = {place for path in line.paths for place in matched(path, declared)}
-        for name in {interface for interface, _ in places}:
-            parameters = {parameter for interface, parameter in places if interface == name}
-            friction[name] = _times(friction[name], factor, parameters)
-    return bench.model_copy(update={"friction": friction})
+        for interface, parameter in places:
+            factors.setdefault(interface, {}).setdefault(parameter, []).append(factor)
+    scaled = {name: _times(bench.friction[name], each) for name, each in factors.items()}
+    return bench.model_copy(update={"friction": {**bench.friction, **scaled}})
 
 
-def _times(options: object, factor: float, parameters: set[str]) -> object:
-    return changed(options, lambda name, value: value * factor if name in parameters else value)
+def _times(options: object, factors: Mapping[str, Sequence[float]]) -> object:
+    return changed(options, lambda name, value: reduce(mul, factors.get(name, ()), value))

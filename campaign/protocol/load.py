@@ -38,7 +38,7 @@ from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.matrix import Axis
 from campaign.protocol.operator import operator_problems
 from campaign.protocol.overrides import Override, parse_overrides
-from campaign.protocol.points import PointError, points_of
+from campaign.protocol.points import PointError, first_point
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import allowed, shown, validate
 from campaign.protocol.schema import (
@@ -359,7 +359,7 @@ class _Loader:
         if not test.entry.operator or any(len(axis) == 0 for axis in test.axes):
             return
         try:
-            point = next(points_of(test))
+            point = first_point(test)
         except PointError:
             return  # reported where the value stands
         self._report(*operator_problems(test, point))

@@ -29,7 +29,7 @@ from campaign.protocol.expand import (
 )
 from campaign.protocol.lacking import not_predicted
 from campaign.protocol.matrix import LARGEST_PLAN, count_points
-from campaign.protocol.points import PointError, incomplete, points_of
+from campaign.protocol.points import PointError, first_point, incomplete
 from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import Protocol, Test
 from campaign.protocol.stages import PlannedStage, most_of
@@ -300,7 +300,7 @@ def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
 def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: int) -> PlannedTest:
     closest = _worst(use for use in uses if not use.margin.sensor)
     coarse = _worst(use for use in uses if use.margin.sensor and use.margin.fraction > CLOSE)
-    first = next(iter(points_of(test)))
+    first = first_point(test)
     matrix: dict[str, dict[str, Any]] = {axis.path: {} for axis in test.axes}
     for trial in expanded.trials:
         for path, values in matrix.items():
@@ -350,7 +350,7 @@ def _worst(uses: Iterable[LimitUse]) -> tuple[LimitUse, ...]:
 
 def _normalised(test: Test, master: int) -> Tree:
     """What determines the trials of a test; prose is left out, so that it may be corrected."""
-    first = next(iter(points_of(test)))
+    first = first_point(test)
     swept: dict[str, Any] = {axis.path: axis.describe() for axis in test.axes}
     by_hand: list[Any] = [entry.model_dump(mode="json") for entry in test.entry.operator]
     more: Tree = {"operator": by_hand} if by_hand else {}

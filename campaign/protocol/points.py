@@ -80,6 +80,14 @@ def points_of(test: Test) -> Iterator[Point]:
         yield Point(values, options, options_tree, bench, bench_tree, chosen, told)
 
 
+def first_point(test: Test) -> Point:
+    """The first point of the matrix. Raises PointError."""
+    if not test.first:
+        test.first.append(next(points_of(test)))
+    point: Point = test.first[0]
+    return point
+
+
 @dataclass
 class _Cache:
     """Options and benches already validated: a sweep of one leaves the other as it is."""

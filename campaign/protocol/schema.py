@@ -191,6 +191,7 @@ class Test:
         origin, bench_origin: where they stand, for problems found later.
         truth: what is simulated in place of the bench, see `physics.truth.plant_of`; None: nothing
             else.
+        first: the first point of the matrix, once `points.first_point` was asked for it.
     """
 
     __test__ = False
@@ -204,6 +205,7 @@ class Test:
     origin: Origin
     bench_origin: Origin
     truth: Tree | None = None
+    first: list[Any] = field(init=False, default_factory=list, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

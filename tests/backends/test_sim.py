@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from campaign.backends.sim import BACKEND, CHANNELS, SimBackend, SimOptions
+from campaign.physics import lanes as lanes_module
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording, SafeState
@@ -49,6 +50,40 @@ def test_a_trial_that_completes_records_what_the_engine_computed() -> None:
     np.testing.assert_allclose(recording.time, np.arange(1000) * 1e-3, atol=1e-12)
     known = {info.name for info in CHANNELS if not info.measured}
     assert known == {"friction_torque", "load_rate"}
+
+
+def test_a_plan_discretises_no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Step and structure do not depend on it; executing does, once a trial."""
+    real, steps = lanes_module.discretise, []
+
+    def counted(a: Any, b: Any, step: float) -> Any:
+        steps.append(step)
+        return real(a, b, step)
+
+    monkeypatch.setattr(lanes_module, "discretise", counted)
+    planned = trial(bench(), task())
+    with BACKEND.open(SimOptions()) as backend:
+        assert backend.refuses(planned) is None
+        cost = backend.cost(planned)
+        assert backend.group(planned)
+        assert steps == []
+        backend.execute(planned, MemoryRecorder(), lambda: False)
+    assert steps == [cost.step]
+
+
+def test_a_bench_is_validated_once_though_each_trial_has_a_copy_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As in a worker process, which receives a copy with each batch."""
+    on, validated = bench(), []
+    real = Bench.model_validate
+    monkeypatch.setattr(
+        Bench, "model_validate", lambda *a, **k: validated.append(a) or real(*a, **k)
+    )
+    with BACKEND.open(SimOptions()) as backend:
+        costs = {backend.cost(trial(on, task(), seed)).step for seed in range(1, 4)}
+    assert len(costs) == 1
+    assert len(validated) == 1
 
 
 def test_the_command_channel_has_the_unit_of_its_mode() -> None:

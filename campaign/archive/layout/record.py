@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
 from campaign.archive.layout.checksums import text_digest
 from campaign.estimate import Estimate, Window
 from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
-from campaign.trial import Tree, Trial, canonical_json
+from campaign.trial import Tree, Trial, canonical_json, tree_text
 
 SHARED = ("bench", "options")
 """Fields of a trial that stand in `trees`."""
@@ -170,11 +170,11 @@ def restored_trial(described: Tree, trees: Trees) -> Trial:
 
 def shared_trees(trial: Trial) -> tuple[Tree, dict[str, Tree]]:
     """A trial with digests in place of its trees, and those trees by their digests."""
-    described = trial.model_dump(mode="json")
+    described = trial.model_dump(mode="json", exclude=set(SHARED))
     trees = {}
     for name in SHARED:
-        tree = described[name]
-        described[name] = text_digest(canonical_json(tree))
+        tree = getattr(trial, name)
+        described[name] = text_digest(tree_text(tree))
         trees[described[name]] = tree
     return described, trees
 
