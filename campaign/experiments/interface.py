@@ -52,19 +52,41 @@ class TrialData(Protocol):
         """What `Experiment.measure` found when it was executed; nothing if nobody looked then."""
 
 
+def no_progress(text: str) -> None:
+    """Reports progress to nobody."""
+
+
+def say_at(say: Callable[[str], None], step: str, text: str) -> None:
+    """Report progress at a step of several, e.g. `model 2 of 5`."""
+    say(f"{step}, {text}")
+
+
 @dataclass(frozen=True)
 class TestData:
-    """All there is about one test of a run, for its analysis.
+    """All there is about one test of a run, for its analysis; or trials that a model suits.
 
     Attributes:
         options: the test's normalised options before the sweep (SI).
         trials: in plan order, failed ones included.
+        model: options of the experiment's `Model`, where `campaign identify` asks for parameters;
+            None in a report.
+        validation: trials that no model is fitted to, for comparison with its predictions; read
+            once, when everything is chosen.
+        say: reports progress.
     """
 
     name: str
     kind: str
     options: Tree
     trials: tuple[TrialData, ...]
+    model: Any = None
+    validation: tuple[TrialData, ...] = ()
+    say: Callable[[str], None] = no_progress
+
+    @property
+    def bench(self) -> Bench:
+        """What is stated of the rig: that of the first trial."""
+        return bench_of(self.trials[0].trial)
 
     def completed(self) -> Iterator[TrialData]:
         """The measurements that ran to their end, in plan order."""
@@ -102,6 +124,27 @@ class Stage:
     why: str
     most: Callable[[Any, Bench], Most]
     trials: Callable[[Any, Bench, TestData], Iterable[TrialRequest]]
+
+
+@dataclass(frozen=True)
+class Model:
+    """How `campaign identify` uses an experiment's analysis, which gives `Result.identified`.
+
+    Attributes:
+        name: what `--model` says.
+        summary: one line for `campaign kinds`.
+        options: what it accepts, `--set NAME.option=value`; the analysis has them as
+            `TestData.model`.
+        suits: of recorded trials, those that the analysis can use; where none, why.
+        analyse: of those, with `TestData.model` and `TestData.validation`. Raises ValueError with a
+            message for the user where there is no result.
+    """
+
+    name: str
+    summary: str
+    options: type[Options]
+    suits: Callable[[Sequence[TrialData]], tuple[Sequence[TrialData], str]]
+    analyse: Callable[[TestData], Result]
 
 
 @dataclass(frozen=True)

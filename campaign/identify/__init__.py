@@ -10,11 +10,11 @@ from functools import cache
 
 # Before the function of the same name: imported later, the folder would take its place.
 import campaign.identify.methods  # noqa: F401
-from campaign.identify.method import Method
+from campaign.experiments.interface import Model
 from campaign.plugins import Kinds
 
 
 @cache
-def methods() -> Kinds[Method]:
+def methods() -> Kinds[Model]:
     """Every method of identification, by name."""
-    return Kinds("identification method", f"{__name__}.methods", "METHOD", Method)
+    return Kinds("identification method", f"{__name__}.methods", "METHOD", Model)

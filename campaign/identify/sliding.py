@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import (
     DRIVE_TORQUE,
     JOINT_TORQUE,
@@ -23,6 +22,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.over_a_turn import OverATurn, over_a_turn
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
 from campaign.estimation.steady_stretches import steady_stretches
+from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.result import Array
 
@@ -84,7 +84,7 @@ class Point:
         )
 
 
-def force_of(trial: ArchivedTrial) -> str:
+def force_of(trial: TrialData) -> str:
     """The channel that friction is read from: the joint's own, or else the drive's."""
     return JOINT_TORQUE if JOINT_TORQUE in trial.channel_names() else DRIVE_TORQUE
 
@@ -114,7 +114,7 @@ class Stretch:
 
 
 def points_of(
-    trials: Sequence[ArchivedTrial], bench: Bench, shortest: float, slowest: float | None = None
+    trials: Sequence[TrialData], bench: Bench, shortest: float, slowest: float | None = None
 ) -> tuple[list[Point], OverATurn | None]:
     """Of all steady stretches, and what of their torque follows from the angle, and is not in them.
 
@@ -130,7 +130,7 @@ def points_of(
 
 
 def slower(
-    trials: Sequence[ArchivedTrial], bench: Bench, shortest: float, found: Sequence[Point]
+    trials: Sequence[TrialData], bench: Bench, shortest: float, found: Sequence[Point]
 ) -> int:
     """How many steady stretches count as standstill, slower than all that were found there.
 
@@ -145,7 +145,7 @@ def slower(
 
 
 def _found(
-    trials: Sequence[ArchivedTrial],
+    trials: Sequence[TrialData],
     bench: Bench,
     shortest: float,
     slowest: float | None,
@@ -161,7 +161,7 @@ def _found(
 
 
 def _stretches(
-    trial: ArchivedTrial,
+    trial: TrialData,
     bench: Bench,
     shortest: float,
     slowest: float | None,

@@ -21,8 +21,7 @@ from campaign.estimation.intervals import LEVEL
 from campaign.estimation.trends.changes import Change, Jump, change, jumps_of
 from campaign.estimation.trends.family import RATE, adjusted, detectable, level_of
 from campaign.estimation.trends.scatter import Mixture
-from campaign.experiments.interface import Experiment
-from campaign.identify.method import Method
+from campaign.experiments.interface import Experiment, Model
 from campaign.plugins import Kinds
 from campaign.reason import NONE, Cause, Reason
 from campaign.trending.covariates import (
@@ -180,7 +179,7 @@ def follow(
     runs: Sequence[RunReader],
     experiments: Mapping[str, Experiment],
     over: str = TIME,
-    methods: Kinds[Method] | None = None,
+    methods: Kinds[Model] | None = None,
     models: Sequence[str] = (),
     exchanged: Sequence[tuple[str, Path]] = (),
 ) -> Trends:

@@ -173,7 +173,8 @@ def test_methods_that_disagree_are_told() -> None:
         one = replace(one, origin=origin or Origin.MEASURED)
         found = [one, *(replace(one, name=each) for each in beside)]
         parameters = tuple(SimpleNamespace(estimate=each, display="") for each in found)
-        return SimpleNamespace(method=SimpleNamespace(name=method), parameters=parameters)
+        identified = SimpleNamespace(parameters=parameters)
+        return SimpleNamespace(model=SimpleNamespace(name=method), identified=identified)
 
     first = section("friction_map", "coulomb_torque_positive", 1.55, 0.08)
     (said,) = disagreements([first, section("inverse_dynamics", "coulomb_positive", 3.07, 0.16)])

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import TOO_WIDE, UNPHYSICAL
 from campaign.identify.directions import OFFSET_OR_ASYMMETRY, with_offset
-from campaign.identify.method import Material, Parameter
 from campaign.identify.methods import frequency_response, friction_map, presliding, whole_model
 from campaign.identify.methods.inverse_dynamics import BENCH, NO_BASE, _settings, _with_base
+from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
+from tests.identify.asked import data_of
+
+RIG = {"name": "rig", "axis": {"name": "tilt"}}
 
 
 def number(name: str, value: float, half: float, **more: Any) -> Estimate:
@@ -60,8 +63,7 @@ def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> 
         refused,
     ]
     parameters = [Parameter(one, "", bench=BENCH[one.name]) for one in found]
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    told = _settings(parameters, Material(bench, cast("Any", (SimpleNamespace(),))))
+    told = _settings(parameters, data_of([SimpleNamespace(trial=SimpleNamespace(bench=RIG))]))
     assert told["friction.load.model"][0] == "coulomb"
     assert not any("static" in path or "stribeck" in path for path in told)
     assert told["friction.load.viscous_friction"][0] == 0.0
@@ -121,10 +123,9 @@ def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
         extra=(),
     )
     trial = SimpleNamespace(
-        trial=SimpleNamespace(recording={"channels": []}), channel_names=frozenset
+        trial=SimpleNamespace(recording={"channels": []}, bench=RIG), channel_names=frozenset
     )
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    parameters = list(whole_model._parameters(best, Material(bench, cast("Any", (trial,)))))
+    parameters = list(whole_model._parameters(best, data_of([trial])))
     found = {each.estimate.name: each for each in parameters}
     assert found["coulomb"].bench == "friction.load.coulomb_torque"
     assert found["static_torque"].estimate.reason in TOO_WIDE

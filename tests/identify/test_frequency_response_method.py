@@ -14,7 +14,6 @@ from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, 
 from campaign.estimate import Origin
 from campaign.estimation.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
-from campaign.identify import methods
 from campaign.identify.frequency.amplitudes import by_amplitude
 from campaign.identify.frequency.axis_numbers import UNKNOWN
 from campaign.identify.frequency.frequency_fit import TOO_FEW
@@ -22,23 +21,19 @@ from campaign.identify.frequency.repeating import unused
 from campaign.identify.frequency.signals import base_frequency
 from campaign.identify.frequency.sources import _lines
 from campaign.identify.material import choose
-from campaign.identify.method import Identified, Material
-from campaign.physics.bench import Bench
+from campaign.result import Result
 from campaign.signals import MultiSine, Polyline, Signal, Sine
 from campaign.trial import Recording, Task, Trial
 from tests.archives import archived, plan_of
 from tests.estimation.coverage import holds
 from tests.estimation.frequency.drives import Drive, loop_of, simulated, with_coulomb
+from tests.identify.asked import asked, suitable
 
 FINE, RATE, PERIOD = 4096, 256, 4.0
 EVERY = FINE // RATE
 DRIVE = Drive(2.0, 1.0, 4000.0, 3.0, 9.0)
 GRID = odd_grid(0.5, 60.0, PERIOD, 1)
 Answer = Callable[[np.ndarray], dict[str, np.ndarray]]
-
-
-def method():  # type: ignore[no-untyped-def]
-    return methods()["frequency_response"]
 
 
 def rig(bench: dict, appendage: bool) -> dict:  # type: ignore[type-arg]
@@ -129,22 +124,21 @@ def identified(
     answer: Answer,
     without: tuple[str, ...] = (),
     **options: object,
-) -> Identified:
+) -> Result:
     path = archived(folder / "results", [(t, answered(t, answer, without)) for t in made])
     chosen = choose(path.parent, path.name)
-    usable, why = method().suits(chosen.trials)
+    usable, why = suitable("frequency_response", chosen.trials)
     if why:
         raise ValueError(why)
-    bench = Bench.model_validate(chosen.trials[0].trial.bench, context={"si": True})
-    return method().identify(Material(bench, tuple(usable)), method().options(**options))
+    return asked("frequency_response", usable, **options)
 
 
 def multisines(count: int, rms: float = 5.0) -> list[MultiSine]:
     return [random_phases(GRID, rms, seed) for seed in range(count)]
 
 
-def told(found: Identified) -> dict:  # type: ignore[type-arg]
-    return {each.estimate.name: each for each in found.parameters}
+def told(found: Result) -> dict:  # type: ignore[type-arg]
+    return {each.estimate.name: each for each in found.identified.parameters}
 
 
 def test_multisines_of_a_torque(tmp_path: Path) -> None:
@@ -164,16 +158,16 @@ def test_multisines_of_a_torque(tmp_path: Path) -> None:
     assert parameters["load_inertia"].bench == "appendage.inertia"
     assert parameters["total_inertia"].bench == "axis.inertia"
     assert parameters["stiffness"].bench == ""
-    tables = {table.key: table for table in found.result.tables}
+    tables = {table.key: table for table in found.tables}
     assert "7 realisations of 2 periods" in str(tables["responses"].rows[0]["excitation"])
     assert set(tables) >= {"responses", "two-masses", "modes", "distortion", "functions"}
     # A linear drive has no distortion.
     for parity in ("even", "odd"):
         level = tables["distortion"].rows[0][parity]
         assert level.kind == "at most" or level.value < 0.005
-    keys = [figure.key for figure in found.result.figures]
+    keys = [figure.key for figure in found.figures]
     assert keys == ["bode-1-load", "distortion-1-load", "coherence", "residuals-1-load"]
-    assert all(figure.caption and figure.alt for figure in found.result.figures)
+    assert all(figure.caption and figure.alt for figure in found.figures)
 
 
 def rubbing(commands: Sequence[Signal], duration: float) -> Answer:
@@ -204,8 +198,8 @@ def test_friction_is_a_systematic_part_where_two_amplitudes_tell_it(tmp_path: Pa
     assert not total.estimate.has_interval
     assert total.bench == ""
     # Nor what friction shifts besides, by an amount that is not known.
-    assert not any(each.bench for each in one.parameters)
-    assert any("Repeat it at half the amplitude" in note for note in one.result.notes)
+    assert not any(each.bench for each in one.identified.parameters)
+    assert any("Repeat it at half the amplitude" in note for note in one.notes)
     all_of_them = [*weak, *strong]
     made = trials(tmp_path, all_of_them, "torque", 8.0)
     both = identified(tmp_path, made, rubbing(all_of_them, 8.0))
@@ -213,7 +207,7 @@ def test_friction_is_a_systematic_part_where_two_amplitudes_tell_it(tmp_path: Pa
     assert total.estimate.systematic_uncertainty > 0
     assert holds(total.estimate, DRIVE.motor + DRIVE.load)
     assert total.bench == "axis.inertia"
-    distortion = next(t for t in both.result.tables if t.key == "distortion").rows
+    distortion = next(t for t in both.tables if t.key == "distortion").rows
     # The stronger one comes first: it tells most.
     assert distortion[1]["odd"].value > 1.3 * distortion[0]["odd"].value
 
@@ -227,7 +221,7 @@ def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
     assert holds(parameters["resonance"].estimate, DRIVE.resonance)
     assert holds(parameters["total_inertia"].estimate, DRIVE.motor + DRIVE.load)
     assert parameters["load_inertia"].bench == ""
-    assert any("behind the spring" in note for note in found.result.notes)
+    assert any("behind the spring" in note for note in found.notes)
 
 
 def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> None:
@@ -240,10 +234,10 @@ def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> N
             assert each.estimate.reason in NEEDS_A_FIT
         else:
             assert each.estimate.reason in TOO_FEW
-    assert not any(each.bench for each in found.parameters)
-    assert any("7 are the fewest" in note for note in found.result.notes)
-    assert all("record 7 realisations" in each.advice for each in found.parameters)
-    assert "distortion" in {table.key for table in found.result.tables}
+    assert not any(each.bench for each in found.identified.parameters)
+    assert any("7 are the fewest" in note for note in found.notes)
+    assert all("record 7 realisations" in each.advice for each in found.identified.parameters)
+    assert "distortion" in {table.key for table in found.tables}
 
 
 def test_a_motor_sensor_that_nobody_can_use_is_told() -> None:
@@ -276,7 +270,7 @@ def test_one_realisation_tells_the_level_of_distortion_and_the_mode(tmp_path: Pa
         # Its lines are half a hertz apart, or more where one was left out.
         assert estimate.high - estimate.low >= 1.0
     assert parameters["stiffness"].estimate.reason in TOO_FEW
-    assert any("A mode stands out" in str(each.parts[0]) for each in found.result.conclusions)
+    assert any("A mode stands out" in str(each.parts[0]) for each in found.conclusions)
 
 
 def test_much_friction_leaves_no_mode_of_one_realisation(tmp_path: Path) -> None:
@@ -284,18 +278,18 @@ def test_much_friction_leaves_no_mode_of_one_realisation(tmp_path: Path) -> None
     command = multisines(1, 2.5)
     made = trials(tmp_path, command, "torque", 8.0)
     found = identified(tmp_path, made, rubbing(command, 8.0))
-    assert not any(each.estimate.has_interval for each in found.parameters)
+    assert not any(each.estimate.has_interval for each in found.identified.parameters)
     assert told(found)["resonance"].estimate.reason in UNKNOWN
-    rows = next(table for table in found.result.tables if table.key == "modes").rows
+    rows = next(table for table in found.tables if table.key == "modes").rows
     assert not any(row["frequency"].has_interval for row in rows)
 
 
 def test_of_a_single_period_no_mode_is_told(tmp_path: Path) -> None:
     """Nothing shows how far its lines scatter: the page says so, and what to record."""
     found = identified(tmp_path, trials(tmp_path, multisines(1), "torque", PERIOD), driven())
-    assert {each.estimate.origin for each in found.parameters} == {Origin.NOT_DETERMINED}
+    assert {each.estimate.origin for each in found.identified.parameters} == {Origin.NOT_DETERMINED}
     assert told(found)["resonance"].estimate.reason in NO_SCATTER
-    said = " ".join(str(each.parts[0]) for each in found.result.conclusions)
+    said = " ".join(str(each.parts[0]) for each in found.conclusions)
     assert "Not determined: resonance" in said
     assert "record 7 realisations" in said
 
@@ -321,14 +315,14 @@ def test_recordings_are_grouped_by_their_recorded_amplitude(
     """Whatever is stated of it: some of these are stated falsely."""
     made, _ = recorded_twice(tmp_path / "one", 4, conditions)
     found = identified(tmp_path / "one", made, driven(), without=(COMMAND,), excited="input")
-    rows = next(t for t in found.result.tables if t.key == "responses").rows
+    rows = next(t for t in found.tables if t.key == "responses").rows
     assert [row["trials"] for row in rows] == [4, 4]
     for row, rms in zip(rows, (5, 2.5), strict=True):
         assert f"rms {rms} N·m, crest" in str(row["excitation"])
         assert "4 realisations of 2 periods" in str(row["excitation"])
-    assert any("rms 5 N·m (4 trials), rms 2.5 N·m (4 trials)" in n for n in found.result.notes)
+    assert any("rms 5 N·m (4 trials), rms 2.5 N·m (4 trials)" in n for n in found.notes)
     # Neither has enough, and each number that is missing has its reason.
-    for each in found.parameters:
+    for each in found.identified.parameters:
         assert each.estimate.has_interval or each.estimate.reason
         assert "record 7 realisations" in each.advice
     assert told(found)["stiffness"].estimate.reason in TOO_FEW
@@ -361,7 +355,7 @@ def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:
     parameters = told(found)
     for name, truth in (("motor_inertia", DRIVE.motor), ("resonance", DRIVE.resonance)):
         assert holds(parameters[name].estimate, truth), name
-    margins = next(table for table in found.result.tables if table.key == "margins").rows[0]
+    margins = next(table for table in found.tables if table.key == "margins").rows[0]
     frequency = np.geomspace(0.5, 200.0, 20_000)
     s = 2j * np.pi * frequency
     loop = (60.0 + 100.0 / s) * DRIVE.response(frequency, "motor")
@@ -397,7 +391,7 @@ def test_recorded_elsewhere_it_must_be_said_what_is_excited(tmp_path: Path) -> N
     )
     parameters = told(found)
     assert parameters["resonance"].estimate.value == pytest.approx(DRIVE.resonance, rel=0.01)
-    assert "coherence" in [figure.key for figure in found.result.figures]
+    assert "coherence" in [figure.key for figure in found.figures]
 
 
 def test_angles_do_where_no_rate_is_recorded(tmp_path: Path) -> None:

@@ -21,13 +21,14 @@ from campaign.identify.frequency.axis_numbers import (
     by_rule,
     of_axis,
 )
-from campaign.identify.method import Identified, Material, Parameter
-from campaign.identify.methods.frequency_response import METHOD
+from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
 from campaign.reason import Reason
+from campaign.result import Result
 from tests.estimation.coverage import holds
 from tests.experiments.laboratory import Done, execute, trials
+from tests.identify.asked import asked
 
 AMPLITUDES = ("4.5 deg/s", "9 deg/s")
 
@@ -49,9 +50,9 @@ def shaken(amplitude: str) -> tuple[Done, ...]:
 
 
 @cache
-def identified(*amplitudes: str) -> Identified:
+def identified(*amplitudes: str) -> Result:
     done = [each for amplitude in amplitudes for each in shaken(amplitude)]
-    return METHOD.identify(Material(platform(), cast("Any", tuple(done))), METHOD.options())
+    return asked("frequency_response", done)
 
 
 def truths() -> Mapping[str, float]:
@@ -68,21 +69,19 @@ def truths() -> Mapping[str, float]:
     }
 
 
-def told(found: Identified) -> Mapping[str, Parameter]:
-    return {each.estimate.name: each for each in found.parameters}
+def told(found: Result) -> Mapping[str, Parameter]:
+    return {each.estimate.name: each for each in found.identified.parameters}
 
 
-def rows(found: Identified) -> Mapping[str, Mapping[str, Any]]:
+def rows(found: Result) -> Mapping[str, Mapping[str, Any]]:
     """Of the table of the two masses, by whose numbers they are."""
-    (table,) = [each for each in found.result.tables if each.key == "two-masses"]
+    (table,) = [each for each in found.tables if each.key == "two-masses"]
     return {str(row["of"]): row for row in table.rows}
 
 
-def words(found: Identified) -> str:
+def words(found: Result) -> str:
     return " ".join(
-        part if isinstance(part, str) else "#"
-        for each in found.result.conclusions
-        for part in each.parts
+        part if isinstance(part, str) else "#" for each in found.conclusions for part in each.parts
     )
 
 
@@ -103,7 +102,7 @@ def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
         assert not holds(whose["the response"][name], truths()[name])
         assert not whose["the axis"][name].has_interval
     assert "At this excitation the response is that of a drive" in words(found)
-    assert any("Repeat it at half the amplitude" in note for note in found.result.notes)
+    assert any("Repeat it at half the amplitude" in note for note in found.notes)
 
 
 @pytest.mark.slow

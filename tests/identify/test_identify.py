@@ -19,9 +19,9 @@ from campaign.estimate import Estimate, Systematic
 from campaign.identify import methods
 from campaign.identify.identification import Identification, _section, identify
 from campaign.identify.material import choose
-from campaign.identify.method import Parameter, Unseen
 from campaign.identify.page import _advice, write_identification
 from campaign.identify.tables import parameters_table
+from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.resources import templates_folder
@@ -62,14 +62,14 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
 ) -> None:
     """A narrow interval beside a doubt of unknown size is no interval that holds."""
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     first, *rest = section.identified.parameters
     doubt = Systematic("friction, at this excitation")
     doubted = replace(first, estimate=replace(first.estimate, systematic=(doubt,)))
     said = Conclusion(("It has an inertia of ", Amount(doubted.estimate), "."))
-    result = replace(section.identified.result, conclusions=(said,))
-    own = replace(section.identified, parameters=(doubted, *rest), result=result)
-    told = replace(found, sections=(replace(section, identified=own),))
+    own = replace(section.identified, parameters=(doubted, *rest))
+    result = replace(section.result, conclusions=(said,), identified=own)
+    told = replace(found, sections=(replace(section, result=result),))
     remark = "Of unknown size, and in no interval: friction, at this excitation."
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     assert remark in page.read_text(encoding="utf-8")
@@ -79,8 +79,8 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
 
 def test_unseen_motion_is_predicted(found: Identification) -> None:
     (section,) = found.sections
-    assert section.identified is not None
-    [table] = [t for t in section.identified.result.tables if t.key == "structures"]
+    assert section.result is not None
+    [table] = [t for t in section.result.tables if t.key == "structures"]
     assert all(0.0 < row["validation"].value < 0.5 for row in table.rows)  # type: ignore[union-attr]
 
 
@@ -309,9 +309,10 @@ def test_a_validation_that_the_model_does_not_predict_is_a_warning(
 ) -> None:
     """At the terminal, on the page and in the data, with its size."""
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     own = replace(section.identified, unseen=Unseen(share, "force"))
-    told = replace(found, sections=(replace(section, identified=own),))
+    result = replace(section.result, identified=own)
+    told = replace(found, sections=(replace(section, result=result),))
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     _say(told)
     text = f"validation residual (RMS): {100 * share:.2g} % of the measured force"
@@ -325,10 +326,10 @@ def test_a_validation_that_the_model_does_not_predict_is_a_warning(
 
 def test_methods_that_validate_tell_what_they_leave(found: Identification) -> None:
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     assert section.identified.unseen is not None
     assert section.identified.unseen.what == "force"  # of an axis that travels
-    [table] = [t for t in section.identified.result.tables if t.key == "structures"]
+    [table] = [t for t in section.result.tables if t.key == "structures"]
     left = [row["validation"].value for row in table.rows]  # type: ignore[union-attr]
     assert section.identified.unseen.share in left
-    assert section.warnings == ()
+    assert section.identified.warnings == ()

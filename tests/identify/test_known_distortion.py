@@ -194,10 +194,10 @@ def tables(results: Path) -> dict[str, dict[str, Table]]:
         chosen = choose(results, f"{run}:{name}")
         found = identify(chosen, methods(), models=("frequency_response",), settings=settings)
         (own,) = found.sections
-        assert own.identified is not None, own.problem
-        notes = " ".join(own.identified.result.notes)
+        assert own.result is not None, own.problem
+        notes = " ".join(own.result.notes)
         assert f"repeats every {PERIOD} s" in notes
-        told[name] = {each.key: each for each in own.identified.result.tables}
+        told[name] = {each.key: each for each in own.result.tables}
     return told
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
-
 import pytest
 
 from campaign.estimation.presliding import Presliding
 from campaign.experiments.breakaway import experiment as breakaway
 from campaign.experiments.interface import TrialData
-from campaign.identify.method import Material
-from campaign.identify.methods.ramps import METHOD, RampsOptions
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
+from campaign.result import Result
 from tests.experiments.laboratory import execute, trials
+from tests.identify.asked import asked, suitable
 from tests.physics.benches import RATIO, bench
 
 RAMPS = {
@@ -26,14 +24,13 @@ RAMPS = {
 }
 
 
-def material(on: Bench) -> Material:
-    done: Any = execute(trials("breakaway", on, RAMPS))
-    return Material(on, tuple(cast("Any", done)), (), lambda text: None)
+def identified(on: Bench) -> Result:
+    return asked("ramps", execute(trials("breakaway", on, RAMPS)))
 
 
 def test_the_strongest_interface_and_what_slips_before_it() -> None:
-    made = material(load_bench("platform"))
-    found = {e.estimate.name: e.estimate for e in METHOD.identify(made, RampsOptions()).parameters}
+    result = identified(load_bench("platform"))
+    found = {e.estimate.name: e.estimate for e in result.identified.parameters}
     assert found["strongest_stiffness"].value == pytest.approx(15284.0, rel=0.03)
     others = 2 * RATIO * 0.03143 + 2.99
     assert found["weaker_share"].value == pytest.approx(others / (20.84 + others), abs=0.02)
@@ -41,8 +38,8 @@ def test_the_strongest_interface_and_what_slips_before_it() -> None:
 
 
 def test_one_interface_alone_has_no_weaker_ones() -> None:
-    made = material(bench(lambda tree: tree["friction"].pop("motor")))
-    names = {e.estimate.name for e in METHOD.identify(made, RampsOptions()).parameters}
+    result = identified(bench(lambda tree: tree["friction"].pop("motor")))
+    names = {e.estimate.name for e in result.identified.parameters}
     assert "breakaway_torque" in names
     assert "weaker_share" not in names
 
@@ -56,12 +53,11 @@ def test_a_ramp_whose_numbers_overflow_costs_that_ramp(monkeypatch: pytest.Monke
         return whole(data, torque)
 
     monkeypatch.setattr(breakaway, "curve_of", curve_of)
-    made = material(bench(lambda tree: tree["friction"].pop("motor")))
-    result = METHOD.identify(made, RampsOptions()).result
+    result = identified(bench(lambda tree: tree["friction"].pop("motor")))
     assert [row["trial"] for row in result.tables[0].rows] == [1, 3]
     assert [note for note in result.notes if "(trial 2): OverflowError" in note]
 
 
 def test_trials_of_another_kind_do_not_do() -> None:
-    other: Any = execute(trials("stabilization", bench(), {"cycles": 1}))
-    assert METHOD.suits(other) == ([], "no trial of breakaway has drive_torque and gyro_rate")
+    other = execute(trials("stabilization", bench(), {"cycles": 1}))
+    assert suitable("ramps", other) == ([], "no trial of breakaway has drive_torque and gyro_rate")

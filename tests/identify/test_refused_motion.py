@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,17 +13,20 @@ from campaign.estimate import Origin
 from campaign.estimation import gate
 from campaign.estimation.inverse.motion import Filtering
 from campaign.identify.inverse.motions import moved
-from campaign.identify.method import Identified, Material
 from campaign.identify.methods import friction_map
-from campaign.identify.methods.inverse_dynamics import METHOD
 from campaign.identify.sliding import points_of, slower
+from campaign.parameter import Identified
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording
+from tests.identify.asked import asked
 
 RATE = 1000.0
 TIME = np.arange(20_000) / RATE
 NOISE = np.random.Generator(np.random.PCG64(5)).standard_normal((2, len(TIME)))
 SWING = 0.3 * np.sin(2.0 * np.pi * TIME) + 0.2 * np.sin(2.0 * np.pi * 0.37 * TIME)
+
+RIG = {"name": "rig", "axis": {"name": "tilt", "inertia": 1.0}}
+"""kg m^2"""
 
 
 def driven(angle: np.ndarray, torque: np.ndarray) -> Any:
@@ -39,16 +42,14 @@ def recorded(*made: Channel) -> Any:
     recording = Recording(TIME[: len(made[0].samples)], channels)
     task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
     return SimpleNamespace(
-        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}),
+        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}, bench=RIG),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
     )
 
 
 def identified(angle: np.ndarray, torque: np.ndarray) -> Identified:
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    trials = (driven(angle, torque),)
-    return METHOD.identify(Material(bench, cast("Any", trials), ()), METHOD.options())
+    return asked("inverse_dynamics", [driven(angle, torque)]).identified
 
 
 @pytest.mark.parametrize(
@@ -120,10 +121,9 @@ def strokes(speeds: tuple[float, ...]) -> Any:
 def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
     """One recording of strokes at several speeds: the slowest are below 3 % of the fastest."""
     trial = strokes((1.0, 0.5, 0.02, 0.01))
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt", "inertia": "1 kg m^2"}})
-    found, _ = points_of((trial,), bench, 0.5)
+    found, _ = points_of((trial,), Bench.model_validate(RIG, context={"si": True}), 0.5)
     assert sorted(point.speed for point in found) == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=0.01)
-    assert slower((trial,), bench, 0.5, found) == 4
+    assert slower((trial,), Bench.model_validate(RIG, context={"si": True}), 0.5, found) == 4
 
 
 def test_friction_that_falls_exponentially_with_heat_is_held_by_a_line_over_it() -> None:
@@ -137,8 +137,7 @@ def test_friction_that_falls_exponentially_with_heat_is_held_by_a_line_over_it()
         Channel(DRIVE_TORQUE, "N m", "torque", "N m", force),
         Channel(TEMPERATURE, "degC", "temperature", "degC", warm),
     )
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    found = METHOD.identify(Material(bench, cast("Any", (trial,)), ()), METHOD.options())
+    found = asked("inverse_dynamics", [trial]).identified
     told = {each.estimate.name: each.estimate for each in found.parameters}
     assert "coulomb_over_temperature" in told
     for way in ("positive", "negative"):
@@ -155,9 +154,7 @@ def test_trials_and_slow_strokes_that_are_not_in_a_map_are_reasons() -> None:
     trials = (strokes((1.0, 0.5, 0.02, 0.01)), strokes((0.0,)))
     for number, trial in enumerate(trials, 1):
         trial.trial.number = number
-    bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt", "inertia": "1 kg m^2"}})
-    options = friction_map.FrictionMapOptions(shortest="0.5 s")
-    found = friction_map.METHOD.identify(Material(bench, cast("Any", trials), ()), options)
+    found = asked("friction_map", trials, shortest="0.5 s").identified
     without, slow = found.left_out
     assert without in friction_map.NO_STRETCH
     assert dict(without.values) == {"count": 1, "total": 2, "numbers": "2"}

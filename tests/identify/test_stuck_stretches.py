@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.identify.method import Material
 from campaign.identify.methods import friction_map
 from campaign.identify.sliding import Point, Stretch
+from tests.identify.asked import asked
 from tests.physics.benches import bench
 
 STEP = 1e-3
@@ -21,7 +21,9 @@ TIME = np.arange(4000) * STEP
 class OneTrial:
     """What the parameters of a map ask a trial for."""
 
-    trial = SimpleNamespace(recording={"made": "elsewhere"}, bench={}, number=1)
+    trial = SimpleNamespace(
+        recording={"made": "elsewhere"}, bench=bench().model_dump(mode="json"), number=1
+    )
 
     @staticmethod
     def channel_names() -> frozenset[str]:
@@ -43,10 +45,7 @@ def stretch(speed: float, *, slips: bool) -> Point:
 
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
     monkeypatch.setattr(friction_map, "points_of", lambda *_: (points, None))
-    material = Material(bench(), cast(Any, (OneTrial(),)))
-    return friction_map.METHOD.identify(
-        material, friction_map.FrictionMapOptions(slowest="1 mrad/s")
-    )
+    return asked("friction_map", [OneTrial()], slowest="1 mrad/s")
 
 
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,10 +53,10 @@ def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     stuck = [stretch(speed, slips=True) for speed in (0.1, 0.15)]
     assert all(point.own.unsteady in STICK_SLIP for point in stuck)
     identification = identified(monkeypatch, [*stuck, *steady])
-    (left,) = identification.left_out
+    (left,) = identification.identified.left_out
     assert left in friction_map.UNSTEADY
     assert dict(left.values) == {"count": 2, "total": 6, "why": STICK_SLIP.code}
-    found = identification.result
+    found = identification
     (told,) = (f for f in found.findings if f.quantity == "coulomb_torque_positive")
     assert told.estimate.value == pytest.approx(5.0, abs=0.01)
     rows = found.tables[0].rows

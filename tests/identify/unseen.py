@@ -80,11 +80,11 @@ def identified(results: Path, method: str, *settings: str) -> Section:
 
 def told(section: Section) -> dict[str, Estimate]:
     """Its numbers by name."""
-    assert section.identified is not None, section.problem
+    assert section.result is not None, section.problem
     return {each.estimate.name: each.estimate for each in section.identified.parameters}
 
 
 def notes(section: Section) -> str:
     """What it says besides."""
-    assert section.identified is not None, section.problem
-    return " ".join(section.identified.result.notes)
+    assert section.result is not None, section.problem
+    return " ".join(section.result.notes)

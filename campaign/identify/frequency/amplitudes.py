@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.estimation.least_squares import Array
+from campaign.experiments.interface import TrialData
 from campaign.identify.frequency.signals import Signals
 from campaign.units import rate_here
 
@@ -17,7 +17,7 @@ SAME_SIZE = 1.1
 of one command have the same rms whatever their phases, and noise and a torque loop add a few
 percent; amplitudes that are to tell friction's part differ by a quarter or more."""
 
-Recorded = tuple[ArchivedTrial, Signals]
+Recorded = tuple[TrialData, Signals]
 
 
 def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import COMMAND, DRIVE_TORQUE
 from campaign.estimation.frequency.multisine import repetition
+from campaign.experiments.interface import TrialData
 from campaign.identify.frequency.signals import SENSORS, Excited
 from campaign.physics.bench import Bench
 
 
-def repeated(trial: ArchivedTrial, excited: Excited) -> float | None:
+def repeated(trial: TrialData, excited: Excited) -> float | None:
     """The period (s) of a recorded multisine; None where nothing repeats, and of planned trials."""
     if trial.trial.task.mode != "recorded":
         return None
@@ -34,7 +34,7 @@ def found_repeating(period: float) -> str:
     )
 
 
-def unused(trials: Sequence[ArchivedTrial], bench: Bench) -> Iterator[str]:
+def unused(trials: Sequence[TrialData], bench: Bench) -> Iterator[str]:
     """Of motor sensors that nobody can use, a sentence."""
     if bench.ratio is not None:
         return

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -20,6 +19,7 @@ from campaign.channels import (
 )
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array
+from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.trial import Recording
 
@@ -64,7 +64,7 @@ class Signals:
         return self.channels[side] in ANGLES
 
 
-def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     """Trials with a torque and a rate or angle that answers it."""
     moving = [
         each
@@ -78,7 +78,7 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     return (), "no trial has a drive torque and a rate or angle that answers it"
 
 
-def signals(trial: ArchivedTrial, bench: Bench, excited: Excited) -> Signals:
+def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
     """Of one trial. Raises ValueError where what is excited is not known."""
     task, recording = trial.trial.task, trial.recording()
     answers, channels = _answers(recording, bench)

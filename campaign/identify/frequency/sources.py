@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured import MeasuredResponse, open_from_closed
@@ -19,6 +18,7 @@ from campaign.estimation.frequency.welch import Excited as Excitation
 from campaign.estimation.frequency_response import Array, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
+from campaign.experiments.interface import TrialData
 from campaign.identify.frequency.amplitudes import Recorded, by_amplitude, size_of
 from campaign.identify.frequency.repeating import found_repeating, repeated, unused
 from campaign.identify.frequency.signals import (
@@ -90,10 +90,10 @@ class Reading:
 
 
 def sources(
-    trials: Sequence[ArchivedTrial], bench: Bench, how: Reading
+    trials: Sequence[TrialData], bench: Bench, how: Reading
 ) -> tuple[list[Source], list[str]]:
     """All that the trials hold, and sentences about those that hold none."""
-    groups: dict[tuple[str, ...], list[ArchivedTrial]] = {}
+    groups: dict[tuple[str, ...], list[TrialData]] = {}
     for trial in trials:
         groups.setdefault(_key(trial, how), []).append(trial)
     found, remarks = [], list(unused(trials, bench))
@@ -127,7 +127,7 @@ def sources(
     return found, remarks
 
 
-def _key(trial: ArchivedTrial, how: Reading) -> tuple[str, ...]:
+def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:
     """Trials of the same key are one measurement."""
     task, command = trial.trial.task, trial.trial.task.command
     own = {"frequency", "seed", "realisation", "realization"}
@@ -156,7 +156,7 @@ def _period(command: MultiSine, duration: float) -> float | None:
     return 1.0 / base if base > 0 and duration * base > 1.0 - 1e-6 else None
 
 
-def _label(group: Sequence[ArchivedTrial]) -> str:
+def _label(group: Sequence[TrialData]) -> str:
     first = group[0].trial
     told = [first.test]
     if first.task.mode != "recorded":
@@ -167,7 +167,7 @@ def _label(group: Sequence[ArchivedTrial]) -> str:
 
 
 def _all_signals(
-    group: Sequence[ArchivedTrial], bench: Bench, how: Reading
+    group: Sequence[TrialData], bench: Bench, how: Reading
 ) -> tuple[list[Recorded], list[str]]:
     found, remarks = [], []
     for trial in group:
@@ -230,7 +230,7 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
     return Source(name, "sines", excitation, numbers, responses, closed, remarks=tuple(remarks))
 
 
-def _steady(trial: ArchivedTrial, time: Array) -> slice:
+def _steady(trial: TrialData, time: Array) -> slice:
     """The window that is measured: the one named so, or the task's."""
     task = trial.trial.task
     named = [each for each in trial.trial.windows if each.name == STEADY]
@@ -292,7 +292,7 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     )
 
 
-def _named(best: BestLinear, trial: ArchivedTrial) -> str:
+def _named(best: BestLinear, trial: TrialData) -> str:
     """The excitation in words; of a loop what came into it, too."""
     torque = str(replace(best.excitation, unit="N·m"))
     command = trial.trial.task.command
@@ -321,13 +321,13 @@ def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
     return np.stack([part[cut] for part, cut in parts if part is not None])
 
 
-def _period_of(trial: ArchivedTrial, how: Reading) -> float:
+def _period_of(trial: TrialData, how: Reading) -> float:
     task = trial.trial.task
     found = _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
     return found or how.period or repeated(trial, how.excited) or task.duration
 
 
-def _lines(trial: ArchivedTrial, period: float, leading: Array, periods: int) -> Lines:
+def _lines(trial: TrialData, period: float, leading: Array, periods: int) -> Lines:
     """Excited lines: those of the command, or those that stand out of what leads.
 
     They stand out by the widest gap in size there is below the largest: what a drive distorts, or

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured import MeasuredResponse
 from campaign.estimation.frequency.output_error import (
@@ -19,6 +18,7 @@ from campaign.estimation.frequency.output_error import (
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.experiments.interface import TrialData
 from campaign.identify.frequency.frequency_fit import Band, FrequencyFit, Masses
 from campaign.identify.frequency.signals import Signals, signals, whole_stretches
 from campaign.identify.frequency.sources import Reading, Source, fitted_part, sources
@@ -130,8 +130,8 @@ def _masses(told: Masses, source: Source, band: Band) -> Iterator[Model]:
 
 
 def validated(
-    fitted: Sequence[ArchivedTrial],
-    unseen: Sequence[ArchivedTrial],
+    fitted: Sequence[TrialData],
+    unseen: Sequence[TrialData],
     bench: Bench,
     how: Reading,
     fits: Sequence[Model],
@@ -162,7 +162,7 @@ def validated(
     return Validation(tuple(found), own, tuple(dict.fromkeys(remarks)))
 
 
-def _same_course(fitted: Sequence[ArchivedTrial], unseen: Sequence[ArchivedTrial]) -> list[str]:
+def _same_course(fitted: Sequence[TrialData], unseen: Sequence[TrialData]) -> list[str]:
     """That what distorts repeats itself with a multisine, so that only noise is new."""
     own = {str(each.trial.task.command) for each in fitted if _is_multisine(each)}
     again = [each for each in unseen if _is_multisine(each) and str(each.trial.task.command) in own]
@@ -176,7 +176,7 @@ def _same_course(fitted: Sequence[ArchivedTrial], unseen: Sequence[ArchivedTrial
     return [told]
 
 
-def _is_multisine(trial: ArchivedTrial) -> bool:
+def _is_multisine(trial: TrialData) -> bool:
     return isinstance(trial.trial.task.command, MultiSine)
 
 
@@ -209,7 +209,7 @@ def _predicted(
     source: Source,
     model: Model,
     measured: MeasuredResponse,
-    unseen: Sequence[ArchivedTrial],
+    unseen: Sequence[TrialData],
     bench: Bench,
     how: Reading,
 ) -> Prediction | None:
@@ -230,7 +230,7 @@ def _predicted(
 
 
 def _own(
-    fitted: Sequence[ArchivedTrial], bench: Bench, how: Reading, fits: Sequence[Model]
+    fitted: Sequence[TrialData], bench: Bench, how: Reading, fits: Sequence[Model]
 ) -> Iterator[tuple[Model, Estimate]]:
     for model in fits:
         trials = [each for each in fitted if each.trial.number in model.source.trials]
@@ -240,7 +240,7 @@ def _own(
 
 
 def _simulated(
-    trials: Sequence[ArchivedTrial], bench: Bench, how: Reading, model: Model
+    trials: Sequence[TrialData], bench: Bench, how: Reading, model: Model
 ) -> list[Simulated]:
     """What the recorded torque makes of the model, beside what was recorded; whatever is too short
     is left out.

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -27,6 +26,7 @@ from campaign.estimation.inverse.motion import (
     whole_pieces,
     zero_phase,
 )
+from campaign.experiments.interface import TrialData
 from campaign.trial import Recording
 
 SLOWEST = 0.02
@@ -66,9 +66,9 @@ class Moved:
         return replace(self, motion=self.motion.part(which), wanted=wanted)
 
 
-def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     """Trials with a force and a motion, or why there are none; too many are cut."""
-    found: list[ArchivedTrial] = []
+    found: list[TrialData] = []
     samples = 0
     for each in trials:
         names = each.channel_names()
@@ -84,7 +84,7 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     return found, ""
 
 
-def moved(trials: Sequence[ArchivedTrial], filtering: Filtering) -> tuple[Moved, ...]:
+def moved(trials: Sequence[TrialData], filtering: Filtering) -> tuple[Moved, ...]:
     """All pieces of all trials without a lost sample. Raises ValueError without any."""
     found = tuple(piece for each in trials for piece in _pieces(each, filtering))
     if not found:
@@ -105,7 +105,7 @@ def moved(trials: Sequence[ArchivedTrial], filtering: Filtering) -> tuple[Moved,
     return found
 
 
-def force_of(trial: ArchivedTrial) -> str:
+def force_of(trial: TrialData) -> str:
     """The channel that is taken for what moves the axis."""
     names = trial.channel_names()
     return next((name for name in FORCES if name in names), DRIVE_TORQUE)
@@ -144,7 +144,7 @@ def with_slowest(filtering: Filtering, pieces: Sequence[Moved], slowest: float |
     return replace(filtering, slowest=slowest)
 
 
-def _pieces(archived: ArchivedTrial, filtering: Filtering) -> Iterator[Moved]:
+def _pieces(archived: TrialData, filtering: Filtering) -> Iterator[Moved]:
     recording = archived.recording()
     force = force_of(archived)
     sources = _sources(recording, force)

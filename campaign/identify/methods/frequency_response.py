@@ -13,7 +13,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.one_inertia import RIGID
@@ -21,6 +20,7 @@ from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.gate import admitted, admitted_together
 from campaign.estimation.intervals import MODEL_MISFIT
+from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.identify.frequency.axis_numbers import by_rule, odd_distortion
 from campaign.identify.frequency.distortion_tables import distortion_tables
 from campaign.identify.frequency.figures import figures
@@ -50,8 +50,8 @@ from campaign.identify.frequency.validation_shown import (
     validation_figures,
     validation_tables,
 )
-from campaign.identify.method import Identified, Material, Method, Parameter, Unseen
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.units import Frequency, Time
@@ -109,25 +109,26 @@ class FrequencyResponseOptions(Options):
     """Where the load's sensor is: on the inertia that the torque drives, or behind the spring."""
 
 
-def _identify(material: Material, options: FrequencyResponseOptions) -> Identified:
+def _analyse(data: TestData) -> Result:
+    options: FrequencyResponseOptions = data.model
     how = Reading(options.excited, options.estimator, options.resolution, options.period)
-    measured, remarks = sources(material.trials, material.bench, how)
+    measured, remarks = sources(data.trials, data.bench, how)
     if not measured:
         raise ValueError(" ".join(dict.fromkeys(remarks)) or "no trial gives a response")
     band = Band(options.lowest, options.highest, options.order)
     found = [found_in(each, band) for each in measured]
     best = best_source(found)
     found.sort(key=lambda each: (each is not best, -each.source.rms))  # what tells most comes first
-    torque = _torque_uncertainty(material.bench)
-    told = masses(best, material.bench, options.place, band, torque, found)
+    torque = _torque_uncertainty(data.bench)
+    told = masses(best, data.bench, options.place, band, torque, found)
     parameters = tuple(_parameters(told, best or found[0]))
     fits = tuple(models(found, told, band))
-    unseen: Sequence[ArchivedTrial] = ()
-    if material.validation:
-        unseen, why = usable(material.validation)
+    unseen: Sequence[TrialData] = ()
+    if data.validation:
+        unseen, why = usable(data.validation)
         if why:
             raise ValueError(f"of the validation {why}")
-    validation = validated(material.trials, unseen, material.bench, how, fits)
+    validation = validated(data.trials, unseen, data.bench, how, fits)
     tables = (
         sources_table(found),
         masses_table(told),
@@ -138,25 +139,25 @@ def _identify(material: Material, options: FrequencyResponseOptions) -> Identifi
         fits_table(found, told),
         *validation_tables(validation),
     )
-    return Identified(
-        parameters,
-        Result(
-            tables=tuple(each for each in tables if each is not None and each.rows),
-            figures=(
-                *validation_figures(validation),
-                *figures(found, told),
-                *residual_figures(found, fits),
-            ),
-            findings=tuple(_findings(found, parameters)),
-            notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
-            conclusions=(
-                *_conclusions(best or found[0], told),
-                *_undetermined(parameters),
-                *validation_conclusions(validation),
-            ),
+    return Result(
+        tables=tuple(each for each in tables if each is not None and each.rows),
+        figures=(
+            *validation_figures(validation),
+            *figures(found, told),
+            *residual_figures(found, fits),
         ),
-        correlations=_correlations(told, parameters),
-        unseen=_unseen(validation),
+        findings=tuple(_findings(found, parameters)),
+        notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
+        conclusions=(
+            *_conclusions(best or found[0], told),
+            *_undetermined(parameters),
+            *validation_conclusions(validation),
+        ),
+        identified=Identified(
+            parameters,
+            correlations=_correlations(told, parameters),
+            unseen=_unseen(validation),
+        ),
     )
 
 
@@ -340,10 +341,10 @@ def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
         yield Conclusion((told,))
 
 
-METHOD = Method(
+METHOD = Model(
     name="frequency_response",
     summary="Response of torque to rate: modes, margins, distortion, two masses on a spring",
     options=FrequencyResponseOptions,
     suits=usable,
-    identify=_identify,
+    analyse=_analyse,
 )

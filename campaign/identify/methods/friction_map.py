@@ -15,18 +15,17 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, NORMAL_LOAD, RELATIVE_RATE
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted_together, mattering
 from campaign.estimation.over_a_turn import OverATurn
 from campaign.estimation.steady_stretches import SHORTEST_TIME
 from campaign.estimation.stribeck import stribeck
+from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.experiments.shared.conclusion_parts import count
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identify.directions import with_offset
-from campaign.identify.method import Identified, Material, Method, Parameter, is_value
 from campaign.identify.sliding import (
     DIRECTIONS,
     Point,
@@ -47,6 +46,7 @@ from campaign.identify.sliding_map import (
     with_doubts,
 )
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter, is_value
 from campaign.reason import Cause, Reason
 from campaign.result import (
     Amount,
@@ -103,7 +103,7 @@ class FrictionMapOptions(Options):
     A sweep over decades of speed in one trial needs less."""
 
 
-def _suits(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+def _suits(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     found = []
     for each in trials:
         names = each.channel_names()
@@ -113,11 +113,12 @@ def _suits(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     return found, "" if found else why
 
 
-def _identify(material: Material, options: FrictionMapOptions) -> Identified:
-    found, held = points_of(material.trials, material.bench, options.shortest, options.slowest)
+def _analyse(data: TestData) -> Result:
+    options: FrictionMapOptions = data.model
+    found, held = points_of(data.trials, data.bench, options.shortest, options.slowest)
     points = [point for point in found if not point.own.unsteady]
     left = [point for point in found if point.own.unsteady]
-    lost = tuple(_left_out(material, options, found))
+    lost = tuple(_left_out(data, options, found))
     if not points:
         raise ValueError("; ".join(["nowhere does the axis slide steadily", *map(str, lost)]))
     notes = [] if held is None else [_over_a_turn(held)]
@@ -138,35 +139,35 @@ def _identify(material: Material, options: FrictionMapOptions) -> Identified:
             "or that of the motion, has the other sign, as of a sensor on the part that rests. "
             "In the mapping `sign = -1` turns it round."
         )
-    parameters = tuple(each for one in maps for each in _parameters(one, maps[0], points, material))
-    return Identified(
-        parameters,
-        Result(
-            tables=(_points_table(points, left),),
-            figures=tuple(_figure(points, each) for each in maps),
-            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=tuple(dict.fromkeys(notes)),
-            conclusions=tuple(_conclusions(parameters)),
+    parameters = tuple(each for one in maps for each in _parameters(one, maps[0], points, data))
+    return Result(
+        tables=(_points_table(points, left),),
+        figures=tuple(_figure(points, each) for each in maps),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=tuple(dict.fromkeys(notes)),
+        conclusions=tuple(_conclusions(parameters)),
+        identified=Identified(
+            parameters,
+            settings=_settings(maps[0].found, parameters) if maps[0].quantity is FRICTION else {},
+            left_out=lost,
         ),
-        settings=_settings(maps[0].found, parameters) if maps[0].quantity is FRICTION else {},
-        left_out=lost,
     )
 
 
 def _left_out(
-    material: Material, options: FrictionMapOptions, found: Sequence[Point]
+    data: TestData, options: FrictionMapOptions, found: Sequence[Point]
 ) -> Iterator[Reason]:
     """Trials and stretches that are not in the map, by reason."""
     used = {point.trial for point in found}
-    without = [each.trial.number for each in material.trials if each.trial.number not in used]
+    without = [each.trial.number for each in data.trials if each.trial.number not in used]
     if without:
         numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
-        yield NO_STRETCH(count=len(without), total=len(material.trials), numbers=numbers)
+        yield NO_STRETCH(count=len(without), total=len(data.trials), numbers=numbers)
     unsteady = Counter(point.own.unsteady.code for point in found if point.own.unsteady)
     for code, stretches in unsteady.items():
         yield UNSTEADY(count=stretches, total=len(found), why=code)
     if options.slowest is None:
-        still = slower(material.trials, material.bench, options.shortest, found)
+        still = slower(data.trials, data.bench, options.shortest, found)
         if still:
             yield TOO_SLOW(count=still)
 
@@ -185,7 +186,7 @@ def _over_a_turn(held: OverATurn) -> str:
 
 
 def _parameters(
-    mapped: Mapped, first: Mapped, points: Sequence[Point], material: Material
+    mapped: Mapped, first: Mapped, points: Sequence[Point], data: TestData
 ) -> Iterator[Parameter]:
     quantity = mapped.quantity
     names = {}
@@ -199,7 +200,7 @@ def _parameters(
                 named = f"friction_coefficient_{direction}"
             names[named] = name, direction
             one = replace(estimate, name=named, unit=quantity.meanings[name][0])
-            found[named] = _scaled(one, quantity, material)
+            found[named] = _scaled(one, quantity, data)
     largest = max(abs(quantity.read(point).value) for point in points)
     fastest = max(point.speed for point in points)
     matters = {
@@ -220,14 +221,14 @@ def _parameters(
         yield Parameter(told[named], meaning, "", key, ADVICE[name])
 
 
-def _scaled(one: Estimate, quantity: Quantity, material: Material) -> Estimate:
+def _scaled(one: Estimate, quantity: Quantity, data: TestData) -> Estimate:
     if one.origin is not Origin.MEASURED or one.name.startswith("stribeck"):
         return one
-    data = material.trials[0]
-    if material.bench.motor is not None and not data.trial.recording:
-        one = with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
-    one = with_scale(one, data, force_of(data))
-    return with_scale(one, data, NORMAL_LOAD) if quantity is COEFFICIENT else one
+    first = data.trials[0]
+    if data.bench.motor is not None and not first.trial.recording:
+        one = with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
+    one = with_scale(one, first, force_of(first))
+    return with_scale(one, first, NORMAL_LOAD) if quantity is COEFFICIENT else one
 
 
 def _settings(
@@ -326,10 +327,10 @@ def _conclusions(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
             yield Conclusion((*parts, "."))
 
 
-METHOD = Method(
+METHOD = Model(
     name="friction_map",
     summary="friction over rate, from steady stretches of any recording",
     options=FrictionMapOptions,
     suits=_suits,
-    identify=_identify,
+    analyse=_analyse,
 )

@@ -18,6 +18,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted_together, refused
 from campaign.estimation.inverse.motion import Filtering
 from campaign.estimation.inverse.terms import TERMS
+from campaign.experiments.interface import Model, TestData
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identify.directions import with_offset
@@ -31,16 +32,9 @@ from campaign.identify.inverse.tables import (
     instruments_table,
     structures_table,
 )
-from campaign.identify.method import (
-    Identified,
-    Material,
-    Method,
-    Parameter,
-    Unseen,
-    is_value,
-)
 from campaign.identify.tables import words
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen, is_value
 from campaign.reason import Cause
 from campaign.result import Amount, Conclusion, Finding, Result, Table
 from campaign.units import AngularRate, Frequency, Time
@@ -93,25 +87,26 @@ class InverseDynamicsOptions(Options):
     """Names of the model's terms; absent: they are chosen."""
 
 
-def _identify(material: Material, options: InverseDynamicsOptions) -> Identified:
+def _analyse(data: TestData) -> Result:
+    options: InverseDynamicsOptions = data.model
     terms = None
     if options.terms:
         unknown = [name for name in options.terms if name not in TERMS]
         if unknown:
             raise UsageError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
         terms = [TERMS[name] for name in options.terms]
-    rate = material.trials[0].trial.task.sample_rate
+    rate = data.trials[0].trial.task.sample_rate
     plain = Filtering.for_rate(rate)
     filtering = Filtering(
         options.low_pass or plain.low_pass,
         options.decimation or plain.decimation,
         round(options.skip * rate),
     )
-    material.say("step 1 of 4, the motion")
-    pieces = moved(material.trials, filtering)
+    data.say("step 1 of 4, the motion")
+    pieces = moved(data.trials, filtering)
     unseen: tuple[Moved, ...] = ()
-    if material.validation:
-        trials, why = usable(material.validation)
+    if data.validation:
+        trials, why = usable(data.validation)
         if why:
             raise ValueError(f"of the validation {why}")
         unseen = moved(trials, filtering)
@@ -122,35 +117,37 @@ def _identify(material: Material, options: InverseDynamicsOptions) -> Identified
         filtering,
         delay=options.delay,
         terms=terms,
-        linear=material.bench.is_linear,
-        say=material.say,
+        linear=data.bench.is_linear,
+        say=data.say,
     )
-    parameters = tuple(_parameters(found, material))
-    return Identified(
-        parameters,
-        Result(
-            tables=tuple(_tables(found)),
-            figures=tuple(figures(found)),
-            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=tuple(_notes(found, material)),
-            conclusions=tuple(_conclusions(found, parameters)),
+    parameters = tuple(_parameters(found, data))
+    return Result(
+        tables=tuple(_tables(found)),
+        figures=tuple(figures(found)),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=tuple(_notes(found, data)),
+        conclusions=tuple(_conclusions(found, parameters)),
+        identified=Identified(
+            parameters,
+            correlations=_correlations(found),
+            settings=_settings(parameters, data),
+            # A ripple has a period that was found; another recording may not show it.
+            again={"terms": tuple(name for name in found.best.structure.names if name in TERMS)},
+            unseen=Unseen(found.best.validation.value)
+            if found.best.validation is not None
+            else None,
         ),
-        correlations=_correlations(found),
-        settings=_settings(parameters, material),
-        # A ripple has a period that was found; another recording may not show it.
-        again={"terms": tuple(name for name in found.best.structure.names if name in TERMS)},
-        unseen=Unseen(found.best.validation.value) if found.best.validation is not None else None,
     )
 
 
-def _parameters(found: InverseDynamics, material: Material) -> Iterator[Parameter]:
+def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
     fit = found.fit
     together = {
         name: (other, share)
         for one, two, share in correlated(fit, found.best.structure.terms)
         for name, other in ((one, two), (two, one))
     }
-    scaled = {name: _scaled(one, material) for name, one in found.estimates.items()}
+    scaled = {name: _scaled(one, data) for name, one in found.estimates.items()}
     told = with_offset(_with_base(admitted_together(scaled, found.matters)), "coulomb")
     dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
     slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
@@ -204,23 +201,23 @@ def _is_plain(found: InverseDynamics) -> bool:
     return {term.name for term in found.best.structure.terms} <= PLAIN
 
 
-def _scaled(one: Estimate, material: Material) -> Estimate:
+def _scaled(one: Estimate, data: TestData) -> Estimate:
     """With what a wrong constant of the force would do to it."""
     if one.origin is Origin.NOT_DETERMINED:
         return one
-    data = material.trials[0]
-    return with_scale(_with_constant(one, material), data, force_of(data))
+    first = data.trials[0]
+    return with_scale(_with_constant(one, data), first, force_of(first))
 
 
-def _with_constant(one: Estimate, material: Material) -> Estimate:
-    if material.bench.motor is None or _from_elsewhere(material):
+def _with_constant(one: Estimate, data: TestData) -> Estimate:
+    if data.bench.motor is None or _from_elsewhere(data):
         return one
-    return with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
+    return with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
 
 
-def _from_elsewhere(material: Material) -> bool:
+def _from_elsewhere(data: TestData) -> bool:
     """Whether a mapping says what the columns are worth, and so how sure that is."""
-    return bool(material.trials[0].trial.recording)
+    return bool(data.trials[0].trial.recording)
 
 
 def _tables(found: InverseDynamics) -> Iterator[Table]:
@@ -234,7 +231,7 @@ def _tables(found: InverseDynamics) -> Iterator[Table]:
         yield instruments_table(found, found.instruments)
 
 
-def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
+def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
     filtering = found.filtering
     yield (
         f"Position low-passed at {filtering.low_pass:g} Hz without phase, differentiated twice; "
@@ -263,7 +260,7 @@ def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
             "what is called Coulomb friction holds every constant force as well, such as a weight "
             "or a sensor's zero. Friction goes to no bench file."
         )
-    if (force := force_of(material.trials[0])) != DRIVE_TORQUE:
+    if (force := force_of(data.trials[0])) != DRIVE_TORQUE:
         yield (
             f"The force is {force}, measured at the load: what motor and gear need themselves, "
             "their inertia and friction, is not in it."
@@ -279,8 +276,8 @@ def _notes(found: InverseDynamics, material: Material) -> Iterator[str]:
             "rates of this motion only; a bench file has no place for it, and gets the inertia. "
             "`--model whole_model` fits the friction models that it has a place for."
         )
-    if len(material.trials) > 1:
-        yield f"{len(material.trials)} trials were fitted together."
+    if len(data.trials) > 1:
+        yield f"{len(data.trials)} trials were fitted together."
 
 
 def _conclusions(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Conclusion]:
@@ -315,10 +312,10 @@ def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
 
 
 def _settings(
-    parameters: Sequence[Parameter], material: Material
+    parameters: Sequence[Parameter], data: TestData
 ) -> dict[str, tuple[object, str, str]]:
     """What a bench's friction needs besides: no Stribeck part was looked for, so it has none."""
-    if "load" in material.bench.friction:
+    if "load" in data.bench.friction:
         return {}
     by_name = {each.estimate.name: each for each in parameters}
     coulomb = by_name.get("coulomb", by_name.get("coulomb_positive"))
@@ -335,10 +332,10 @@ def _settings(
     return told
 
 
-METHOD = Method(
+METHOD = Model(
     name="inverse_dynamics",
     summary="inertia and friction of any motion, by regression of the force",
     options=InverseDynamicsOptions,
     suits=usable,
-    identify=_identify,
+    analyse=_analyse,
 )

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
 from campaign.estimation.gate import admitted
@@ -26,6 +25,7 @@ from campaign.estimation.presliding_dynamics.presliding_fit import (
     identify_presliding_dynamics,
 )
 from campaign.estimation.presliding_dynamics.record import Record
+from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.experiments.presliding_multisine.dynamics import (
     BY_TORQUE,
     assumed_of,
@@ -37,7 +37,6 @@ from campaign.experiments.presliding_multisine.dynamics import (
     with_torques_known,
 )
 from campaign.experiments.shared.imported_scale import with_scale
-from campaign.identify.method import Identified, Material, Method, Parameter, Unseen
 from campaign.identify.presliding.small_motions import (
     is_planned,
     small_motion,
@@ -45,6 +44,7 @@ from campaign.identify.presliding.small_motions import (
     usable,
 )
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Amount, Column, Conclusion, Finding, Result, Table
@@ -88,41 +88,42 @@ class PreslidingOptions(Options):
     """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
 
 
-def _identify(material: Material, options: PreslidingOptions) -> Identified:
-    records = [small_motion(each) for each in material.trials]
-    records = with_torques_known(material.trials, records)
-    unseen = _unseen(material.validation)
+def _analyse(data: TestData) -> Result:
+    options: PreslidingOptions = data.model
+    records = [small_motion(each) for each in data.trials]
+    records = with_torques_known(data.trials, records)
+    unseen = _unseen(data.validation)
     found = identify_presliding_dynamics(
-        records, assumed_of(material.bench, _span(material.trials, records))
+        records, assumed_of(data.bench, _span(data.trials, records))
     )
-    told = estimates_of(found, material.bench)
+    told = estimates_of(found, data.bench)
     for name in BY_TORQUE:
         if name in told and told[name].has_interval:
-            told[name] = with_scale(told[name], material.trials[0], DRIVE_TORQUE)
-    told |= _bristle_damping(told, material.bench, options)
+            told[name] = with_scale(told[name], data.trials[0], DRIVE_TORQUE)
+    told |= _bristle_damping(told, data.bench, options)
     missed = [unexplained(found.fit, each) for each in unseen]
-    planned = all(map(is_planned, material.trials))
-    parameters = tuple(_parameters(told, material.bench, planned or _gives_way(found)))
-    shown = tuple(each.trial.number for each in material.trials)
+    planned = all(map(is_planned, data.trials))
+    parameters = tuple(_parameters(told, data.bench, planned or _gives_way(found)))
+    shown = tuple(each.trial.number for each in data.trials)
     figures = list(figures_of(found, "", shown))
     if "damping_at_rest" in told and told["damping_at_rest"].has_interval:
         sizes = np.array([record.amplitude for record in found.fit.records])
         figures.append(damping_figure(sizes, [], told, options.damping_ratio, "", shown))
-    return Identified(
-        parameters,
-        Result(
-            tables=tuple(_tables(found, told, unseen, missed)),
-            figures=tuple(figures),
-            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=(*remarks(found), *_notes(material.bench, found, planned)),
-            conclusions=tuple(_conclusions(told)),
+    return Result(
+        tables=tuple(_tables(found, told, unseen, missed)),
+        figures=tuple(figures),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=(*remarks(found), *_notes(data.bench, found, planned)),
+        conclusions=tuple(_conclusions(told)),
+        identified=Identified(
+            parameters,
+            correlations=_correlations(found),
+            unseen=Unseen(max(missed), "motion") if missed else None,
         ),
-        correlations=_correlations(found),
-        unseen=Unseen(max(missed), "motion") if missed else None,
     )
 
 
-def _unseen(trials: Sequence[ArchivedTrial]) -> list[Record]:
+def _unseen(trials: Sequence[TrialData]) -> list[Record]:
     """Of a validation, what stays below breakaway. Raises ValueError where nothing does."""
     if not trials:
         return []
@@ -132,7 +133,7 @@ def _unseen(trials: Sequence[ArchivedTrial]) -> list[Record]:
     return with_torques_known(chosen, [small_motion(each) for each in chosen])
 
 
-def _span(trials: Sequence[ArchivedTrial], records: Sequence[Record]) -> tuple[float, float]:
+def _span(trials: Sequence[TrialData], records: Sequence[Record]) -> tuple[float, float]:
     """Lowest and highest frequency of all trials (Hz)."""
     spans = [span_of(*each) for each in zip(trials, records, strict=True)]
     return min(low for low, _ in spans), max(high for _, high in spans)
@@ -282,10 +283,10 @@ def _correlations(found: PreslidingDynamics) -> dict[tuple[str, str], float]:
     return {(own[i], own[j]): float(matrix[i, j]) for i in range(len(own)) for j in range(i)}
 
 
-METHOD = Method(
+METHOD = Model(
     name="presliding",
     summary="stiffness, damping and inertia from small motions below breakaway",
     options=PreslidingOptions,
     suits=usable,
-    identify=_identify,
+    analyse=_analyse,
 )

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
@@ -19,10 +18,10 @@ from campaign.estimation.intervals import of_repeats
 from campaign.experiments.breakaway.experiment import EXPERIMENT as RAMP
 from campaign.experiments.breakaway.experiment import curve_of
 from campaign.experiments.breakaway.means import mean
-from campaign.experiments.interface import measured, metrics
+from campaign.experiments.interface import Model, TestData, TrialData, measured, metrics
 from campaign.experiments.preparing.unusable import not_measured, notes_on
-from campaign.identify.method import Identified, Material, Method, Parameter
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter
 from campaign.reason import Cause
 from campaign.result import Amount, Cell, Column, Conclusion, Finding, RecordingDoubt, Result, Table
 
@@ -48,7 +47,7 @@ class RampsOptions(Options):
     """Ramps have no options of their own: those of their trials say it all."""
 
 
-def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     """Trials of `breakaway` with torque and rate, or why there are none."""
     needed = {DRIVE_TORQUE, GYRO_RATE}
     found = [t for t in trials if t.trial.kind == RAMP.name and needed <= t.channel_names()]
@@ -56,12 +55,12 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     return found, "" if found else why
 
 
-def _identify(material: Material, options: RampsOptions) -> Identified:
+def _analyse(data: TestData) -> Result:
     found: dict[str, list[Estimate]] = {name: [] for name in OF_A_RAMP}
     shares: list[float] = []
     doubts: list[RecordingDoubt] = []
     rows: list[dict[str, Cell]] = []
-    for trial in material.trials:
+    for trial in data.trials:
         try:
             own = metrics(trial, partial(measured, RAMP))
             share = _weaker_share(trial, own)
@@ -75,22 +74,22 @@ def _identify(material: Material, options: RampsOptions) -> Identified:
         shares += [] if share is None else [share]
         shown = {name: own.get(metric) for name, metric in OF_A_RAMP.items()}
         rows.append({"trial": trial.trial.number, **shown, WEAKER: share})
-    notes = list(notes_on(doubts, len(material.trials)))
+    notes = list(notes_on(doubts, len(data.trials)))
     if not found[BREAKAWAY]:
         raise ValueError("; ".join(note.rstrip(".") for note in notes) or "no ramp shows breakaway")
     told = tuple(_parameters(found, shares, notes))
-    return Identified(
-        told,
-        Result(
-            tables=(_table(rows),),
-            findings=tuple(Finding.of(each.estimate, {}) for each in told),
-            notes=tuple(notes),
-            conclusions=tuple(_conclusions({e.estimate.name: e.estimate for e in told})),
+    return Result(
+        tables=(_table(rows),),
+        findings=tuple(Finding.of(each.estimate, {}) for each in told),
+        notes=tuple(notes),
+        conclusions=tuple(_conclusions({e.estimate.name: e.estimate for e in told})),
+        identified=Identified(
+            told,
         ),
     )
 
 
-def _weaker_share(trial: ArchivedTrial, own: dict[str, Estimate]) -> float | None:
+def _weaker_share(trial: TrialData, own: dict[str, Estimate]) -> float | None:
     """Share of the torque that a ramp's weaker interfaces carry: 0 where it shows only one."""
     if OF_A_RAMP[STRONGEST] not in own:
         return None
@@ -144,10 +143,10 @@ def _conclusions(told: dict[str, Estimate]) -> Iterator[Conclusion]:
         )
 
 
-METHOD = Method(
+METHOD = Model(
     name="ramps",
     summary="stiffness of the interface that slips last, and what the others carry, from ramps",
     options=RampsOptions,
     suits=usable,
-    identify=_identify,
+    analyse=_analyse,
 )

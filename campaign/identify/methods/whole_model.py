@@ -15,17 +15,18 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.inverse.motion import Filtering
 from campaign.estimation.inverse.terms import Term
+from campaign.experiments.interface import Model, TestData
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.identify.inverse.inverse_fit import InverseDynamics
 from campaign.identify.inverse.inverse_fit import find as find_inverse
 from campaign.identify.inverse.motions import Moved, force_of, moved, usable, with_slowest
-from campaign.identify.method import Identified, Material, Method, Parameter, Unseen
 from campaign.identify.tables import words
 from campaign.identify.whole.parts import telling_parts
 from campaign.identify.whole.shown import figures, models_table, values_table
 from campaign.identify.whole.whole_model_fit import Fit, find, product
 from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen
 from campaign.reason import Cause, Reason
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.units import Frequency, Time
@@ -79,19 +80,20 @@ class WholeModelOptions(Options):
     """Name of the model whose numbers are told; absent: the one that does best."""
 
 
-def _identify(material: Material, options: WholeModelOptions) -> Identified:
-    rate = material.trials[0].trial.task.sample_rate
+def _analyse(data: TestData) -> Result:
+    options: WholeModelOptions = data.model
+    rate = data.trials[0].trial.task.sample_rate
     plain = Filtering.for_rate(rate)
     filtering = Filtering(
         options.low_pass or plain.low_pass,
         options.decimation or plain.decimation,
         round(options.skip * rate),
     )
-    material.say("the motion")
-    whole = moved(material.trials, filtering)
+    data.say("the motion")
+    whole = moved(data.trials, filtering)
     unseen: tuple[Moved, ...] = ()
-    if material.validation:
-        trials, why = usable(material.validation)
+    if data.validation:
+        trials, why = usable(data.validation)
         if why:
             raise ValueError(f"of the validation {why}")
         unseen = moved(trials, filtering)
@@ -101,32 +103,32 @@ def _identify(material: Material, options: WholeModelOptions) -> Identified:
         unseen = tuple(each.part(slice(moves.skip, None)) for each in unseen)
         moves = replace(moves, skip=0)
     filtering = replace(moves, slowest=STILL * moves.slowest)
-    regression = find_inverse(pieces, unseen, moves, linear=material.bench.is_linear)
+    regression = find_inverse(pieces, unseen, moves, linear=data.bench.is_linear)
     extra = _linear_terms(regression)
     held = regression.instruments
     known = held.delay if held is not None and held.of_wanted else None
-    found = find(pieces, unseen, filtering, extra, options.starts, material.say, known=known)
+    found = find(pieces, unseen, filtering, extra, options.starts, data.say, known=known)
     names = [each.model.name for each in found.fits]
     if options.model and options.model not in names:
         raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
     if options.model:
         found = replace(found, best=names.index(options.model))
     best = found.fits[found.best]
-    parameters = tuple(_parameters(best, material))
-    return Identified(
-        parameters,
-        Result(
-            tables=(models_table(found), *(values_table(each) for each in found.fits)),
-            figures=tuple(figures(found, regression, unseen)),
-            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-            notes=tuple(_notes(best)),
-            conclusions=tuple(_conclusions(best)),
+    parameters = tuple(_parameters(best, data))
+    return Result(
+        tables=(models_table(found), *(values_table(each) for each in found.fits)),
+        figures=tuple(figures(found, regression, unseen)),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=tuple(_notes(best)),
+        conclusions=tuple(_conclusions(best)),
+        identified=Identified(
+            parameters,
+            correlations=best.fit.correlation,
+            settings=_settings(best, parameters),
+            again={"model": best.model.name},
+            unseen=Unseen(best.validation.value) if best.validation is not None else None,
+            left_out=_left_out(whole, pieces),
         ),
-        correlations=best.fit.correlation,
-        settings=_settings(best, parameters),
-        again={"model": best.model.name},
-        unseen=Unseen(best.validation.value) if best.validation is not None else None,
-        left_out=_left_out(whole, pieces),
     )
 
 
@@ -146,7 +148,7 @@ def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
     return tuple(term for term in terms if term.name.startswith(LINEAR))
 
 
-def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
+def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
     told = dict(best.fit.estimates)
     keys = {each.unknown.name: each for each in best.model.numbers if not each.over}
     meanings = {each.unknown.name: each.meaning for each in best.model.numbers}
@@ -159,7 +161,7 @@ def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
             bench = f"{FRICTION}.{keys[name].key}"
         advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
         display = "ms" if name == "delay" else ""
-        one = admitted(_scaled(estimate, material))
+        one = admitted(_scaled(estimate, data))
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
     for each in best.model.numbers:
         if not each.over:
@@ -172,18 +174,18 @@ def _parameters(best: Fit, material: Material) -> Iterator[Parameter]:
         made = product(f"static_torque{way}", ratio, told[base], share)
         meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
         advice = ADVICE[RATIO]
-        made = admitted(_scaled(made, material))
+        made = admitted(_scaled(made, data))
         yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", advice)
 
 
-def _scaled(one: Estimate, material: Material) -> Estimate:
+def _scaled(one: Estimate, data: TestData) -> Estimate:
     """With what a wrong constant of the force would do to it."""
     if not one.name.startswith(FORCES) or one.origin is Origin.NOT_DETERMINED:
         return one
-    data = material.trials[0]
-    if material.bench.motor is not None and not data.trial.recording:
-        one = with_systematic(one, material.bench, TORQUE_CONSTANT, one.value)
-    return with_scale(one, data, force_of(data))
+    first = data.trials[0]
+    if data.bench.motor is not None and not first.trial.recording:
+        one = with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
+    return with_scale(one, first, force_of(first))
 
 
 def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[object, str, str]]:
@@ -247,10 +249,10 @@ def _conclusions(best: Fit) -> Iterator[Conclusion]:
         )
 
 
-METHOD = Method(
+METHOD = Model(
     name="whole_model",
     summary="friction models along any motion, fitted through the engine and compared",
     options=WholeModelOptions,
     suits=usable,
-    identify=_identify,
+    analyse=_analyse,
 )

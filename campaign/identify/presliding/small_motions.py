@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from campaign.archive import ArchivedTrial
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.estimation.presliding_dynamics.plant import Array
 from campaign.estimation.presliding_dynamics.record import FEWEST, Assumed, Record
 from campaign.estimation.presliding_dynamics.start import first_plant
+from campaign.experiments.interface import TrialData
 from campaign.experiments.presliding_multisine.dynamics import record_of
 from campaign.experiments.presliding_multisine.experiment import EXPERIMENT as SHAKEN
 from campaign.experiments.presliding_multisine.experiment import PreslidingMultisineOptions
@@ -30,7 +30,7 @@ DIRECTION = 0.5
 """Friction that changes with the direction, over that which grows with the angle: more slides."""
 
 
-def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], str]:
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     """Trials that stay below breakaway, or why there are none.
 
     Where some were planned for it (`presliding_multisine`), these. Else what was done in open loop
@@ -44,7 +44,7 @@ def usable(trials: Sequence[ArchivedTrial]) -> tuple[Sequence[ArchivedTrial], st
     planned = [each for each in shown if is_planned(each)]
     if planned:
         return planned, ""
-    found: list[ArchivedTrial] = []
+    found: list[TrialData] = []
     whys: list[str] = []
     samples = 0
     for each in shown:
@@ -75,12 +75,12 @@ def _told(whys: Sequence[str]) -> str:
     return whys[0] + (f"; and so on of {more} more" if more else "") if whys else ""
 
 
-def is_planned(data: ArchivedTrial) -> bool:
+def is_planned(data: TrialData) -> bool:
     """Whether it is a small motion by its plan, so that nobody has to look."""
     return data.trial.kind == SHAKEN.name
 
 
-def small_motion(data: ArchivedTrial) -> Record:
+def small_motion(data: TrialData) -> Record:
     """The record of a trial. Raises ValueError with the reason where it holds too little."""
     if is_planned(data):
         return record_of(data, 1.0 / options_of(data).lowest)
@@ -104,7 +104,7 @@ def small_motion(data: ArchivedTrial) -> Record:
     )
 
 
-def span_of(data: ArchivedTrial, record: Record) -> tuple[float, float]:
+def span_of(data: TrialData, record: Record) -> tuple[float, float]:
     """Lowest and highest frequency (Hz) that a trial shows."""
     if is_planned(data):
         options = options_of(data)
@@ -112,7 +112,7 @@ def span_of(data: ArchivedTrial, record: Record) -> tuple[float, float]:
     return 1.0 / float(record.time[-1]), record.highest_frequency()
 
 
-def options_of(data: ArchivedTrial) -> PreslidingMultisineOptions:
+def options_of(data: TrialData) -> PreslidingMultisineOptions:
     """Of a planned trial."""
     return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
 
@@ -171,7 +171,7 @@ def _smooth(record: Record) -> tuple[Array, Array, Array, Array]:
     return torque, angle, rate, np.gradient(rate, record.step)
 
 
-def _not_even(data: ArchivedTrial) -> str:
+def _not_even(data: TrialData) -> str:
     """Why a trial is not looked at; empty where it is."""
     task, label = data.trial.task, data.trial.label
     if data.trial.recording:
@@ -181,7 +181,7 @@ def _not_even(data: ArchivedTrial) -> str:
     return "" if isinstance(task.base_acceleration, Zero) else f"{label}: the hull moves"
 
 
-def _measured(data: ArchivedTrial) -> str:
+def _measured(data: TrialData) -> str:
     """The channel of the motion: what was recorded before what was made of it."""
     told = data.trial.recording.get("channels")
     made = {

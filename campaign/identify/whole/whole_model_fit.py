@@ -27,9 +27,9 @@ from campaign.estimation.whole_model import (
     moved_with,
     refitted,
 )
+from campaign.experiments.interface import say_at
 from campaign.identify.inverse.inverse_fit import together
 from campaign.identify.inverse.motions import Moved, never_moved
-from campaign.identify.method import say_at
 from campaign.identify.whole.models import Model, Sizes, models
 from campaign.identify.whole.residuals import Residuals, steps_between
 from campaign.reason import Cause, Reason

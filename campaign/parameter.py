@@ -1,17 +1,13 @@
-"""What a method of identification is: which trials suffice, and what it makes of them."""
+"""Parameters: the numbers of a rig that an analysis identifies, and what they rest on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from campaign.archive import ArchivedTrial
 from campaign.estimate import Estimate, Origin
-from campaign.options import Options
-from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
-from campaign.result import Result
 
 MOST_LEFT = 1.0 / 3.0
 """RMS of a validation's residual, over that of what was measured, up to which a model predicts it:
@@ -21,33 +17,6 @@ UNPREDICTED = Cause(
     "validation residual (RMS): {percent:.2g} % of the measured {what}; the model does not predict "
     "this motion",
 )
-
-
-def no_progress(text: str) -> None:
-    """Where nobody waits."""
-
-
-def say_at(say: Callable[[str], None], step: str, text: str) -> None:
-    """Tell what is being done at a step of several, e.g. `method 2 of 5`."""
-    say(f"{step}, {text}")
-
-
-@dataclass(frozen=True)
-class Material:
-    """What is identified from.
-
-    Attributes:
-        bench: what is stated of the rig.
-        trials: that models are fitted to, completed measurements in plan order.
-        validation: that no model is fitted to, and that predictions are held against; read once,
-            when everything is chosen. Empty without any.
-        say: tells whoever waits what is being done.
-    """
-
-    bench: Bench
-    trials: tuple[ArchivedTrial, ...]
-    validation: tuple[ArchivedTrial, ...] = ()
-    say: Callable[[str], None] = no_progress
 
 
 def is_value(estimate: Estimate) -> bool:
@@ -105,11 +74,10 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Identified:
-    """What one method found.
+    """What an analysis identifies of a rig, beside its tables, figures and findings.
 
     Attributes:
-        parameters: of the model that it settled on.
-        result: tables, figures, findings, notes and conclusions behind them.
+        parameters: of the model that it chose; empty where it identifies none.
         correlations: of parameters, by their names; pairs that are not named go their own ways.
         settings: further values that the bench file needs for these parameters to be of use, by
             key: value, SI unit (rotary; "" for none) and what they rest on; nobody measured them.
@@ -118,8 +86,7 @@ class Identified:
         left_out: of the recordings, one reason for each kind.
     """
 
-    parameters: tuple[Parameter, ...]
-    result: Result
+    parameters: tuple[Parameter, ...] = ()
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
     settings: Mapping[str, tuple[Any, str, str]] = field(default_factory=dict)
     again: Mapping[str, Any] = field(default_factory=dict)
@@ -133,20 +100,4 @@ class Identified:
         return tuple(each for each in told if each)
 
 
-@dataclass(frozen=True)
-class Method:
-    """A method of identification.
-
-    Attributes:
-        name: what `--model` says.
-        summary: one line for `campaign kinds`.
-        options: what it accepts; `--set NAME.option=value`.
-        suits: of trials, those that it can use; where none, why.
-        identify: what they come to. Raises ValueError with a message for the user.
-    """
-
-    name: str
-    summary: str
-    options: type[Options]
-    suits: Callable[[Sequence[ArchivedTrial]], tuple[Sequence[ArchivedTrial], str]]
-    identify: Callable[[Material, Any], Identified]
+NOTHING_IDENTIFIED = Identified()
