@@ -82,8 +82,18 @@ def recorded(rig: BlindRig) -> Any:
     axis = {"name": "axis", "kind": "linear"} if rig.is_linear else {"name": "axis"}
     bench = {"name": "blind", "axis": axis}
     task = SimpleNamespace(sample_rate=RATE, duration=len(rig.time) / RATE)
+    trial = SimpleNamespace(
+        number=1,
+        kind="motion",
+        point={},
+        can_use=(),
+        task=task,
+        bench=bench,
+        recording={"channels": []},
+    )
     return SimpleNamespace(
-        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}, bench=bench),
+        trial=trial,
+        estimates=(),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
     )

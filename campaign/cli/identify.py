@@ -17,15 +17,15 @@ from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
 from campaign.identify.material import Chosen, choose
 from campaign.identify.page import next_measurement, refuse_foreign, write_identification
-from campaign.identify.tables import changes_table, told, words
+from campaign.identify.tables import changes_table, told
 from campaign.interrupts import unwinding
 from campaign.resources import templates_folder
-from campaign.text import pretty_unit
+from campaign.text import pretty_unit, words
 
 WIDTH = 80
 
@@ -58,7 +58,7 @@ def identify_run(
     with _waiting() as say:
         found = identify(
             chosen,
-            methods(),
+            identifying(),
             models=models,
             validation=unseen,
             compared=compared,

@@ -7,7 +7,8 @@ from itertools import combinations
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Section
-from campaign.identify.tables import told, words
+from campaign.identify.tables import told
+from campaign.text import words
 
 SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
 """Names of one method for what others call so."""

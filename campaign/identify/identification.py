@@ -1,4 +1,4 @@
-"""A rig identified from a run: every method that its trials suffice for, and what changed since."""
+"""A rig identified from a run: every model that its trials suffice for, and what changed since."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.difference import Difference, difference_of
-from campaign.experiments.interface import Model, TestData, bench_of, no_progress, say_at
-from campaign.experiments.preparing.axis_units import of_its_axis
+from campaign.experiments.interface import (
+    Experiment,
+    Model,
+    TestData,
+    bench_of,
+    no_progress,
+    result_of,
+    say_at,
+    suitable,
+)
 from campaign.identify.material import Chosen, same_recordings
 from campaign.parameter import NOTHING_IDENTIFIED, Identified, Parameter
 from campaign.physics.bench import Bench
-from campaign.plugins import Kinds
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
@@ -52,12 +59,17 @@ class Section:
         changes: against the run that it is compared with; empty without any.
     """
 
-    model: Model
+    experiment: Experiment
     options: Any
     trials: tuple[int, ...] = ()
     result: Result | None = None
     problem: str = ""
     changes: tuple[Change, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """What the analysis is called here."""
+        return self.experiment.model
 
     @property
     def identified(self) -> Identified:
@@ -72,7 +84,7 @@ class Identification:
     Attributes:
         chosen, validation, compared: which trials of which runs.
         bench: what was stated of the rig.
-        sections: one for each method, those that found nothing last.
+        sections: one for each model, those that found nothing last.
     """
 
     chosen: Chosen
@@ -89,7 +101,7 @@ class Identification:
 
 def identify(
     chosen: Chosen,
-    known: Kinds[Model],
+    known: Mapping[str, Experiment],
     *,
     models: Sequence[str] = (),
     validation: Chosen | None = None,
@@ -100,11 +112,11 @@ def identify(
     """Identify the rig of a run.
 
     Args:
-        models: names of methods; none: all that the trials suffice for.
+        models: names of models; none: all that the trials suffice for.
         settings: `METHOD.option=value`, as for `--set`.
         say: is told what is being done.
 
-    Raises UsageError for unknown methods, for trials of several benches and for a run that would
+    Raises UsageError for unknown models, for trials of several benches and for a run that would
     be held against itself, and ProtocolError for settings that are wrong.
     """
     unknown = [name for name in models if name not in known]
@@ -158,7 +170,9 @@ def _bench(chosen: Chosen) -> Bench:
     return bench_of(chosen.trials[0].trial)
 
 
-def _options(settings: Sequence[str], known: Kinds[Model], bench: Bench) -> dict[str, Any]:
+def _options(
+    settings: Sequence[str], known: Mapping[str, Experiment], bench: Bench
+) -> dict[str, Any]:
     """Each method's options, validated; in the units of the bench's axis."""
     overrides, problems = parse_overrides(settings)
     trees: dict[str, dict[str, Any]] = {name: {} for name in known}
@@ -174,7 +188,7 @@ def _options(settings: Sequence[str], known: Kinds[Model], bench: Bench) -> dict
     found: dict[str, Any] = {}
     with speaking_of(bench.sides):
         for name, tree in trees.items():
-            made = find_faults(known[name].options, tree)
+            made = find_faults(known[name].model.options, tree)
             if isinstance(made, list):
                 problems += list(_placed(made, texts.get(name, name)))
             else:
@@ -190,33 +204,41 @@ def _placed(faults: Sequence[tuple[Any, Any, str]], text: str) -> Iterator[Probl
 
 
 def _section(
-    model: Model,
+    experiment: Experiment,
     options: Any,
     bench: Bench,
     chosen: Chosen,
     validation: Chosen | None,
     say: Callable[[str], None],
 ) -> Section:
-    told = f"{model.name}, {chosen.name}"
+    told = f"{experiment.model.name}, {chosen.name}"
     say(told)
-    trials, why = model.suits(chosen.trials)
+    trials, why = suitable(experiment, chosen.trials)
     if not trials:
-        return Section(model, options, problem=why)
+        return Section(experiment, options, problem=why)
     numbers = tuple(each.trial.number for each in trials)
     unseen = validation.trials if validation is not None else ()
     data = TestData(
-        chosen.test, "", {}, tuple(trials), options, unseen, lambda text: say(f"{told}: {text}")
+        chosen.test,
+        experiment.name,
+        {},
+        tuple(trials),
+        options,
+        unseen,
+        lambda text: say(f"{told}: {text}"),
     )
     try:
-        with speaking_of(bench.sides):
-            found = of_its_axis(model.analyse(data))
-            return Section(model, options, numbers, _with_place(found, bench))
+        found = result_of(experiment, data)
     except ValueError as error:
-        return Section(model, options, numbers, problem=str(error))
+        return Section(experiment, options, numbers, problem=str(error))
     except ArithmeticError as error:  # numbers of these recordings that no float holds
         explain_in_debug()
         problem = f"it failed: {one_line(error)}"
-        return Section(model, options, numbers, problem=problem)
+        return Section(experiment, options, numbers, problem=problem)
+    if not found.identified.parameters:
+        problem = "; ".join(note.rstrip(".") for note in found.notes) or "it has no parameters"
+        return Section(experiment, options, numbers, problem=problem)
+    return Section(experiment, options, numbers, _with_place(found, bench))
 
 
 def fitted_again(
@@ -224,7 +246,7 @@ def fitted_again(
 ) -> Section:
     """The model that a section settled on, fitted to other trials of the same rig."""
     options = section.options.model_copy(update=dict(section.identified.again))
-    return _section(section.model, options, bench, chosen, None, say)
+    return _section(section.experiment, options, bench, chosen, None, say)
 
 
 def _with_place(result: Result, bench: Bench) -> Result:

@@ -19,7 +19,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
-from campaign.identify.tables import changes_table, parameters_table, words
+from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
 from campaign.plain_text import on_a_page
 from campaign.report.drawing.drawn import Drawn
@@ -29,6 +29,7 @@ from campaign.report.page.folder import Folder, ShownFigure, ShownTable
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import Look, looks_of_page, variables
 from campaign.result import Figure, Result
+from campaign.text import words
 
 CURES = {
     "angle": "slide over all of a turn, at several speeds in both directions",

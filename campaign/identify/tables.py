@@ -9,7 +9,7 @@ from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Change, Section
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, number, pretty_unit
+from campaign.text import interval, number, pretty_unit, words
 from campaign.units import convert
 
 BOUNDS = {"at least": "≥", "at most": "≤"}
@@ -121,8 +121,3 @@ def systematic(estimate: Estimate, display: str = "") -> str:
         f"{words_here(part.source)} {shown(part.standard_uncertainty)}"
         for part in estimate.systematic
     )
-
-
-def words(name: str) -> str:
-    """`coulomb positive`."""
-    return name.replace("_", " ")

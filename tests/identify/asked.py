@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, cast
 
-from campaign.experiments.interface import TestData, TrialData
-from campaign.identify import methods
+from campaign.experiments.interface import TestData, TrialData, result_of
+from campaign.experiments.interface import suitable as _suitable
+from campaign.identify import identifying
 from campaign.options import Options
 from campaign.result import Result
 
@@ -23,11 +24,11 @@ def asked(
     name: str, trials: Iterable[object], validation: Iterable[object] = (), **options: Any
 ) -> Result:
     """As `campaign identify --model NAME`; raises ValueError where there is no result."""
-    model = methods()[name]
-    return model.analyse(data_of(trials, validation, model.options.model_validate(options)))
+    own = identifying()[name]
+    data = data_of(trials, validation, own.model.options.model_validate(options))
+    return result_of(own, data)
 
 
 def suitable(name: str, trials: Iterable[object]) -> tuple[list[TrialData], str]:
     """The trials that a model can use; where none, why."""
-    found, why = methods()[name].suits(cast("Any", tuple(trials)))
-    return list(found), why
+    return _suitable(identifying()[name], cast("Any", tuple(trials)))

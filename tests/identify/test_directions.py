@@ -9,9 +9,12 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import TOO_WIDE, UNPHYSICAL
-from campaign.identify.directions import OFFSET_OR_ASYMMETRY, with_offset
-from campaign.identify.methods import frequency_response, friction_map, presliding, whole_model
-from campaign.identify.methods.inverse_dynamics import BENCH, NO_BASE, _settings, _with_base
+from campaign.experiments.frequency_response.model import analysis as frequency_response
+from campaign.experiments.inverse_dynamics.experiment import BENCH, NO_BASE, _settings, _with_base
+from campaign.experiments.motion import friction_map
+from campaign.experiments.presliding_multisine import parameters as presliding
+from campaign.experiments.shared.directions import OFFSET_OR_ASYMMETRY, with_offset
+from campaign.experiments.whole_model import experiment as whole_model
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from tests.identify.asked import data_of
@@ -134,9 +137,8 @@ def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
 
 def test_a_damping_below_what_the_viscous_friction_takes_of_it_is_unphysical() -> None:
     bench = Bench.model_validate({"name": "rig", "axis": {"name": "tilt"}})
-    options = presliding.PreslidingOptions(viscous_friction="20 N m s/rad")
     found = {"damping_at_rest": number("damping_at_rest", 10.0, 1.0)}
-    told = presliding._bristle_damping(found, bench, options)
+    told = presliding._bristle_damping(found, bench, 20.0)
     assert told["bristle_damping"].value == -10.0
     assert told["bristle_damping"].reason in UNPHYSICAL
 

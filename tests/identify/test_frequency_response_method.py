@@ -14,12 +14,12 @@ from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, 
 from campaign.estimate import Origin
 from campaign.estimation.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
-from campaign.identify.frequency.amplitudes import by_amplitude
-from campaign.identify.frequency.axis_numbers import UNKNOWN
-from campaign.identify.frequency.frequency_fit import TOO_FEW
-from campaign.identify.frequency.repeating import unused
-from campaign.identify.frequency.signals import base_frequency
-from campaign.identify.frequency.sources import _lines
+from campaign.experiments.frequency_response.model.amplitudes import by_amplitude
+from campaign.experiments.frequency_response.model.axis_numbers import UNKNOWN
+from campaign.experiments.frequency_response.model.frequency_fit import TOO_FEW
+from campaign.experiments.frequency_response.model.repeating import unused
+from campaign.experiments.frequency_response.model.signals import base_frequency
+from campaign.experiments.frequency_response.model.sources import _lines
 from campaign.identify.material import choose
 from campaign.result import Result
 from campaign.signals import MultiSine, Polyline, Signal, Sine

@@ -13,7 +13,7 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.drive import TwoMass
-from campaign.identify.frequency.axis_numbers import (
+from campaign.experiments.frequency_response.model.axis_numbers import (
     BENT,
     FRICTION,
     UNKNOWN,

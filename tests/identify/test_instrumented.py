@@ -18,15 +18,15 @@ from campaign.estimation.inverse.motion import (
 )
 from campaign.estimation.inverse.simulation import find_loop, followed_motion
 from campaign.estimation.inverse.terms import DIRECTIONAL, SYMMETRIC, TERMS
-from campaign.identify.inverse.instrumented import (
+from campaign.experiments.any_motion.instrumented import (
     Instruments,
     held_against,
     instruments,
     told_delay,
 )
-from campaign.identify.inverse.inverse_fit import BENDS, InverseDynamics, find
-from campaign.identify.inverse.motions import Moved, with_slowest
-from campaign.identify.inverse.tables import instruments_table
+from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find
+from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.tables import instruments_table
 from campaign.reason import Reason
 from tests.estimation.coverage import holds
 

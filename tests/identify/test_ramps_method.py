@@ -54,7 +54,7 @@ def test_a_ramp_whose_numbers_overflow_costs_that_ramp(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(breakaway, "curve_of", curve_of)
     result = identified(bench(lambda tree: tree["friction"].pop("motor")))
-    assert [row["trial"] for row in result.tables[0].rows] == [1, 3]
+    assert [row["measurement"] for row in result.tables[0].rows] == [1, 3, "mean"]
     assert [note for note in result.notes if "(trial 2): OverflowError" in note]
 
 

@@ -12,9 +12,9 @@ from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPE
 from campaign.estimate import Origin
 from campaign.estimation import gate
 from campaign.estimation.inverse.motion import Filtering
-from campaign.identify.inverse.motions import moved
-from campaign.identify.methods import friction_map
-from campaign.identify.sliding import points_of, slower
+from campaign.experiments.any_motion.motions import moved
+from campaign.experiments.motion import friction_map
+from campaign.experiments.motion.sliding import points_of, slower
 from campaign.parameter import Identified
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording
@@ -41,8 +41,18 @@ def recorded(*made: Channel) -> Any:
     channels = {each.name: each for each in made}
     recording = Recording(TIME[: len(made[0].samples)], channels)
     task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
+    trial = SimpleNamespace(
+        number=1,
+        kind="motion",
+        point={},
+        can_use=(),
+        task=task,
+        bench=RIG,
+        recording={"channels": []},
+    )
     return SimpleNamespace(
-        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}, bench=RIG),
+        trial=trial,
+        estimates=(),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
     )

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.identify.methods import friction_map
-from campaign.identify.sliding import Point, Stretch
+from campaign.experiments.motion import friction_map
+from campaign.experiments.motion.sliding import Point, Stretch
 from tests.identify.asked import asked
 from tests.physics.benches import bench
 

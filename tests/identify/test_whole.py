@@ -12,10 +12,10 @@ from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_position
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
-from campaign.identify.inverse.motions import Moved, with_slowest
-from campaign.identify.whole.along import Along
-from campaign.identify.whole.models import Sizes, models
-from campaign.identify.whole.whole_model_fit import _with_band, find, product, resolved
+from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.whole_model.along import Along
+from campaign.experiments.whole_model.models import Sizes, models
+from campaign.experiments.whole_model.whole_model_fit import _with_band, find, product, resolved
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from campaign.reason import Reason
 from tests.estimation.coverage import holds, rejected
@@ -99,7 +99,7 @@ def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
 ) -> None:
     """It looks like a delay: 0.7 ms of it, and viscous friction is 4 % too large."""
     monkeypatch.setattr(
-        "campaign.identify.whole.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
+        "campaign.experiments.whole_model.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
     )
     rig = random_rigs(16, seed=51, stribeck=True)[1]
     filtering = Filtering.for_rate(1000.0)
