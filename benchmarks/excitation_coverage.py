@@ -25,9 +25,9 @@ from campaign.estimate import Estimate, Origin
 from campaign.physics.bench import Bench
 from tests.estimation.coverage import holds
 from tests.estimation.excited_rigs import THREE, excited_rig
+from tests.experiments.asked import asked
 from tests.experiments.excited import by_lines, by_series, played, rate, true_dynamics
 from tests.experiments.laboratory import Done
-from tests.identify.asked import asked
 
 WIDE = {"signal": "multisine", "lowest": "0.5 Hz", "highest": "40 Hz", "period": "4 s"}
 SHARES = (0.1, 0.2)

@@ -28,7 +28,7 @@ from campaign.estimate import Origin
 from campaign.parameter import Identified
 from campaign.trial import Channel, Recording
 from tests.estimation.blind_rigs import RATE, BlindRig, blind_rigs
-from tests.identify.asked import asked
+from tests.experiments.asked import asked
 
 NAMES = (
     "inertia",

@@ -63,8 +63,8 @@ def show_kind(name: str) -> None:
         _show(*BENCH)
         return
     rooms = [room for room in _rooms() if name in room]
-    identified = identifying().get(name)
-    if not rooms and identified is None:
+    models = {} if rooms else identifying()
+    if not rooms and name not in models:
         close = difflib.get_close_matches(name, kind_names(), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
@@ -80,9 +80,11 @@ def show_kind(name: str) -> None:
                     "not suit it: `campaign plan` shows them, and why."
                 )
             _show_needs(kind)
-    if identified is not None and identified.model.options is not identified.options:
-        summary, options = identified.model.summary, identified.model.options
-        _show(MODEL, name, f"{summary} (by {identified.name})", options)
+            if kind.model.name == name and kind.model.options is not kind.options:
+                _show(MODEL, name, kind.model.summary, kind.model.options)
+    if name in models:
+        own = models[name]
+        _show(MODEL, name, f"{own.model.summary} (by {own.name})", own.model.options)
 
 
 def kind_names() -> list[str]:

@@ -21,8 +21,8 @@ from campaign.experiments.interface import (
 from campaign.options import describe
 from campaign.protocol import check_limits, load_protocol, make_plan
 from campaign.trial import Most
+from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import execute, failed, table
-from tests.identify.asked import asked
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "adding-an-experiment.md").read_text(encoding="utf-8")
@@ -65,6 +65,7 @@ def test_the_example_runs_and_finds_the_friction(experiment: Experiment, tmp_pat
         expected = float(str(tc)) + 141.176 * 0.03 + (4 + 141.176 * 0.001) * rate
         assert row["friction"] == pytest.approx(expected, rel=0.01)
     with experiments().including(experiment):
+        assert suitable("coast_down", done) == (list(done), "")
         (parameter,) = asked("coast_down", done).identified.parameters
     means = [float(str(row["friction"])) for row in rows]
     assert parameter.estimate.value == pytest.approx(np.mean(means))

@@ -25,8 +25,8 @@ from campaign.result import Result
 from campaign.signals import MultiSine, Polyline
 from campaign.trial import Trial
 from tests.backends.test_files import opened
+from tests.experiments.asked import suitable
 from tests.experiments.laboratory import Done, analyse, execute, table, trials
-from tests.identify.asked import suitable
 from tests.link.controllers import controller
 from tests.physics.benches import bench
 

@@ -25,8 +25,8 @@ from campaign.trial import Task
 from tests.archives import archived, executed, plan_of
 from tests.estimation.coverage import holds
 from tests.estimation.frequency import test_best_linear as static
-from tests.identify.asked import asked
-from tests.identify.test_frequency_response_method import (
+from tests.experiments.asked import asked
+from tests.experiments.test_frequency_response_model import (
     DRIVE,
     GRID,
     Answer,
@@ -86,7 +86,7 @@ def test_a_drive_that_has_changed_is_not_predicted(
 ) -> None:
     own = run_of(tmp_path / "a", driven())
     softer = replace(DRIVE, stiffness=0.97 * DRIVE.stiffness)
-    monkeypatch.setattr("tests.identify.test_frequency_response_method.DRIVE", softer)
+    monkeypatch.setattr("tests.experiments.test_frequency_response_model.DRIVE", softer)
     found = held(own, run_of(tmp_path / "b", driven(), 100))
     for row in table(found, "validation").rows:
         assert "times the square" in str(row["verdict"])

@@ -13,8 +13,8 @@ from campaign.protocol import load_protocol, make_plan
 from campaign.published.draws import SEED
 from campaign.resources import protocols_folder
 from campaign.trial import Trial
+from tests.experiments.asked import asked
 from tests.experiments.laboratory import Done, execute
-from tests.identify.asked import asked
 
 PROTOCOLS = sorted(protocols_folder().glob("*.toml"))
 MODELS = {"breakaway": "ramps", "presliding_multisine": "presliding"}

@@ -10,8 +10,8 @@ from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
 from campaign.result import Result
+from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import execute, trials
-from tests.identify.asked import asked, suitable
 from tests.physics.benches import RATIO, bench
 
 RAMPS = {

@@ -27,8 +27,8 @@ from campaign.protocol.bench_file import load_bench
 from campaign.reason import Reason
 from campaign.result import Result
 from tests.estimation.coverage import holds
+from tests.experiments.asked import asked
 from tests.experiments.laboratory import Done, execute, trials
-from tests.identify.asked import asked
 
 AMPLITUDES = ("4.5 deg/s", "9 deg/s")
 

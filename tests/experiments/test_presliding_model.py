@@ -10,8 +10,8 @@ import pytest
 
 from campaign.physics.bench import Bench
 from campaign.result import Result
+from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import Done, execute, trials
-from tests.identify.asked import asked, suitable
 from tests.physics.benches import bench
 
 SMALL = {"lowest": "0.5 Hz", "highest": "20 Hz", "periods": 4, "sample_rate": "500 Hz"}

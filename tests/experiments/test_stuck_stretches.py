@@ -11,7 +11,7 @@ import pytest
 from campaign.estimation.steadiness import STICK_SLIP
 from campaign.experiments.motion import friction_map
 from campaign.experiments.motion.sliding import Point, Stretch
-from tests.identify.asked import asked
+from tests.experiments.asked import asked
 from tests.physics.benches import bench
 
 STEP = 1e-3

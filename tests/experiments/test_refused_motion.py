@@ -18,7 +18,7 @@ from campaign.experiments.motion.sliding import points_of, slower
 from campaign.parameter import Identified
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording
-from tests.identify.asked import asked
+from tests.experiments.asked import asked
 
 RATE = 1000.0
 TIME = np.arange(20_000) / RATE

@@ -17,7 +17,7 @@ from campaign.experiments.shared.directions import OFFSET_OR_ASYMMETRY, with_off
 from campaign.experiments.whole_model import experiment as whole_model
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
-from tests.identify.asked import data_of
+from tests.experiments.asked import data_of
 
 RIG = {"name": "rig", "axis": {"name": "tilt"}}
 

@@ -27,7 +27,7 @@ from campaign.trial import Recording, Task, Trial
 from tests.archives import archived, plan_of
 from tests.estimation.coverage import holds
 from tests.estimation.frequency.drives import Drive, loop_of, simulated, with_coulomb
-from tests.identify.asked import asked, suitable
+from tests.experiments.asked import asked, suitable
 
 FINE, RATE, PERIOD = 4096, 256, 4.0
 EVERY = FINE // RATE
