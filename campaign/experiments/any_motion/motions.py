@@ -26,7 +26,7 @@ from campaign.estimation.inverse.motion import (
     whole_pieces,
     zero_phase,
 )
-from campaign.experiments.interface import TrialData
+from campaign.experiments.interface import TestData, TrialData
 from campaign.trial import Recording
 
 SLOWEST = 0.02
@@ -82,6 +82,26 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
         force = f"{DRIVE_TORQUE} or {JOINT_TORQUE}"
         return (), f"no trial has {force}, and {RELATIVE_ANGLE} or {RELATIVE_RATE}"
     return found, ""
+
+
+def read(
+    data: TestData, low_pass: float | None, decimation: int | None, skip: float
+) -> tuple[Filtering, tuple[Moved, ...], tuple[Moved, ...]]:
+    """How motions are filtered, with defaults for the sample rate; all pieces of the trials, and
+    those of the validation. Raises ValueError where either have none.
+    """
+    rate = data.trials[0].trial.task.sample_rate
+    plain = Filtering.for_rate(rate)
+    filtering = Filtering(
+        low_pass or plain.low_pass, decimation or plain.decimation, round(skip * rate)
+    )
+    pieces = moved(data.trials, filtering)
+    if not data.validation:
+        return filtering, pieces, ()
+    unseen, why = usable(data.validation)
+    if why:
+        raise ValueError(f"of the validation {why}")
+    return filtering, pieces, moved(unseen, filtering)
 
 
 def moved(trials: Sequence[TrialData], filtering: Filtering) -> tuple[Moved, ...]:

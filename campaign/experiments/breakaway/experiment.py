@@ -29,7 +29,7 @@ from campaign.estimation.relative_rate import (
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
 from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
-from campaign.experiments.breakaway.parameters import parameters_of, usable
+from campaign.experiments.breakaway.parameters import parameters_of
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
@@ -402,6 +402,5 @@ EXPERIMENT = Experiment(
         name="ramps",
         summary="breakaway torque, stiffness of the interface that slips last, and what the others "
         "carry, from ramps",
-        suits=usable,
     ),
 )

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimation.intervals import of_repeats
 from campaign.estimation.presliding import Presliding
 from campaign.experiments.breakaway.means import Ramps, means_of
@@ -32,13 +31,6 @@ ADVICE = {
     STRONGEST: "more ramps, and faster ones where noise hides the beginning",
     WEAKER: "more, and slower, ramps",
 }
-
-
-def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """Trials of `breakaway` with torque and rate, or why there are none."""
-    needed = {DRIVE_TORQUE, GYRO_RATE}
-    found = [t for t in trials if t.trial.kind == "breakaway" and needed <= t.channel_names()]
-    return found, "" if found else f"no trial of breakaway has {DRIVE_TORQUE} and {GYRO_RATE}"
 
 
 def parameters_of(

@@ -16,11 +16,10 @@ from campaign.channels import DRIVE_TORQUE
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted_together, refused
-from campaign.estimation.inverse.motion import Filtering
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.figures import figures
 from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
-from campaign.experiments.any_motion.motions import Moved, force_of, moved, usable, with_slowest
+from campaign.experiments.any_motion.motions import force_of, read, usable, with_slowest
 from campaign.experiments.any_motion.tables import (
     correlated,
     deviations_table,
@@ -97,21 +96,8 @@ def _identify(data: TestData, options: InverseDynamicsOptions) -> Result:
         if unknown:
             raise UsageError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
         terms = [TERMS[name] for name in options.terms]
-    rate = data.trials[0].trial.task.sample_rate
-    plain = Filtering.for_rate(rate)
-    filtering = Filtering(
-        options.low_pass or plain.low_pass,
-        options.decimation or plain.decimation,
-        round(options.skip * rate),
-    )
     data.say("step 1 of 4, the motion")
-    pieces = moved(data.trials, filtering)
-    unseen: tuple[Moved, ...] = ()
-    if data.validation:
-        trials, why = usable(data.validation)
-        if why:
-            raise ValueError(f"of the validation {why}")
-        unseen = moved(trials, filtering)
+    filtering, pieces, unseen = read(data, options.low_pass, options.decimation, options.skip)
     filtering = with_slowest(filtering, pieces, options.slowest)
     found = find(
         pieces,

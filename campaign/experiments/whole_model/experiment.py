@@ -13,11 +13,10 @@ from pydantic import Field
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted
-from campaign.estimation.inverse.motion import Filtering
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
-from campaign.experiments.any_motion.motions import Moved, force_of, moved, usable, with_slowest
+from campaign.experiments.any_motion.motions import Moved, force_of, read, usable, with_slowest
 from campaign.experiments.interface import Experiment, Model, TestData
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.recorded_motion import analysis, nothing_to_plan
@@ -84,21 +83,8 @@ class WholeModelOptions(Options):
 
 
 def _identify(data: TestData, options: WholeModelOptions) -> Result:
-    rate = data.trials[0].trial.task.sample_rate
-    plain = Filtering.for_rate(rate)
-    filtering = Filtering(
-        options.low_pass or plain.low_pass,
-        options.decimation or plain.decimation,
-        round(options.skip * rate),
-    )
     data.say("the motion")
-    whole = moved(data.trials, filtering)
-    unseen: tuple[Moved, ...] = ()
-    if data.validation:
-        trials, why = usable(data.validation)
-        if why:
-            raise ValueError(f"of the validation {why}")
-        unseen = moved(trials, filtering)
+    filtering, whole, unseen = read(data, options.low_pass, options.decimation, options.skip)
     moves = with_slowest(filtering, whole, None)
     pieces = telling_parts(whole, moves)
     if pieces is not whole:  # parts lie behind what is skipped
