@@ -76,13 +76,6 @@ TOO_SLOW = Cause(
     "{count} steady stretches below 3 % of the fastest rate of their trial count as standstill, "
     "and are not in the map (`--set friction_map.slowest=RATE`: slower than that is standstill)",
 )
-KEYS = {
-    "coulomb_torque": "coulomb_torque",
-    "static_torque": "static_torque",
-    "stribeck_velocity": "stribeck_velocity",
-    "stribeck_exponent": "stribeck_exponent",
-    "viscous_friction": "viscous_friction",
-}
 ADVICE = {
     "coulomb_torque": "slide at more speeds",
     "static_torque": "slide more slowly: below a tenth of the Stribeck velocity",
@@ -91,6 +84,8 @@ ADVICE = {
     "viscous_friction": "slide at more, and further apart, speeds",
     "friction": "slide at several speeds, further apart",
 }
+KEYS = {*ADVICE} - {"friction"}
+"""Numbers that a bench has a place for."""
 
 
 class FrictionMapOptions(Options):
@@ -216,7 +211,7 @@ def _parameters(
     for named, (name, direction) in names.items():
         prefix = "negative." if direction == "negative" else ""
         goes = quantity is FRICTION and name in KEYS and both
-        key = f"friction.load.{prefix}{KEYS[name]}" if goes else ""
+        key = f"friction.load.{prefix}{name}" if goes else ""
         meaning = f"{quantity.meanings[name][1]}, {direction} direction."
         yield Parameter(told[named], meaning, "", key, ADVICE[name])
 
