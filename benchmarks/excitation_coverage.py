@@ -15,18 +15,17 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from typing import Any, cast
+from typing import cast
 
 from scipy.stats import binomtest
 
 from benchmarks.document import table
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate, Origin
-from campaign.identify.method import Material
-from campaign.identify.methods.frequency_response import METHOD
 from campaign.physics.bench import Bench
 from tests.estimation.coverage import holds
 from tests.estimation.excited_rigs import THREE, excited_rig
+from tests.experiments.asked import asked
 from tests.experiments.excited import by_lines, by_series, played, rate, true_dynamics
 from tests.experiments.laboratory import Done
 
@@ -98,11 +97,11 @@ def responses(seed: int) -> dict[str, Held]:
 def told_of(on: Bench, done: Sequence[Done]) -> list[Estimate]:
     with speaking_of(on.sides):
         try:
-            found = METHOD.identify(Material(on, cast("Any", tuple(done))), METHOD.options())
+            found = asked("frequency_response", done)
         except ValueError as error:
             print(f"{on.name}: {error}")
             return []
-    return [each.estimate for each in found.parameters]
+    return [each.estimate for each in found.identified.parameters]
 
 
 def rows(what: str, held: Held) -> Iterator[list[str]]:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
@@ -25,11 +25,10 @@ from scipy.stats import binomtest
 from benchmarks.document import DOCS, table
 from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Origin
-from campaign.identify.method import Identified, Material
-from campaign.identify.methods import inverse_dynamics, whole_model
-from campaign.physics.bench import Bench
+from campaign.parameter import Identified
 from campaign.trial import Channel, Recording
 from tests.estimation.blind_rigs import RATE, BlindRig, blind_rigs
+from tests.experiments.asked import asked
 
 NAMES = (
     "inertia",
@@ -80,31 +79,34 @@ def recorded(rig: BlindRig) -> Any:
         made.append(Channel(REFERENCE, "rad", "wanted", "deg", rig.wanted))
     channels = {each.name: each for each in made}
     recording = Recording(rig.time, channels)
+    axis = {"name": "axis", "kind": "linear"} if rig.is_linear else {"name": "axis"}
+    bench = {"name": "blind", "axis": axis}
     task = SimpleNamespace(sample_rate=RATE, duration=len(rig.time) / RATE)
+    trial = SimpleNamespace(
+        number=1,
+        kind="motion",
+        point={},
+        can_use=(),
+        task=task,
+        bench=bench,
+        recording={"channels": []},
+    )
     return SimpleNamespace(
-        trial=SimpleNamespace(number=1, task=task, recording={"channels": []}),
+        trial=trial,
+        estimates=(),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
     )
 
 
-def material(rig: BlindRig) -> Material:
-    """What a method gets of such a recording."""
-    axis = {"name": "axis", "kind": "linear"} if rig.is_linear else {"name": "axis"}
-    bench = Bench.model_validate({"name": "blind", "axis": axis})
-    return Material(bench, (cast("Any", recorded(rig)),))
-
-
 def by_inverse_dynamics(rig: BlindRig) -> Identified:
     """As `campaign identify --model inverse_dynamics` does."""
-    method = inverse_dynamics.METHOD
-    return method.identify(material(rig), method.options())
+    return asked("inverse_dynamics", [recorded(rig)]).identified
 
 
 def by_whole_model(rig: BlindRig) -> Identified:
     """The model that can be right: Stribeck friction by direction; one start."""
-    method = whole_model.METHOD
-    return method.identify(material(rig), method.options(model=MODEL, starts=1))
+    return asked("whole_model", [recorded(rig)], model=MODEL, starts=1).identified
 
 
 def told(method: Callable[[BlindRig], Identified], rig: BlindRig, number: int) -> list[Told]:

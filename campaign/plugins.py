@@ -192,16 +192,22 @@ GROUPS = {
     "export format": "campaign.exports",
     "report format": "campaign.report_formats",
     "recording format": "campaign.recording_formats",
-    "identification method": "campaign.identification_methods",
 }
 """Entry point group by room."""
+ENDED = {
+    "campaign.identification_methods": "what identifies is an experiment with a `model`, in the "
+    "group campaign.experiments",
+}
+"""Groups that there were, and what to do instead."""
 
 
 def stray_entries() -> Iterator[str]:
     """A line about each package that cannot be read, or that names a group there is none of."""
     yield from installed().unreadable
     for plug_in in installed().plug_ins:
-        if plug_in.group not in GROUPS.values():
+        if plug_in.group in ENDED:
+            yield f"{plug_in}: the group {plug_in.group!r} has ended; {ENDED[plug_in.group]}"
+        elif plug_in.group not in GROUPS.values():
             known = ", ".join(GROUPS.values())
             yield f"{plug_in}: there is no group {plug_in.group!r}; there are {known}"
 

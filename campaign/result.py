@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import InstanceOf
 
 from campaign.estimate import Estimate, Origin
+from campaign.parameter import NOTHING_IDENTIFIED, Identified
 from campaign.reason import NONE, Cause, Reason
 
 Array = Annotated[NDArray[np.float64], InstanceOf()]
@@ -342,6 +343,7 @@ class Result:
         telling: key of the figure that tells it best; "" for the first.
         doubts: recordings that something is wrong with; `notes` say the same. Whoever calls an
             analysis adds them.
+        identified: parameters of the rig, and what they rest on; empty without any.
     """
 
     tables: tuple[Table, ...] = ()
@@ -351,6 +353,7 @@ class Result:
     conclusions: tuple[Conclusion, ...] = ()
     telling: str = ""
     doubts: tuple[RecordingDoubt, ...] = ()
+    identified: Identified = NOTHING_IDENTIFIED
 
     @property
     def is_empty(self) -> bool:

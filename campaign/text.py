@@ -173,3 +173,8 @@ def nearest(word: object, names: Iterable[str]) -> str:
     known = {name.lower(): name for name in names}
     close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.6)
     return f"; did you mean {known[close[0]]!r}?" if close else ""
+
+
+def words(name: str) -> str:
+    """`coulomb positive`."""
+    return name.replace("_", " ")

@@ -214,6 +214,7 @@ def test_a_package_that_cannot_be_read_costs_only_its_own(packages: Packages) ->
     packages.declare("mangled", "[campaign.friction]\nmud = mud:FRICTION\n")
     (packages.folder / "mangled-1.0.dist-info" / "METADATA").unlink()
     packages.install("lost", {}, {"campaign.frictions/slime": "lost:FRICTION"})
+    packages.install("late", {}, {"campaign.identification_methods/mud": "late:METHOD"})
     code = """
 import json
 from campaign.physics.friction import friction_models
@@ -222,7 +223,8 @@ print(json.dumps([list(friction_models()), sorted(stray_entries())]))
 """
     names, strays = said(packages, code)
     assert names == ["coulomb", "grease", "lugre", "stribeck"]
-    assert len(strays) == 2
+    assert len(strays) == 3
+    assert any("late 1.0" in stray and "experiment with a `model`" in stray for stray in strays)
     assert any("lost 1.0" in stray and "no group 'campaign.frictions'" in stray for stray in strays)
     assert any("with mud:FRICTION" in stray and "cannot be read" in stray for stray in strays)
 

@@ -17,15 +17,15 @@ from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
 from campaign.identify.material import Chosen, choose
 from campaign.identify.page import next_measurement, refuse_foreign, write_identification
-from campaign.identify.tables import changes_table, told, words
+from campaign.identify.tables import changes_table, told
 from campaign.interrupts import unwinding
 from campaign.resources import templates_folder
-from campaign.text import pretty_unit
+from campaign.text import pretty_unit, words
 
 WIDTH = 80
 
@@ -58,15 +58,15 @@ def identify_run(
     with _waiting() as say:
         found = identify(
             chosen,
-            methods(),
+            identifying(),
             models=models,
             validation=unseen,
             compared=compared,
             settings=settings,
             say=say,
         )
-    if all(each.identified is None for each in found.sections):
-        told = [f"{each.method.name}: {each.problem}" for each in found.sections]
+    if all(each.result is None for each in found.sections):
+        told = [f"{each.model.name}: {each.problem}" for each in found.sections]
         lines = [
             textwrap.fill(each, WIDTH, initial_indent="  ", subsequent_indent="    ")
             for each in told
@@ -172,8 +172,8 @@ def _write_bench(path: Path, text: str) -> None:
 def _say(found: Identification) -> None:
     with speaking_of(found.bench.sides):
         for section in found.sections:
-            if section.identified is None:
-                _wrapped(f"{section.method.name}: not identified: {section.problem}")
+            if section.result is None:
+                _wrapped(f"{section.model.name}: not identified: {section.problem}")
                 continue
             _tell(section)
             if section.problem:
@@ -188,9 +188,9 @@ def _say(found: Identification) -> None:
 
 
 def _tell(section: Section) -> None:
-    print_line(f"{section.method.name} ({section.method.summary})")
-    for warning in section.warnings:
-        print_note(f"{section.method.name}: {warning.text}", style="yellow")
+    print_line(f"{section.model.name} ({section.model.summary})")
+    for warning in section.identified.warnings:
+        print_note(f"{section.model.name}: {warning.text}", style="yellow")
     rows = [
         (
             words(each.estimate.name),
@@ -198,16 +198,16 @@ def _tell(section: Section) -> None:
             pretty_unit(each.display or each.estimate.unit),
             each.bench,
         )
-        for each in section.parameters
+        for each in section.identified.parameters
     ]
     print_table(("parameter", "value, 95 %", "unit", "key of the bench"), rows)
     reasons: dict[str, list[str]] = {}
-    for each in section.parameters:
+    for each in section.identified.parameters:
         if each.estimate.reason:
             reasons.setdefault(str(each.estimate.reason), []).append(words(each.estimate.name))
     for reason, names in reasons.items():
         _wrapped(f"{', '.join(names)}: {reason}.")
-    for remark in of_unknown_size(each.estimate for each in section.parameters):
+    for remark in of_unknown_size(each.estimate for each in section.identified.parameters):
         _wrapped(remark)
 
 

@@ -15,7 +15,7 @@ from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.export import exports
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
@@ -27,6 +27,7 @@ from campaign.unit_grammar import listed
 from campaign.units import convert
 
 CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
+MODEL = "model of identify"
 UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
@@ -41,6 +42,7 @@ def list_kinds() -> None:
                 problems.append(kind)
             else:
                 rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
+    rows += [(MODEL, name, kind.model.summary) for name, kind in identifying().items()]
     print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
         print_note(problem, style="yellow")
@@ -61,7 +63,8 @@ def show_kind(name: str) -> None:
         _show(*BENCH)
         return
     rooms = [room for room in _rooms() if name in room]
-    if not rooms:
+    models = {} if rooms else identifying()
+    if not rooms and name not in models:
         close = difflib.get_close_matches(name, kind_names(), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
@@ -77,12 +80,17 @@ def show_kind(name: str) -> None:
                     "not suit it: `campaign plan` shows them, and why."
                 )
             _show_needs(kind)
+            if kind.model.name == name and kind.model.options is not kind.options:
+                _show(MODEL, name, kind.model.summary, kind.model.options)
+    if name in models:
+        own = models[name]
+        _show(MODEL, name, f"{own.model.summary} (by {own.name})", own.model.options)
 
 
 def kind_names() -> list[str]:
     """All that `show_kind` knows, sorted."""
     own = (CHANNELS[1], UNITS_KIND[1], BENCH[1])
-    return sorted({*own, *(name for room in _rooms() for name in room)})
+    return sorted({*own, *identifying(), *(name for room in _rooms() for name in room)})
 
 
 def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:
@@ -120,7 +128,7 @@ def _show_channels() -> None:
 
 def _rooms() -> Iterator[Kinds[Any]]:
     yield from (experiments(), friction_models(), compensation_methods(), backends())
-    yield from (exports(), formats(), methods())
+    yield from (exports(), formats())
 
 
 def _whose(room: Kinds[Any], name: str) -> str:

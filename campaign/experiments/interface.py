@@ -52,19 +52,41 @@ class TrialData(Protocol):
         """What `Experiment.measure` found when it was executed; nothing if nobody looked then."""
 
 
+def no_progress(text: str) -> None:
+    """Reports progress to nobody."""
+
+
+def say_at(say: Callable[[str], None], step: str, text: str) -> None:
+    """Report progress at a step of several, e.g. `model 2 of 5`."""
+    say(f"{step}, {text}")
+
+
 @dataclass(frozen=True)
 class TestData:
-    """All there is about one test of a run, for its analysis.
+    """All there is about one test of a run, for its analysis; or trials that a model suits.
 
     Attributes:
         options: the test's normalised options before the sweep (SI).
         trials: in plan order, failed ones included.
+        model: options of the experiment's `Model`, where `campaign identify` asks for parameters;
+            None in a report.
+        validation: trials that no model is fitted to, for comparison with its predictions; read
+            once, when everything is chosen.
+        say: reports progress.
     """
 
     name: str
     kind: str
     options: Tree
     trials: tuple[TrialData, ...]
+    model: Any = None
+    validation: tuple[TrialData, ...] = ()
+    say: Callable[[str], None] = no_progress
+
+    @property
+    def bench(self) -> Bench:
+        """What is stated of the rig: that of the first trial."""
+        return bench_of(self.trials[0].trial)
 
     def completed(self) -> Iterator[TrialData]:
         """The measurements that ran to their end, in plan order."""
@@ -102,6 +124,35 @@ class Stage:
     why: str
     most: Callable[[Any, Bench], Most]
     trials: Callable[[Any, Bench, TestData], Iterable[TrialRequest]]
+
+
+Suits = Callable[[Sequence[TrialData]], tuple[Sequence[TrialData], str]]
+"""Of recorded trials, those that an analysis can use; where none, why."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """How `campaign identify` uses an experiment's analysis, which gives `Result.identified`.
+
+    Attributes:
+        name: what `--model` says.
+        summary: one line for `campaign kinds`.
+        options: what it accepts, `--set NAME.option=value`; the analysis has them as
+            `TestData.model`.
+        suits: recorded trials that the analysis can use. Absent: those of the experiment itself.
+        analyse: what analyses them in place of the experiment's own analysis, which has
+            `TestData.model` and `TestData.validation`. Either raises ValueError with a message for
+            the user where there is no result.
+    """
+
+    name: str
+    summary: str
+    options: type[Options] = Options
+    suits: Suits | None = None
+    analyse: Callable[[TestData], Result] | None = None
+
+
+NO_MODEL = Model("", "")
 
 
 @dataclass(frozen=True)
@@ -144,6 +195,7 @@ class Experiment:
         warnings: what the plan should warn of, with what to do about it: sentences without a full
             stop, of the options and the bench of a point whose trials were made. What a test's
             points say alike is told once.
+        model: how `campaign identify` uses its analysis.
     """
 
     name: str
@@ -162,6 +214,7 @@ class Experiment:
     windows: tuple[str, ...] = ()
     warnings: Callable[[Any, Bench], Iterable[str]] | None = None
     most_samples: int | None = None
+    model: Model = NO_MODEL
 
 
 EMPTY = Result()
@@ -172,13 +225,25 @@ TOO_LONG = Cause(
 )
 
 
+def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[TrialData], str]:
+    """Of recorded trials, those that the experiment's model can use; where none, why."""
+    if experiment.model.suits is not None:
+        found, why = experiment.model.suits(trials)
+        return list(found), why
+    own = [each for each in trials if each.trial.kind == experiment.name]
+    return own, "" if own else f"no trial is of the kind {experiment.name}"
+
+
 def result_of(experiment: Experiment, data: TestData) -> Result:
     """What the analysis finds, with a note on every channel that it had to do without.
 
     Recordings that cannot hold anything are kept from it, and a note says which and why. Of a test
-    that sweeps the seed of its bench's scatter each draw is analysed by itself.
+    that sweeps the seed of its bench's scatter each draw is analysed by itself. Metrics of trials
+    of other kinds, which a model may suit, are those of other analyses, and not used.
     """
     with speaking_of(_sides(data)):
+        if data.model is not None and experiment.model.analyse is not None:
+            return of_its_axis(experiment.model.analyse(data))
         return of_its_axis(_result_of(experiment, data))
 
 
@@ -188,13 +253,15 @@ def _sides(data: TestData) -> Sides:
 
 
 def _result_of(experiment: Experiment, data: TestData) -> Result:
+    if data.model is not None:
+        data = replace(data, trials=tuple(_own(experiment, item) for item in data.trials))
     before = [_doubt(experiment, item) for item in data.trials]
     kept = zip(data.trials, before, strict=True)
     trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
     result = EMPTY
     if trials or not data.trials:
         usable = with_named_tables(replace(data, trials=trials))
-        draws = draws_of(item.trial for item in data.trials)
+        draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
         if len(draws) > 1:
             parts = {seed: _draw(usable, seed) for seed in draws}
             result = merged(
@@ -205,7 +272,8 @@ def _result_of(experiment: Experiment, data: TestData) -> Result:
     doubts = (*result.doubts, *filter(None, before))
     lacking: dict[str, None] = {}
     for item in data.trials:
-        if item.trial.can_use and item.ending.outcome == "completed":
+        own = data.model is None or item.trial.kind == experiment.name
+        if own and item.trial.can_use and item.ending.outcome == "completed":
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
     without = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
     notes = (*result.notes, *notes_on(doubts, len(data.trials)), *without)
@@ -219,6 +287,8 @@ def _analysed(experiment: Experiment, data: TestData) -> Result:
     except (ArchiveError, UsageError, IncompleteBenchError):
         raise
     except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
+        if experiment.measure is None:
+            raise
         good, doubts = _measurable(experiment, data)
         if not doubts:
             raise
@@ -279,8 +349,20 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
         return tuple(map(estimate_here, experiment.measure(data)))
 
 
+def _own(experiment: Experiment, data: TrialData) -> TrialData:
+    """The trial without the metrics of another experiment."""
+    if data.trial.kind == experiment.name or not data.estimates:
+        return data
+    return _Instead(data, data.trial.point, ())
+
+
 def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
-    """Why a recording is not analysed; of one that is too long no sample is read to find out."""
+    """Why a recording is not analysed; of one that is too long no sample is read to find out.
+
+    A model that suits trials of other kinds looks at them itself.
+    """
+    if data.trial.kind != experiment.name:
+        return None
     most, task = experiment.most_samples, data.trial.task
     samples = task.duration * task.sample_rate
     if most is not None and samples > most:

@@ -1,20 +1,20 @@
-"""Identifying a rig from archived runs: which trials a method takes, what it finds, where it goes.
-
-Estimators are in `campaign.estimation`, as functions on arrays; a method feeds them from trials
-and says what their numbers are of the rig.
-"""
+"""Parameters of a rig from archived runs: trials, analyses of experiments, bench file, page."""
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Mapping
 
-# Before the function of the same name: imported later, the folder would take its place.
-import campaign.identify.methods  # noqa: F401
-from campaign.identify.method import Method
-from campaign.plugins import Kinds
+from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment
 
 
-@cache
-def methods() -> Kinds[Method]:
-    """Every method of identification, by name."""
-    return Kinds("identification method", f"{__name__}.methods", "METHOD", Method)
+def identifying() -> Mapping[str, Experiment]:
+    """Every experiment whose analysis identifies, by the name of its model.
+
+    Packages that cannot be used are left out. A name of the program stays the program's.
+    """
+    kinds = experiments()
+    every = [(kinds.plug_in(name) is None, kind) for name, kind in kinds.described()]
+    own_last = sorted(every, key=lambda each: each[0])
+    found = {kind.model.name: kind for _, kind in own_last if isinstance(kind, Experiment)}
+    return {name: found[name] for name in sorted(found) if name}

@@ -7,7 +7,8 @@ from itertools import combinations
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Section
-from campaign.identify.tables import told, words
+from campaign.identify.tables import told
+from campaign.text import words
 
 SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
 """Names of one method for what others call so."""
@@ -25,8 +26,8 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
     """
     found: dict[tuple[str, bool], list[tuple[str, Estimate, str]]] = {}
     for section in sections:
-        names = {each.estimate.name for each in section.parameters}
-        for each in section.parameters:
+        names = {each.estimate.name for each in section.identified.parameters}
+        for each in section.identified.parameters:
             name = each.estimate.name
             for own, common in SAME.items():
                 name = name.replace(own, common) if name.startswith(own) else name
@@ -34,7 +35,7 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
             if name.split("_")[0] in COMPARED and measured:
                 at_one = f"{name.split('_')[0]}{OVER_TEMPERATURE}" in names
                 found.setdefault((name, at_one), []).append(
-                    (section.method.name, each.estimate, each.display)
+                    (section.model.name, each.estimate, each.display)
                 )
     for (name, _), several in found.items():
         pairs = [(_gap(one[1], other[1]), one, other) for one, other in combinations(several, 2)]

@@ -11,8 +11,8 @@ from campaign.errors import CampaignError
 from campaign.estimate import Estimate
 from campaign.identify.compensations import identified_compensations, without_identified
 from campaign.identify.identification import Identification, Section
-from campaign.identify.method import Parameter
 from campaign.identify.written import amount, known_of
+from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.physics.friction import coulomb, friction_models
 from campaign.protocol.bench_edit import with_known
@@ -48,7 +48,7 @@ def bench_text(found: Identification, command: str) -> str:
                 values[parameter.bench] = _written(parameter.estimate)
                 known[parameter.bench] = known_of(parameter.estimate)
             correlations += _correlations(section, filled)
-            if filled and section.identified is not None:
+            if filled:
                 for path, (value, unit, _) in _settings(section, found.bench).items():
                     if _is_friction(path) and section is not sliding:
                         continue
@@ -74,7 +74,7 @@ def keys_by_method(found: Identification) -> dict[str, list[str]]:
     """Names of methods, and keys of the bench file whose values are theirs."""
     sliding = _of_sliding(found.sections)
     method = {
-        parameter.bench: section.method.name
+        parameter.bench: section.model.name
         for section in found.sections
         for parameter in _going(section, sliding).values()
     }  # of a key that several fill in, the last
@@ -99,8 +99,6 @@ def _source(found: Identification) -> tuple[str, str]:
 
 def _filled(section: Section) -> dict[str, Parameter]:
     """Parameters that have a place in a bench, by their names."""
-    if section.identified is None:
-        return {}
     return {each.estimate.name: each for each in section.identified.parameters if each.bench}
 
 
@@ -138,7 +136,7 @@ def _is_friction(path: str) -> bool:
 
 def _tells_curve(section: Section) -> bool:
     """Whether a Stribeck curve is measured, whole: what the motion leaves open is no fact."""
-    settings = section.identified.settings if section.identified is not None else {}
+    settings = section.identified.settings
     left_open = any(path.endswith(("static_torque", "stribeck_velocity")) for path in settings)
     return _tells_sliding(_filled(section), "static_torque") and not left_open
 
@@ -149,7 +147,7 @@ def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]
     Where no curve is told and the bench has no bristles, friction is Coulomb and viscous friction;
     with bristles the rest of the bench's curve stays.
     """
-    settings = dict(section.identified.settings) if section.identified is not None else {}
+    settings = dict(section.identified.settings)
     model, load = f"{FRICTION}model", bench.friction.get("load")
     if model not in settings:
         return settings
@@ -204,8 +202,6 @@ def _value(value: Any, unit: str) -> Any:
 
 
 def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:
-    if section.identified is None:
-        return
     for (one, other), share in section.identified.correlations.items():
         if one in filled and other in filled and abs(share) >= LEAST_CORRELATION:
             yield [filled[one].bench, filled[other].bench, round(max(-1.0, min(1.0, share)), 3)]

@@ -22,8 +22,8 @@ from typing import Any
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Identification, Section
-from campaign.identify.method import Parameter
 from campaign.identify.written import amount, known_of
+from campaign.parameter import Parameter
 from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
 from campaign.physics.loop import at_load
 
@@ -224,7 +224,7 @@ def _bristles(found: Identification) -> Bristles:
 
 
 def _named(sections: Sequence[Section], method: str) -> dict[str, Estimate]:
-    own = [each for each in sections if each.method.name == method]
+    own = [each for each in sections if each.model.name == method]
     return {e.estimate.name: e.estimate for e in _measured(own) if e.estimate.value > 0.0}
 
 
@@ -233,7 +233,7 @@ def _measured(sections: Sequence[Section]) -> list[Parameter]:
     return [
         each
         for section in sections
-        for each in section.parameters
+        for each in section.identified.parameters
         if each.estimate.origin is Origin.MEASURED and each.estimate.has_interval
     ]
 

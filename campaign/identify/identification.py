@@ -1,4 +1,4 @@
-"""A rig identified from a run: every method that its trials suffice for, and what changed since."""
+"""A rig identified from a run: every model that its trials suffice for, and what changed since."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from campaign.axis_kind import speaking_of, unit_here, words_here
+from campaign.axis_kind import speaking_of
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.difference import Difference, difference_of
-from campaign.experiments.interface import bench_of
-from campaign.experiments.preparing.axis_units import estimate_here, of_its_axis
-from campaign.identify.material import Chosen, same_recordings
-from campaign.identify.method import (
-    Identified,
-    Material,
-    Method,
-    Parameter,
+from campaign.experiments.interface import (
+    Experiment,
+    Model,
+    TestData,
+    bench_of,
     no_progress,
+    result_of,
     say_at,
+    suitable,
 )
+from campaign.identify.material import Chosen, same_recordings
+from campaign.parameter import NOTHING_IDENTIFIED, Identified, Parameter
 from campaign.physics.bench import Bench
-from campaign.plugins import Kinds
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
-from campaign.reason import Reason
+from campaign.result import Result
 
 FRICTION = "friction."
 WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
@@ -51,30 +51,30 @@ class Change:
 
 @dataclass(frozen=True)
 class Section:
-    """What one method made of the run.
+    """What one model's analysis found of the run.
 
     Attributes:
         trials: numbers of those that it used.
-        identified: None where it could not, and `problem` says why.
+        result: None where there is none, and `problem` says why.
         changes: against the run that it is compared with; empty without any.
     """
 
-    method: Method
+    experiment: Experiment
     options: Any
     trials: tuple[int, ...] = ()
-    identified: Identified | None = None
+    result: Result | None = None
     problem: str = ""
     changes: tuple[Change, ...] = ()
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """None where nothing was identified."""
-        return self.identified.parameters if self.identified is not None else ()
+    def model(self) -> Model:
+        """What the analysis is called here."""
+        return self.experiment.model
 
     @property
-    def warnings(self) -> tuple[Reason, ...]:
-        """What a reader has to know before the parameters."""
-        return self.identified.warnings if self.identified is not None else ()
+    def identified(self) -> Identified:
+        """Of a section without a result, nothing."""
+        return self.result.identified if self.result is not None else NOTHING_IDENTIFIED
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Identification:
     Attributes:
         chosen, validation, compared: which trials of which runs.
         bench: what was stated of the rig.
-        sections: one for each method, those that found nothing last.
+        sections: one for each model, those that found nothing last.
     """
 
     chosen: Chosen
@@ -96,12 +96,12 @@ class Identification:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All of them."""
-        return tuple(parameter for each in self.sections for parameter in each.parameters)
+        return tuple(parameter for own in self.sections for parameter in own.identified.parameters)
 
 
 def identify(
     chosen: Chosen,
-    methods: Kinds[Method],
+    known: Mapping[str, Experiment],
     *,
     models: Sequence[str] = (),
     validation: Chosen | None = None,
@@ -112,30 +112,30 @@ def identify(
     """Identify the rig of a run.
 
     Args:
-        models: names of methods; none: all that the trials suffice for.
+        models: names of models; none: all that the trials suffice for.
         settings: `METHOD.option=value`, as for `--set`.
         say: is told what is being done.
 
-    Raises UsageError for unknown methods, for trials of several benches and for a run that would
+    Raises UsageError for unknown models, for trials of several benches and for a run that would
     be held against itself, and ProtocolError for settings that are wrong.
     """
-    unknown = [name for name in models if name not in methods]
+    unknown = [name for name in models if name not in known]
     if unknown:
-        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(methods)}")
+        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(known)}")
     for option, other in (("--validate", validation), ("--compare", compared)):
         if other is not None:
             _refuse_same(chosen, other, option)
     bench = _bench(chosen)
-    given = _options(settings, methods, bench)
+    given = _options(settings, known, bench)
     sections = []
-    names = list(models or methods)
+    names = list(models or known)
     for number, name in enumerate(names, 1):
         say_of = partial(say_at, say, f"method {number} of {len(names)}")
-        section = _section(methods[name], given[name], bench, chosen, validation, say_of)
-        if compared is not None and section.identified is not None:
-            section = _compared(section, section.identified, bench, compared, say_of)
+        section = _section(known[name], given[name], bench, chosen, validation, say_of)
+        if compared is not None and section.result is not None:
+            section = _compared(section, bench, compared, say_of)
         sections.append(section)
-    sections.sort(key=lambda each: each.identified is None)
+    sections.sort(key=lambda each: each.result is None)
     return Identification(chosen, validation, compared, bench, tuple(_adjusted(sections)))
 
 
@@ -170,15 +170,17 @@ def _bench(chosen: Chosen) -> Bench:
     return bench_of(chosen.trials[0].trial)
 
 
-def _options(settings: Sequence[str], methods: Kinds[Method], bench: Bench) -> dict[str, Any]:
+def _options(
+    settings: Sequence[str], known: Mapping[str, Experiment], bench: Bench
+) -> dict[str, Any]:
     """Each method's options, validated; in the units of the bench's axis."""
     overrides, problems = parse_overrides(settings)
-    trees: dict[str, dict[str, Any]] = {name: {} for name in methods}
+    trees: dict[str, dict[str, Any]] = {name: {} for name in known}
     texts: dict[str, str] = {}
     for override in overrides:
         name, *keys = override.keys
-        if name not in methods or len(keys) != 1:
-            told = f"write METHOD.option=value; methods are {', '.join(methods)}"
+        if name not in known or len(keys) != 1:
+            told = f"write METHOD.option=value; methods are {', '.join(known)}"
             problems.append(Overridden(override.text).problem((), "key", told))
             continue
         trees[str(name)][str(keys[0])] = override.value
@@ -186,7 +188,7 @@ def _options(settings: Sequence[str], methods: Kinds[Method], bench: Bench) -> d
     found: dict[str, Any] = {}
     with speaking_of(bench.sides):
         for name, tree in trees.items():
-            made = find_faults(methods[name].options, tree)
+            made = find_faults(known[name].model.options, tree)
             if isinstance(made, list):
                 problems += list(_placed(made, texts.get(name, name)))
             else:
@@ -202,63 +204,60 @@ def _placed(faults: Sequence[tuple[Any, Any, str]], text: str) -> Iterator[Probl
 
 
 def _section(
-    method: Method,
+    experiment: Experiment,
     options: Any,
     bench: Bench,
     chosen: Chosen,
     validation: Chosen | None,
     say: Callable[[str], None],
 ) -> Section:
-    told = f"{method.name}, {chosen.name}"
+    told = f"{experiment.model.name}, {chosen.name}"
     say(told)
-    trials, why = method.suits(chosen.trials)
+    trials, why = suitable(experiment, chosen.trials)
     if not trials:
-        return Section(method, options, problem=why)
+        return Section(experiment, options, problem=why)
     numbers = tuple(each.trial.number for each in trials)
     unseen = validation.trials if validation is not None else ()
-    material = Material(bench, tuple(trials), tuple(unseen), lambda text: say(f"{told}: {text}"))
+    data = TestData(
+        chosen.test,
+        experiment.name,
+        {},
+        tuple(trials),
+        options,
+        unseen,
+        lambda text: say(f"{told}: {text}"),
+    )
     try:
-        with speaking_of(bench.sides):
-            found = method.identify(material, options)
-            return Section(method, options, numbers, _with_place(_of_its_axis(found), bench))
+        found = result_of(experiment, data)
     except ValueError as error:
-        return Section(method, options, numbers, problem=str(error))
+        return Section(experiment, options, numbers, problem=str(error))
     except ArithmeticError as error:  # numbers of these recordings that no float holds
         explain_in_debug()
         problem = f"it failed: {one_line(error)}"
-        return Section(method, options, numbers, problem=problem)
-
-
-def _of_its_axis(found: Identified) -> Identified:
-    parameters = tuple(
-        replace(
-            each,
-            estimate=estimate_here(each.estimate),
-            meaning=words_here(each.meaning),
-            display=unit_here(each.display),
-            advice=words_here(each.advice),
-        )
-        for each in found.parameters
-    )
-    unseen = found.unseen and replace(found.unseen, what=words_here(found.unseen.what))
-    return replace(found, parameters=parameters, result=of_its_axis(found.result), unseen=unseen)
+        return Section(experiment, options, numbers, problem=problem)
+    if not found.identified.parameters:
+        problem = "; ".join(note.rstrip(".") for note in found.notes) or "it has no parameters"
+        return Section(experiment, options, numbers, problem=problem)
+    return Section(experiment, options, numbers, _with_place(found, bench))
 
 
 def fitted_again(
     section: Section, bench: Bench, chosen: Chosen, say: Callable[[str], None] = no_progress
 ) -> Section:
     """The model that a section settled on, fitted to other trials of the same rig."""
-    again = section.identified.again if section.identified is not None else {}
-    options = section.options.model_copy(update=dict(again))
-    return _section(section.method, options, bench, chosen, None, say)
+    options = section.options.model_copy(update=dict(section.identified.again))
+    return _section(section.experiment, options, bench, chosen, None, say)
 
 
-def _with_place(found: Identified, bench: Bench) -> Identified:
+def _with_place(result: Result, bench: Bench) -> Result:
     """As found, without a place in the bench file for what makes no bench there."""
-    return _with_whole_tables(_with_own_friction(found, bench), bench)
+    notes = list(result.notes)
+    found = _with_own_friction(result.identified, bench, notes)
+    found = _with_whole_tables(found, bench, notes)
+    return replace(result, identified=found, notes=tuple(notes))
 
 
-def _with_whole_tables(found: Identified, bench: Bench) -> Identified:
+def _with_whole_tables(found: Identified, bench: Bench, notes: list[str]) -> Identified:
     """Without keys of a table that the bench has not, and that would lack others."""
     told = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
     for table, keys in WHOLE.items():
@@ -267,19 +266,15 @@ def _with_whole_tables(found: Identified, bench: Bench) -> Identified:
         if not needed & told or not missing or getattr(bench, table) is not None:
             continue
         what = f"Without {', '.join(missing)} there is no [{table}] to write"
-        note = f"{what}: the file gets none of it."
+        notes.append(f"{what}: the file gets none of it.")
         parameters = (
             replace(each, bench="") if each.bench in needed else each for each in found.parameters
         )
-        found = replace(
-            found,
-            parameters=tuple(parameters),
-            result=replace(found.result, notes=(*found.result.notes, note)),
-        )
+        found = replace(found, parameters=tuple(parameters))
     return found
 
 
-def _with_own_friction(found: Identified, bench: Bench) -> Identified:
+def _with_own_friction(found: Identified, bench: Bench, notes: list[str]) -> Identified:
     """Friction of all interfaces together is that of none: it goes to no bench with several.
 
     What compensates it has a model of all together, and takes it.
@@ -288,7 +283,7 @@ def _with_own_friction(found: Identified, bench: Bench) -> Identified:
     others = [name for name in bench.friction if name != "load"]
     if not others or not any(each.bench.startswith(FRICTION) for each in found.parameters):
         return found
-    note = (
+    notes.append(
         f"Friction is that of all interfaces together, and the bench has some besides the load's "
         f"({', '.join(others)}): of the bench file it goes to compensations only."
     )
@@ -299,7 +294,6 @@ def _with_own_friction(found: Identified, bench: Bench) -> Identified:
             for each in found.parameters
         ),
         settings={k: v for k, v in found.settings.items() if not k.startswith(FRICTION)},
-        result=replace(found.result, notes=(*found.result.notes, note)),
     )
 
 
@@ -310,19 +304,18 @@ def _lumped(parameter: Parameter) -> Parameter:
 
 def _compared(
     section: Section,
-    identified: Identified,
     bench: Bench,
     compared: Chosen,
     say: Callable[[str], None],
 ) -> Section:
     """The same model of another run, and how its parameters differ."""
     other = fitted_again(section, bench, compared, say)
-    if other.identified is None:
+    if other.result is None:
         return replace(section, problem=f"{compared.name}: {other.problem}")
     after = {each.estimate.name: each.estimate for each in other.identified.parameters}
     pairs = [
         (each.estimate, after[each.estimate.name])
-        for each in identified.parameters
+        for each in section.identified.parameters
         if each.estimate.name in after
     ]
     changes = tuple(Change(one, two, difference_of(one, two, _shared(one))) for one, two in pairs)

@@ -19,8 +19,8 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
-from campaign.identify.method import Identified, Parameter
-from campaign.identify.tables import changes_table, parameters_table, words
+from campaign.identify.tables import changes_table, parameters_table
+from campaign.parameter import Parameter
 from campaign.plain_text import on_a_page
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw, series_of
@@ -28,7 +28,8 @@ from campaign.report.output import replaced_folder
 from campaign.report.page.folder import Folder, ShownFigure, ShownTable
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import Look, looks_of_page, variables
-from campaign.result import Figure
+from campaign.result import Figure, Result
+from campaign.text import words
 
 CURES = {
     "angle": "slide over all of a turn, at several speeds in both directions",
@@ -89,15 +90,15 @@ def write_identification(
         parameters = parameters_table(found.sections)
         first = making.folder.shown_table(parameters, (), "parameters")  # as on the page
         shown = [
-            _section(each, each.identified, found, making)
+            _section(each, each.result, found, making)
             for each in found.sections
-            if each.identified is not None
+            if each.result is not None
         ]
         context = {
             "found": found,
             "parameters": first,
             "shown": shown,
-            "refused": [each for each in found.sections if each.identified is None],
+            "refused": [each for each in found.sections if each.result is None],
             "next": next_measurement(found),
             "problems": making.problems,
             "command": command,
@@ -160,9 +161,9 @@ def _advice(parameter: Parameter) -> str:
 
 
 def _section(
-    section: Section, identified: Identified, found: Identification, making: _Making
+    section: Section, result: Result, found: Identification, making: _Making
 ) -> ShownSection:
-    name, result = section.method.name, identified.result
+    name = section.model.name
     folder = making.folder
     figures = [
         shown
@@ -177,7 +178,7 @@ def _section(
     return ShownSection(
         anchor=f"method-{name.replace('_', '-')}",
         section=section,
-        warnings=tuple(f"{name}: {each.text}" for each in section.warnings),
+        warnings=tuple(f"{name}: {each.text}" for each in section.identified.warnings),
         conclusions=tuple(sentence(each) for each in result.conclusions),
         remarks=tuple(remarks(result.conclusions)),
         figures=tuple(figures),
@@ -189,7 +190,7 @@ def _section(
 def _looks(found: Identification) -> Mapping[str, Look]:
     series: list[list[str]] = []
     for section in found.sections:
-        for figure in section.identified.result.figures if section.identified else ():
+        for figure in section.result.figures if section.result else ():
             with suppress(Exception):  # a plug-in's, which is told where it is shown
                 series.append(series_of(figure))
     return looks_of_page(series)
@@ -219,12 +220,12 @@ def as_json(found: Identification, command: str) -> str:
 
 def _method_tree(section: Section) -> dict[str, Any]:
     tree: dict[str, Any] = {
-        "method": section.method.name,
+        "method": section.model.name,
         "options": section.options.model_dump(mode="json"),
         "trials": list(section.trials),
         "problem": section.problem,
     }
-    if section.identified is None:
+    if section.result is None:
         return tree
     return tree | {
         "parameters": [
@@ -241,12 +242,12 @@ def _method_tree(section: Section) -> dict[str, Any]:
                  for name, cell in row.items()}
                 for row in table.rows
             ]
-            for table in section.identified.result.tables
+            for table in section.result.tables
         },
-        "notes": list(section.identified.result.notes),
+        "notes": list(section.result.notes),
         "warnings": [
             {"code": each.code, "text": each.text, "values": dict(each.values)}
-            for each in section.warnings
+            for each in section.identified.warnings
         ],
         "changes": [
             {"before": row_of(each.before), "after": row_of(each.after),

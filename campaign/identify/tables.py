@@ -9,7 +9,7 @@ from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Change, Section
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, number, pretty_unit
+from campaign.text import interval, number, pretty_unit, words
 from campaign.units import convert
 
 BOUNDS = {"at least": "≥", "at most": "≤"}
@@ -28,11 +28,11 @@ def parameters_table(sections: Sequence[Section]) -> Table:
             "systematic": systematic(parameter.estimate, parameter.display),
             "meaning": parameter.meaning,
             "bench": parameter.bench,
-            "method": section.method.name,
+            "method": section.model.name,
             "reason": str(parameter.estimate.reason),
         }
         for section in sections
-        for parameter in section.parameters
+        for parameter in section.identified.parameters
     ]
     columns = (
         Column("parameter", "Parameter"),
@@ -69,7 +69,7 @@ def changes_table(before: str, after: str, section: Section) -> Table:
         f"(Benjamini and Hochberg): of what is declared changed {CHANGED:.0%} may be false."
     )
     return Table(
-        f"changes-{section.method.name.replace('_', '-')}", "What has changed", columns, rows,
+        f"changes-{section.model.name.replace('_', '-')}", "What has changed", columns, rows,
         note=note,
     )  # fmt: skip
 
@@ -121,8 +121,3 @@ def systematic(estimate: Estimate, display: str = "") -> str:
         f"{words_here(part.source)} {shown(part.standard_uncertainty)}"
         for part in estimate.systematic
     )
-
-
-def words(name: str) -> str:
-    """`coulomb positive`."""
-    return name.replace("_", " ")

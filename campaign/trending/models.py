@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.errors import UsageError
-from campaign.experiments.interface import bench_of
+from campaign.experiments.interface import Experiment, bench_of
 from campaign.identify.identification import Section, fitted_again, identify
 from campaign.identify.material import Chosen
-from campaign.identify.method import Method
-from campaign.plugins import Kinds
 from campaign.trending.members import Member
 from campaign.trending.series import TWIN, Point, Series, add_point, made
 from campaign.trial import Outcome, Role
@@ -30,35 +28,35 @@ class Fitted:
 
 
 def fit_models(
-    members: Sequence[Member], methods: Kinds[Method], models: Sequence[str]
+    members: Sequence[Member], known: Mapping[str, Experiment], models: Sequence[str]
 ) -> tuple[Fitted, ...]:
     """Each method's parameters over the runs.
 
     Raises UsageError for names that no method has.
     """
-    unknown = [name for name in models if name not in methods]
+    unknown = [name for name in models if name not in known]
     if unknown:
-        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(methods)}")
-    return tuple(_fitted(members, methods, name) for name in dict.fromkeys(models))
+        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(known)}")
+    return tuple(_fitted(members, known, name) for name in dict.fromkeys(models))
 
 
-def _fitted(members: Sequence[Member], methods: Kinds[Method], name: str) -> Fitted:
+def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> Fitted:
     first: Section | None = None
     found: dict[str, tuple[Section, list[Point], list[str]]] = {}
     problems: list[str] = []
     seen: dict[tuple[str, ...], Member] = {}
     for member in members:
-        why, section = _section(member, methods, name, first)
-        if section is None or section.identified is None:
+        why, section = _section(member, known, name, first)
+        if section is None or section.result is None:
             problems.append(f"{member.name}: {name}: {why}")
             continue
         if first is None:
             first = section
-            found = {p.estimate.name: (section, [], []) for p in section.parameters}
+            found = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
         prints = tuple(text for own in member.identical.values() for text in own)
         twin = seen.setdefault(prints, member) if prints else member
         same = "" if twin is member else f"{TWIN} {twin.name}"
-        for parameter in section.parameters:
+        for parameter in section.identified.parameters:
             if parameter.estimate.name in found:
                 _, points, left_out = found[parameter.estimate.name]
                 estimate = parameter.estimate
@@ -68,7 +66,7 @@ def _fitted(members: Sequence[Member], methods: Kinds[Method], name: str) -> Fit
             points,
             left_out,
             test=name,
-            title=methods[name].summary,
+            title=known[name].model.summary,
             quantity=each,
             name=each.replace("_", " "),
             unit=_unit(found, each),
@@ -80,7 +78,7 @@ def _fitted(members: Sequence[Member], methods: Kinds[Method], name: str) -> Fit
 
 
 def _section(
-    member: Member, methods: Kinds[Method], name: str, first: Section | None
+    member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
 ) -> tuple[str, Section | None]:
     """The method's section of a run, by the structure that the first one settled on."""
     trials = tuple(
@@ -95,16 +93,17 @@ def _section(
         if first is not None:
             section = fitted_again(first, bench_of(trials[0].trial), chosen)
         else:
-            (section,) = identify(chosen, methods, models=[name]).sections
+            (section,) = identify(chosen, known, models=[name]).sections
     except UsageError as error:
         return str(error), None
     return section.problem, section
 
 
 def _unit(found: Mapping[str, tuple[Section, list[Point], list[str]]], name: str) -> str:
-    return next(p.estimate.unit for p in found[name][0].parameters if p.estimate.name == name)
+    parameters = found[name][0].identified.parameters
+    return next(p.estimate.unit for p in parameters if p.estimate.name == name)
 
 
 def _display(section: Section, name: str) -> str:
-    own = next(p for p in section.parameters if p.estimate.name == name)
+    own = next(p for p in section.identified.parameters if p.estimate.name == name)
     return own.display or own.estimate.unit

@@ -22,8 +22,6 @@ from campaign.estimation.trends.changes import Change, Jump, change, jumps_of
 from campaign.estimation.trends.family import RATE, adjusted, detectable, level_of
 from campaign.estimation.trends.scatter import Mixture
 from campaign.experiments.interface import Experiment
-from campaign.identify.method import Method
-from campaign.plugins import Kinds
 from campaign.reason import NONE, Cause, Reason
 from campaign.trending.covariates import (
     ORDER,
@@ -180,7 +178,7 @@ def follow(
     runs: Sequence[RunReader],
     experiments: Mapping[str, Experiment],
     over: str = TIME,
-    methods: Kinds[Method] | None = None,
+    known: Mapping[str, Experiment] | None = None,
     models: Sequence[str] = (),
     exchanged: Sequence[tuple[str, Path]] = (),
 ) -> Trends:
@@ -188,7 +186,7 @@ def follow(
 
     Args:
         over: `time`, `order`, `temperature`, a tag that has a number, or one of the numbers.
-        models: of `methods`, those whose parameters are followed as well.
+        models: of `known`, those whose parameters are followed as well.
         exchanged: what was exchanged before which run (`with_exchanged`).
 
     Raises UsageError for runs and names that nothing can be made of.
@@ -196,8 +194,8 @@ def follow(
     members = with_exchanged(members_of(runs, experiments), exchanged)
     series = series_of(members)
     fitted: tuple[Fitted, ...] = ()
-    if models and methods is not None:
-        fitted = fit_models(members, methods, models)
+    if models and known is not None:
+        fitted = fit_models(members, known, models)
         series += [each for one in fitted for each in one.series]
     if not series:
         raise UsageError("the runs found nothing that could be followed")

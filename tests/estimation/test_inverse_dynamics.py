@@ -39,8 +39,8 @@ from campaign.estimation.inverse.validation import (
     improvement,
     relative_error,
 )
-from campaign.identify.inverse.inverse_fit import find
-from campaign.identify.inverse.motions import Moved, with_slowest
+from campaign.experiments.any_motion.inverse_fit import find
+from campaign.experiments.any_motion.motions import Moved, with_slowest
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.rigs import Rig, random_rigs
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from campaign.experiments.interface import (
 from campaign.options import describe
 from campaign.protocol import check_limits, load_protocol, make_plan
 from campaign.trial import Most
+from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import execute, failed, table
 
 ROOT = Path(__file__).parents[2]
@@ -39,6 +41,7 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # as `import` does
     spec.loader.exec_module(module)
     found = module.EXPERIMENT
     assert isinstance(found, Experiment)
@@ -61,6 +64,12 @@ def test_the_example_runs_and_finds_the_friction(experiment: Experiment, tmp_pat
         rate = float(str(row["rate"]))
         expected = float(str(tc)) + 141.176 * 0.03 + (4 + 141.176 * 0.001) * rate
         assert row["friction"] == pytest.approx(expected, rel=0.01)
+    with experiments().including(experiment):
+        assert suitable("coast_down", done) == (list(done), "")
+        (parameter,) = asked("coast_down", done).identified.parameters
+    means = [float(str(row["friction"])) for row in rows]
+    assert parameter.estimate.value == pytest.approx(np.mean(means))
+    assert parameter.estimate.has_interval
     nothing = experiment.analyse(TestData("", "", {}, tuple(map(failed, done))))
     assert not nothing.figures
     assert "did not complete" in nothing.notes[0]

@@ -10,15 +10,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial
 from campaign.backends.serial import SerialBackend, SerialOptions
 from campaign.estimation.gate import UNPHYSICAL
 from campaign.experiments import experiments
 from campaign.experiments.excitation.account import dynamics_of, motion_of
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import Experiment
-from campaign.identify.methods.frequency_response import METHOD as FREQUENCY_RESPONSE
-from campaign.identify.methods.inverse_dynamics import METHOD as INVERSE_DYNAMICS
 from campaign.physics.bench import Bench
 from campaign.physics.limits import motion
 from campaign.protocol import check_limits, load_protocol, make_plan
@@ -28,6 +25,7 @@ from campaign.result import Result
 from campaign.signals import MultiSine, Polyline
 from campaign.trial import Trial
 from tests.backends.test_files import opened
+from tests.experiments.asked import suitable
 from tests.experiments.laboratory import Done, analyse, execute, table, trials
 from tests.link.controllers import controller
 from tests.physics.benches import bench
@@ -261,9 +259,9 @@ def test_a_limit_is_held_beside_what_was_reached() -> None:
 
 
 def test_identification_takes_them() -> None:
-    of_series, why = INVERSE_DYNAMICS.suits(cast("tuple[ArchivedTrial, ...]", series()))
+    of_series, why = suitable("inverse_dynamics", series())
     assert len(of_series) == 1, why
-    responses, why = FREQUENCY_RESPONSE.suits(cast("tuple[ArchivedTrial, ...]", shaken()))
+    responses, why = suitable("frequency_response", shaken())
     assert len(responses) == 7, why
 
 

@@ -19,8 +19,8 @@ from campaign.errors import ExitCode
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.over_a_turn import over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
+from campaign.experiments.motion.sliding import Point
 from campaign.identify.agreement import disagreements
-from campaign.identify.sliding import Point
 from tests.identify.unseen import curve, identified, notes, told
 
 RATE = 66.85
@@ -173,7 +173,8 @@ def test_methods_that_disagree_are_told() -> None:
         one = replace(one, origin=origin or Origin.MEASURED)
         found = [one, *(replace(one, name=each) for each in beside)]
         parameters = tuple(SimpleNamespace(estimate=each, display="") for each in found)
-        return SimpleNamespace(method=SimpleNamespace(name=method), parameters=parameters)
+        identified = SimpleNamespace(parameters=parameters)
+        return SimpleNamespace(model=SimpleNamespace(name=method), identified=identified)
 
     first = section("friction_map", "coulomb_torque_positive", 1.55, 0.08)
     (said,) = disagreements([first, section("inverse_dynamics", "coulomb_positive", 3.07, 0.16)])

@@ -11,14 +11,14 @@ import pytest
 import tomlkit
 
 from campaign.estimate import Estimate
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.compensations import (
     Entries,
     identified_compensations,
     without_identified,
 )
 from campaign.identify.identification import Identification, Section, _with_place
-from campaign.identify.method import Identified, Parameter
+from campaign.parameter import Identified, Parameter
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.result import Result
@@ -78,7 +78,9 @@ def entries(text: str, **sections: Sequence[Parameter]) -> Entries:
     bench = bench_of(text)
     made = tuple(
         Section(
-            methods()[name], None, identified=_with_place(Identified(tuple(own), Result()), bench)
+            identifying()[name],
+            None,
+            result=_with_place(Result(identified=Identified(tuple(own))), bench),
         )
         for name, own in sections.items()
     )

@@ -10,15 +10,15 @@ import pytest
 
 from campaign.estimation.frequency.measured import MeasuredResponse
 from campaign.estimation.inverse.motion import Filtering, motion_of_position
-from campaign.identify.frequency.figures import figures as response_figures
-from campaign.identify.frequency.frequency_fit import Masses
-from campaign.identify.inverse.figures import figures, friction_figure
-from campaign.identify.inverse.inverse_fit import InverseDynamics, predicted
-from campaign.identify.inverse.inverse_fit import find as find_inverse
-from campaign.identify.inverse.motions import Moved, with_slowest
-from campaign.identify.whole.models import models
-from campaign.identify.whole.shown import figures as whole_figures
-from campaign.identify.whole.whole_model_fit import find as find_whole
+from campaign.experiments.any_motion.figures import figures, friction_figure
+from campaign.experiments.any_motion.inverse_fit import InverseDynamics, predicted
+from campaign.experiments.any_motion.inverse_fit import find as find_inverse
+from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.frequency_response.model.figures import figures as response_figures
+from campaign.experiments.frequency_response.model.frequency_fit import Masses
+from campaign.experiments.whole_model.models import models
+from campaign.experiments.whole_model.shown import figures as whole_figures
+from campaign.experiments.whole_model.whole_model_fit import find as find_whole
 from campaign.result import Curve, Figure
 from tests.estimation.rigs import Rig, random_rigs
 
@@ -57,7 +57,7 @@ def test_the_plain_regression_is_drawn_beside_the_friction_models(
     regression: InverseDynamics, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "campaign.identify.whole.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
+        "campaign.experiments.whole_model.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
     )
     still = replace(regression.filtering, slowest=0.25 * regression.filtering.slowest)
     whole = find_whole(regression.pieces, [], still, starts=1)

@@ -14,26 +14,24 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.errors import UsageError
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.identification import Identification, identify
 from campaign.identify.material import Chosen, choose
-from campaign.identify.method import Identified, Material
 from campaign.identify.page import _looks, write_identification
-from campaign.physics.bench import Bench
 from campaign.protocol import as_tree
 from campaign.resources import protocols_folder, templates_folder
-from campaign.result import Table
+from campaign.result import Result, Table
 from campaign.trial import Task
 from tests.archives import archived, executed, plan_of
 from tests.estimation.coverage import holds
 from tests.estimation.frequency import test_best_linear as static
-from tests.identify.test_frequency_response_method import (
+from tests.experiments.asked import asked
+from tests.experiments.test_frequency_response_model import (
     DRIVE,
     GRID,
     Answer,
     answered,
     driven,
-    method,
     trials,
 )
 
@@ -51,14 +49,12 @@ def chosen(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> Chos
     return choose(path.parent, path.name)
 
 
-def held(own: Sequence[ArchivedTrial], unseen: Sequence[ArchivedTrial]) -> Identified:
-    bench = Bench.model_validate(own[0].trial.bench, context={"si": True})
-    material = Material(bench, tuple(own), tuple(unseen))
-    return method().identify(material, method().options())
+def held(own: Sequence[ArchivedTrial], unseen: Sequence[ArchivedTrial]) -> Result:
+    return asked("frequency_response", own, unseen)
 
 
-def table(found: Identified, key: str) -> Table:
-    return next(each for each in found.result.tables if each.key == key)
+def table(found: Result, key: str) -> Table:
+    return next(each for each in found.tables if each.key == key)
 
 
 def test_an_unseen_run_is_predicted_line_by_line_and_over_time(tmp_path: Path) -> None:
@@ -80,7 +76,7 @@ def test_an_unseen_run_is_predicted_line_by_line_and_over_time(tmp_path: Path) -
     assert len(outputs) == 4
     for data in ("fitted", "unseen"):
         assert 0.002 < outputs[data, "two inertias"].value < 0.02
-    keys = [figure.key for figure in found.result.figures]
+    keys = [figure.key for figure in found.figures]
     assert keys[:2] == ["prediction-1-load", "output-1-load"]
     assert "residuals-1-load" in keys
 
@@ -90,7 +86,7 @@ def test_a_drive_that_has_changed_is_not_predicted(
 ) -> None:
     own = run_of(tmp_path / "a", driven())
     softer = replace(DRIVE, stiffness=0.97 * DRIVE.stiffness)
-    monkeypatch.setattr("tests.identify.test_frequency_response_method.DRIVE", softer)
+    monkeypatch.setattr("tests.experiments.test_frequency_response_model.DRIVE", softer)
     found = held(own, run_of(tmp_path / "b", driven(), 100))
     for row in table(found, "validation").rows:
         assert "times the square" in str(row["verdict"])
@@ -104,7 +100,7 @@ def test_the_same_samples_are_refused_whatever_run_they_are_in(tmp_path: Path) -
     again = chosen(tmp_path / "b", driven(), count=8)  # of which one is new
     assert own.run.identity != again.run.identity
     with pytest.raises(UsageError, match="the same samples as"):
-        identify(own, methods(), models=("frequency_response",), validation=again)
+        identify(own, identifying(), models=("frequency_response",), validation=again)
 
 
 def test_the_same_phases_are_told(tmp_path: Path) -> None:
@@ -112,19 +108,19 @@ def test_the_same_phases_are_told(tmp_path: Path) -> None:
     again = driven()
     again(np.random.default_rng(0).standard_normal(4096))  # its noise has gone on
     found = held(run_of(tmp_path / "a", driven()), run_of(tmp_path / "b", again))
-    assert any("phases and all" in note for note in found.result.notes)
+    assert any("phases and all" in note for note in found.notes)
     other = held(run_of(tmp_path / "c", driven()), run_of(tmp_path / "d", driven(), 100))
-    assert not any("phases and all" in note for note in other.result.notes)
+    assert not any("phases and all" in note for note in other.notes)
 
 
 def test_correlations_and_condition_are_told(tmp_path: Path) -> None:
     found = held(run_of(tmp_path / "a", driven()), ())
-    assert found.correlations["stiffness", "load_inertia"] > 0.5
-    assert all(-1.0 <= share <= 1.0 for share in found.correlations.values())
+    assert found.identified.correlations["stiffness", "load_inertia"] > 0.5
+    assert all(-1.0 <= share <= 1.0 for share in found.identified.correlations.values())
     conditions = [row["condition"] for row in table(found, "functions").rows]
     assert all(1.0 <= each < 1e6 for each in conditions)
     pairs = table(found, "correlations").rows
-    assert len(pairs) == len(found.correlations)
+    assert len(pairs) == len(found.identified.correlations)
 
 
 def test_levels_of_a_static_nonlinearity_have_their_closed_form_in_decibels(tmp_path: Path) -> None:
@@ -221,7 +217,10 @@ def shaken(
 def identified(path: Path, unseen: Path | None = None) -> Identification:
     other = choose(unseen.parent, unseen.name) if unseen is not None else None
     return identify(
-        choose(path.parent, path.name), methods(), models=["frequency_response"], validation=other
+        choose(path.parent, path.name),
+        identifying(),
+        models=["frequency_response"],
+        validation=other,
     )
 
 
@@ -254,15 +253,13 @@ def test_a_linear_bench_has_masses_in_its_own_units(linear: tuple[Identification
     assert told["damping"].estimate.unit == "N s/m"
     assert "nertia" not in " ".join(each.meaning + each.advice for each in found.parameters)
     (section,) = found.sections
-    assert section.identified is not None
-    result = section.identified.result
-    assert any(
-        "N, crest" in str(r["excitation"]) for r in table(section.identified, "responses").rows
-    )
+    assert section.result is not None
+    result = section.result
+    assert any("N, crest" in str(r["excitation"]) for r in table(section.result, "responses").rows)
     # The unseen run of the same strength is predicted; a weaker one is another response.
     verdicts = {
         (str(row["source"]), row["model"]): row["verdict"]
-        for row in table(section.identified, "validation").rows
+        for row in table(section.result, "validation").rows
     }
     assert verdicts["shaken, force, rms 300 N", "two masses"] == "as closely as scatter allows"
     assert "times the square" in str(verdicts["shaken, force, rms 150 N", "two masses"])
@@ -276,8 +273,8 @@ def test_a_linear_bench_has_masses_in_its_own_units(linear: tuple[Identification
 def axis_units(found: Identification) -> list[str]:
     """Units of the figures' axes."""
     (section,) = found.sections
-    assert section.identified is not None
-    panels = [panel for each in section.identified.result.figures for panel in each.panels]
+    assert section.result is not None
+    panels = [panel for each in section.result.figures for panel in each.panels]
     return [axis.unit for panel in panels for axis in (panel.x, panel.y) if axis.label != "Phase"]
 
 

@@ -16,12 +16,13 @@ from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
-from campaign.identify import methods
+from campaign.experiments.interface import Model, suitable
+from campaign.identify import identifying
 from campaign.identify.identification import Identification, _section, identify
 from campaign.identify.material import choose
-from campaign.identify.method import Parameter, Unseen
 from campaign.identify.page import _advice, write_identification
 from campaign.identify.tables import parameters_table
+from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.resources import templates_folder
@@ -41,7 +42,7 @@ def run(results: Path) -> str:
 def found(results: Path, run: str) -> Identification:
     return identify(
         choose(results, f"{run}:monday"),
-        methods(),
+        identifying(),
         models=PLAIN,
         validation=choose(results, f"{run}:tuesday"),
         compared=choose(results, f"{run}:worn"),
@@ -62,14 +63,14 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
 ) -> None:
     """A narrow interval beside a doubt of unknown size is no interval that holds."""
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     first, *rest = section.identified.parameters
     doubt = Systematic("friction, at this excitation")
     doubted = replace(first, estimate=replace(first.estimate, systematic=(doubt,)))
     said = Conclusion(("It has an inertia of ", Amount(doubted.estimate), "."))
-    result = replace(section.identified.result, conclusions=(said,))
-    own = replace(section.identified, parameters=(doubted, *rest), result=result)
-    told = replace(found, sections=(replace(section, identified=own),))
+    own = replace(section.identified, parameters=(doubted, *rest))
+    result = replace(section.result, conclusions=(said,), identified=own)
+    told = replace(found, sections=(replace(section, result=result),))
     remark = "Of unknown size, and in no interval: friction, at this excitation."
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     assert remark in page.read_text(encoding="utf-8")
@@ -79,8 +80,8 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
 
 def test_unseen_motion_is_predicted(found: Identification) -> None:
     (section,) = found.sections
-    assert section.identified is not None
-    [table] = [t for t in section.identified.result.tables if t.key == "structures"]
+    assert section.result is not None
+    [table] = [t for t in section.result.tables if t.key == "structures"]
     assert all(0.0 < row["validation"].value < 0.5 for row in table.rows)  # type: ignore[union-attr]
 
 
@@ -95,7 +96,7 @@ def test_what_changed_is_declared_and_what_did_not_is_not(
     assert holds(worn.difference.difference, 0.1 * rig.truth["coulomb_positive"])
     same = identify(
         choose(results, f"{run}:monday"),
-        methods(),
+        identifying(),
         models=PLAIN,
         compared=choose(results, f"{run}:tuesday"),
     ).sections[0]
@@ -185,8 +186,8 @@ def test_a_part_of_nothing_that_suits_is_told_with_reasons(
     results: Path, run: str, tmp_path: Path
 ) -> None:
     chosen = choose(results, f"{run}:monday")
-    for name in methods():
-        trials, why = methods()[name].suits(())
+    for name in identifying():
+        trials, why = suitable(identifying()[name], ())
         assert not trials
         assert why
     assert chosen.trials
@@ -219,9 +220,9 @@ def test_a_recording_that_was_imported_twice_is_not_held_against_itself(
     one = choose(results, f"{run}:monday")
     assert one.run.identity != other.run.identity
     with pytest.raises(UsageError, match=r"the same samples as .*monday in trials"):
-        identify(one, methods(), models=PLAIN, **{option: other})  # type: ignore[arg-type]
+        identify(one, identifying(), models=PLAIN, **{option: other})  # type: ignore[arg-type]
     fresh = choose(results, f"{run}:tuesday")
-    assert identify(fresh, methods(), models=PLAIN, **{option: other}).parameters  # type: ignore[arg-type]
+    assert identify(fresh, identifying(), models=PLAIN, **{option: other}).parameters  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ["page", "bench", "folder"])
@@ -276,9 +277,11 @@ def test_what_makes_a_part_smaller_is_a_sentence(source: str) -> None:
 
 def test_a_method_that_nothing_suits_is_counted_as_well() -> None:
     said: list[str] = []
-    method = cast("Any", SimpleNamespace(name="ramps", suits=lambda trials: ((), "no trial")))
+    kind = replace(
+        identifying()["ramps"], model=Model("ramps", "", suits=lambda trials: ((), "no trial"))
+    )
     chosen = cast("Any", SimpleNamespace(name="run", trials=()))
-    section = _section(method, None, cast("Any", None), chosen, None, said.append)
+    section = _section(kind, None, cast("Any", None), chosen, None, said.append)
     assert (section.problem, said) == ("no trial", ["ramps, run"])
 
 
@@ -309,9 +312,10 @@ def test_a_validation_that_the_model_does_not_predict_is_a_warning(
 ) -> None:
     """At the terminal, on the page and in the data, with its size."""
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     own = replace(section.identified, unseen=Unseen(share, "force"))
-    told = replace(found, sections=(replace(section, identified=own),))
+    result = replace(section.result, identified=own)
+    told = replace(found, sections=(replace(section, result=result),))
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     _say(told)
     text = f"validation residual (RMS): {100 * share:.2g} % of the measured force"
@@ -325,10 +329,10 @@ def test_a_validation_that_the_model_does_not_predict_is_a_warning(
 
 def test_methods_that_validate_tell_what_they_leave(found: Identification) -> None:
     (section,) = found.sections
-    assert section.identified is not None
+    assert section.result is not None
     assert section.identified.unseen is not None
     assert section.identified.unseen.what == "force"  # of an axis that travels
-    [table] = [t for t in section.identified.result.tables if t.key == "structures"]
+    [table] = [t for t in section.result.tables if t.key == "structures"]
     left = [row["validation"].value for row in table.rows]  # type: ignore[union-attr]
     assert section.identified.unseen.share in left
-    assert section.warnings == ()
+    assert section.identified.warnings == ()

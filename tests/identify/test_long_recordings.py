@@ -20,15 +20,15 @@ from campaign.estimation.inverse.motion import (
 )
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import TERMS
-from campaign.identify import methods
+from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.whole_model import parts
+from campaign.experiments.whole_model.models import Sizes, models
+from campaign.experiments.whole_model.parts import telling_parts
+from campaign.experiments.whole_model.residuals import Residuals, steps_between
+from campaign.experiments.whole_model.whole_model_fit import find
+from campaign.identify import identifying
 from campaign.identify.identification import identify
-from campaign.identify.inverse.motions import Moved, with_slowest
 from campaign.identify.material import choose
-from campaign.identify.whole import parts
-from campaign.identify.whole.models import Sizes, models
-from campaign.identify.whole.parts import telling_parts
-from campaign.identify.whole.residuals import Residuals, steps_between
-from campaign.identify.whole.whole_model_fit import find
 from tests.estimation.rigs import random_rigs
 
 
@@ -142,7 +142,7 @@ def test_methods_are_counted(results: Path) -> None:
     names = ("friction_map", "inverse_dynamics")
     compared = choose(results, f"{run}:tuesday")
     chosen = choose(results, f"{run}:monday")
-    identify(chosen, methods(), models=names, compared=compared, say=said.append)
+    identify(chosen, identifying(), models=names, compared=compared, say=said.append)
 
     heads = [text.split(": ")[0] for text in said]
     assert list(dict.fromkeys(heads)) == [

@@ -11,7 +11,7 @@ import pytest
 
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.identification import Section, identify
 from campaign.identify.material import choose
 from tests.estimation.bristle_plants import Array, Interface, Truth, multisine
@@ -81,16 +81,16 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def section(results: Path, test: str) -> Section:
     run = next(results.glob("*-small.nxs")).stem
-    found = identify(choose(results, f"{run}:{test}"), methods(), models=("presliding",))
+    found = identify(choose(results, f"{run}:{test}"), identifying(), models=("presliding",))
     (own,) = found.sections
     return own
 
 
 def test_an_imported_small_motion_tells_stiffness_damping_and_inertia(results: Path) -> None:
     own = section(results, "small")
-    assert own.identified is not None, own.problem
+    assert own.result is not None, own.problem
     assert len(own.trials) == 2
-    told = {each.estimate.name: each for each in own.parameters}
+    told = {each.estimate.name: each for each in own.identified.parameters}
     for name, true, key in (
         ("stiffness_at_rest", 5000.0, "friction.load.bristle_stiffness"),
         ("bristle_damping", 60.0, "friction.load.bristle_damping"),
@@ -99,13 +99,13 @@ def test_an_imported_small_motion_tells_stiffness_damping_and_inertia(results: P
         assert holds(told[name].estimate, true), (name, told[name].estimate)
         assert told[name].estimate.half_width < 0.02 * true
         assert told[name].bench == key
-    assert any("Nobody planned" in note for note in own.identified.result.notes)
+    assert any("Nobody planned" in note for note in own.result.notes)
 
 
 def test_slow_reversals_tell_stiffness_and_no_inertia(results: Path) -> None:
     own = section(results, "reversals")
-    assert own.identified is not None, own.problem
-    told = {each.estimate.name: each.estimate for each in own.parameters}
+    assert own.result is not None, own.problem
+    told = {each.estimate.name: each.estimate for each in own.identified.parameters}
     stiffness = told["stiffness_at_rest"]
     assert not stiffness.has_interval or holds(stiffness, 5000.0)
     inertia = told.get("inertia")
@@ -114,7 +114,7 @@ def test_slow_reversals_tell_stiffness_and_no_inertia(results: Path) -> None:
 
 def test_a_sliding_recording_is_not_taken_and_the_reason_is_told(results: Path) -> None:
     own = section(results, "sliding")
-    assert own.identified is None
+    assert own.result is None
     assert own.trials == ()  # nothing was fitted
     assert "no trial is a small motion below breakaway" in own.problem
     assert "slides" in own.problem or "does not come back" in own.problem

@@ -10,7 +10,7 @@ import pytest
 from campaign.cli.identify import identify_run
 from campaign.errors import NoResultError
 from campaign.estimate import Estimate, Origin
-from campaign.identify.sliding import places
+from campaign.experiments.motion.sliding import places
 from tests.identify.unseen import (
     curve,
     identified,
@@ -96,7 +96,7 @@ def test_motion_in_one_direction(tmp_path: Path) -> None:
     assert holds(found["inertia"], 0.4)
     assert holds(found["viscous_negative"], 0.7)
     assert holds(found["coulomb_negative"], 2.0)
-    assert section.identified is not None
+    assert section.result is not None
     keys = {each.bench for each in section.identified.parameters}
     assert not any(key.startswith("friction") for key in keys)
     assert not section.identified.settings
@@ -179,7 +179,7 @@ def test_a_tribometer_with_several_loads_tells_coefficients(tmp_path: Path) -> N
         assert holds(found[f"stribeck_velocity_{way}"], 0.01)
     # Of several loads there is no friction curve, and a bench gets none.
     assert not any(name.startswith("coulomb_torque") for name in found)
-    assert section.identified is not None
+    assert section.result is not None
     assert not any(each.bench for each in section.identified.parameters)
     assert not section.identified.settings
     assert "Normal loads differ" in notes(section)

@@ -9,7 +9,7 @@ import numpy as np
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
-from campaign.identify import methods
+from campaign.identify import identifying
 from campaign.identify.identification import Section, identify
 from campaign.identify.material import choose
 
@@ -75,16 +75,16 @@ def identified(results: Path, method: str, *settings: str) -> Section:
     """What one method makes of the only run there is."""
     run = next(path for path in results.glob("*.nxs") if not path.stem.endswith("-results"))
     chosen = choose(results, run.stem)
-    return identify(chosen, methods(), models=(method,), settings=settings).sections[0]
+    return identify(chosen, identifying(), models=(method,), settings=settings).sections[0]
 
 
 def told(section: Section) -> dict[str, Estimate]:
     """Its numbers by name."""
-    assert section.identified is not None, section.problem
+    assert section.result is not None, section.problem
     return {each.estimate.name: each.estimate for each in section.identified.parameters}
 
 
 def notes(section: Section) -> str:
     """What it says besides."""
-    assert section.identified is not None, section.problem
-    return " ".join(section.identified.result.notes)
+    assert section.result is not None, section.problem
+    return " ".join(section.result.notes)

@@ -19,10 +19,7 @@ from campaign.cli.report import report_run
 from campaign.errors import DEBUG, PRECEDENCE, CampaignError, ExitCode, NoResultError
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.identify import methods
-from campaign.identify.method import Identified, Material, Method
-from campaign.options import Options
+from campaign.experiments.interface import Experiment, Model, TestData, TrialData, metrics
 from campaign.result import Finding, Result
 from tests.execution.test_measuring import numbered, run
 from tests.experiments.laboratory import trials
@@ -149,13 +146,14 @@ def test_a_run_in_which_nothing_is_identified(
 
 
 def test_a_method_whose_numbers_overflow_costs_that_method(tmp_path: Path) -> None:
-    def overflow(material: Material, options: Options) -> Identified:
+    def overflow(data: TestData) -> Result:
         raise OverflowError("math range error")
 
-    method = Method("overflowing", "", Options, lambda trials: (trials, ""), overflow)
-    reader = archived(tmp_path, top_rate(failing(RuntimeError("no"), Counter(), ())))
-    with methods().including(method), pytest.raises(NoResultError) as refused:
-        identify_run(str(reader.path), tmp_path, models=(method.name,))
+    kind = top_rate(failing(RuntimeError("no"), Counter(), ()))
+    kind = replace(kind, model=Model("overflowing", "", analyse=overflow))
+    reader = archived(tmp_path, kind)
+    with experiments().including(kind), pytest.raises(NoResultError) as refused:
+        identify_run(str(reader.path), tmp_path, models=(kind.model.name,))
     assert "overflowing: it failed: OverflowError: math range error" in str(refused.value)
 
 

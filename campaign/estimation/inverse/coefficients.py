@@ -1,7 +1,7 @@
 """Coefficients of an inverse dynamic model as estimates: scatter, and what other rows would say.
 
 `coefficients` is for terms that are known and a force that is not late. Where terms and delay are
-to be found as well, `campaign.identify.inverse` does that, with the same two steps.
+to be found as well, `campaign.experiments.any_motion` does that, with the same two steps.
 """
 
 from __future__ import annotations

@@ -29,9 +29,10 @@ from campaign.estimation.relative_rate import (
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
 from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
+from campaign.experiments.breakaway.parameters import parameters_of
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
 from campaign.experiments.shared import fitting_ramps
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
@@ -40,6 +41,7 @@ from campaign.experiments.shared.found_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
+from campaign.parameter import Identified
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
@@ -326,6 +328,8 @@ def _analyse(data: TestData) -> Result:
     known = any(bench_of(item.trial).axis.inertia is not None for item in data.completed())
     slid = not findings and any(_slid(item) for item in data.completed())
     settings = Settings.of(data, BreakawayOptions)
+    asked = data.model is not None
+    parameters = tuple(parameters_of(groups, curve_of, notes)) if asked else ()
     return Result(
         tuple(tables),
         tuple(figures),
@@ -334,6 +338,7 @@ def _analyse(data: TestData) -> Result:
         breakaway_conclusions(
             findings, rates, settings, inertia_known=known or not rates, slid=slid
         ),
+        identified=Identified(parameters),
     )
 
 
@@ -393,4 +398,9 @@ EXPERIMENT = Experiment(
         DRIVE_TORQUE: "the torque at which the load slides",
         GYRO_RATE: "the presliding curve, and the moment at which the load slides",
     },
+    model=Model(
+        name="ramps",
+        summary="breakaway torque, stiffness of the interface that slips last, and what the others "
+        "carry, from ramps",
+    ),
 )

@@ -32,6 +32,7 @@ from campaign.experiments.frequency_response.figures import (
     torque_figure,
 )
 from campaign.experiments.frequency_response.marks import place_names, servo_figure
+from campaign.experiments.frequency_response.model.analysis import MODEL
 from campaign.experiments.frequency_response.sine_commands import (
     rate_sine,
     told_amplitude,
@@ -387,4 +388,5 @@ EXPERIMENT = Experiment(
             trials=_refined,
         ),
     ),
+    model=MODEL,
 )

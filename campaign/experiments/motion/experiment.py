@@ -7,7 +7,7 @@ claimed of the rest of the motion but what it was.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from campaign.experiments.interface import Experiment, TestData, TrialData, benc
 from campaign.experiments.motion.account import account_of
 from campaign.experiments.motion.conclusions import motion_conclusions
 from campaign.experiments.motion.figures import friction_figure, motion_figure
+from campaign.experiments.motion.friction_map import MODEL as FRICTION_MAP
 from campaign.experiments.motion.tables import (
     friction_table,
     line_findings,
@@ -35,6 +36,7 @@ from campaign.experiments.motion.tables import (
     summary_table,
 )
 from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
+from campaign.experiments.shared.recorded_motion import nothing_to_plan
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -62,13 +64,6 @@ class MotionOptions(Options):
     """Shortest steady stretch that friction is read from, where no windows are named."""
     radius: Length | None = Field(default=None, gt=0)
     """At which a normal load rubs, of an axis that turns: for friction over normal load."""
-
-
-def _trials(options: MotionOptions, bench: Bench) -> Iterable[TrialRequest]:
-    raise ValueError(
-        "a motion is what somebody recorded, so there is nothing to plan: give it "
-        "[[test.recording]] and `campaign import` it"
-    )
 
 
 def _found(options: MotionOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
@@ -198,7 +193,7 @@ EXPERIMENT = Experiment(
     name="motion",
     summary="any recorded motion: its course, tracking error, and friction where it is steady",
     options=MotionOptions,
-    trials=_trials,
+    trials=nothing_to_plan,
     analyse=_analyse,
     measure=_measure,
     requires={
@@ -208,4 +203,5 @@ EXPERIMENT = Experiment(
     can_use=CAN_USE,
     recorded=_found,
     most_samples=MOST_SAMPLES,
+    model=FRICTION_MAP,
 )

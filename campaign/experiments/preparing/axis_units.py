@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from campaign.axis_kind import is_linear, unit_here, words_here
 from campaign.estimate import Estimate
+from campaign.parameter import Identified
 from campaign.reason import Reason
 from campaign.result import (
     Amount,
@@ -40,7 +41,23 @@ def of_its_axis(result: Result) -> Result:
         findings=tuple(map(_finding, result.findings)),
         notes=tuple(map(words_here, result.notes)),
         conclusions=tuple(map(_conclusion, result.conclusions)),
+        identified=_identified(result.identified),
     )
+
+
+def _identified(found: Identified) -> Identified:
+    parameters = tuple(
+        replace(
+            each,
+            estimate=estimate_here(each.estimate),
+            meaning=words_here(each.meaning),
+            display=unit_here(each.display),
+            advice=words_here(each.advice),
+        )
+        for each in found.parameters
+    )
+    unseen = found.unseen and replace(found.unseen, what=words_here(found.unseen.what))
+    return replace(found, parameters=parameters, unseen=unseen)
 
 
 def estimate_here(estimate: Estimate) -> Estimate:

@@ -8,9 +8,9 @@ trials at once: unlike a torque ramp, which only shows stiffness, that measures 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
-from pydantic import Field
 
 from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
@@ -19,58 +19,49 @@ from campaign.estimation.presliding_dynamics.presliding_fit import (
     PreslidingDynamics,
     identify_presliding_dynamics,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
 from campaign.experiments.presliding_multisine.dynamics import (
+    BY_TORQUE,
     QUANTITIES,
     assumed_of,
     damping_figure,
     estimates_of,
     figures_of,
-    record_of,
     remarks,
     table_of,
-    with_torques_known,
+)
+from campaign.experiments.presliding_multisine.options import (
+    PreslidingMultisineOptions,
+    PreslidingOptions,
+)
+from campaign.experiments.presliding_multisine.parameters import identified
+from campaign.experiments.presliding_multisine.small_motions import (
+    is_planned,
+    options_of,
+    records_of,
+    span_of,
+    usable,
 )
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.conclusion_parts import conclusion, determined, setting
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.multisine import (
     PER_LINE,
     below_breakaway,
     first_slip,
     odd_multisine,
 )
-from campaign.options import Options
+from campaign.parameter import NOTHING_IDENTIFIED
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Cell, Conclusion, Finding, Result
-from campaign.trial import Task, Trial, TrialRequest
-from campaign.units import Frequency, Torque
+from campaign.trial import Task, TrialRequest
 
 OWN = ("amplitude", "realisation")
 """What distinguishes the trials of one group."""
+DAMPING = "damping_at_rest"
 FASTEST = 0.5
 """of the torque at which an interface slips: above it a trial hardly is one below breakaway."""
-
-
-class PreslidingMultisineOptions(Options):
-    """Options of a presliding-multisine test."""
-
-    amplitudes: tuple[Torque, ...] = Field(default=(0.5, 1.0, 2.0), min_length=1, max_length=100)
-    """Largest torques of the multisine; all of them far below breakaway."""
-    lowest: Frequency = Field(default=0.5, gt=0)
-    """Lowest line; the others are its odd multiples, and its period is that of the torque."""
-    highest: Frequency = Field(default=60.0, gt=0)
-    """Highest line, well above the resonance of the load on its bristles."""
-    periods: int = Field(default=10, ge=2, le=10_000)
-    """Periods of the torque in a trial."""
-    realisations: int = Field(default=1, ge=1, le=100)
-    """Trials of each amplitude, each with phases of its own."""
-    seed: int = Field(default=1, ge=0, lt=2**63)
-    """Which phases; with the same seed they are the same."""
-    damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
-    """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
-    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
-    """Rate of the recording; at least 8 times the highest line."""
 
 
 def _trials(options: PreslidingMultisineOptions, bench: Bench) -> Iterator[TrialRequest]:
@@ -115,19 +106,24 @@ def _warnings(options: PreslidingMultisineOptions, bench: Bench) -> Iterable[str
         )
 
 
-def _options(trial: Trial) -> PreslidingMultisineOptions:
-    return PreslidingMultisineOptions.model_validate(trial.options, context={"si": True})
-
-
 def _found(items: Sequence[TrialData]) -> dict[str, Estimate]:
-    return estimates_of(_fit(items), bench_of(items[0].trial))
+    return _told(_fit(items), items)
+
+
+def _told(found: PreslidingDynamics, items: Sequence[TrialData]) -> dict[str, Estimate]:
+    """The numbers by name; of an imported torque with what its scale may be off by."""
+    told = estimates_of(found, bench_of(items[0].trial))
+    return told | {
+        name: with_scale(told[name], items[0], DRIVE_TORQUE)
+        for name in BY_TORQUE
+        if name in told and told[name].has_interval
+    }
 
 
 def _fit(items: Sequence[TrialData]) -> PreslidingDynamics:
-    options, bench = _options(items[0].trial), bench_of(items[0].trial)
-    span = options.lowest, options.highest
-    records = [record_of(item, 1.0 / options.lowest) for item in items]
-    return identify_presliding_dynamics(with_torques_known(items, records), assumed_of(bench, span))
+    records = records_of(items)
+    assumed = assumed_of(bench_of(items[0].trial), span_of(items, records))
+    return identify_presliding_dynamics(records, assumed)
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
@@ -136,10 +132,13 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 def _analyse(data: TestData) -> Result:
+    """Each place of the sweep by itself; a model is fitted to all small motions together."""
     notes: list[str] = list(failures_note(data))
-    groups = list(grouped(data.completed(), own=OWN).values())
+    groups = [tuple(each) for each in grouped(data.completed(), own=OWN).values()]
+    if data.model is not None:
+        groups = [data.trials]
     results = [
-        _of_group(group, f"-{number}" if len(groups) > 1 else "")
+        _of_group(data, group, f"-{number}" if len(groups) > 1 else "")
         for number, group in enumerate(groups, start=1)
     ]
     notes += [note for each in results for note in each.notes]
@@ -149,15 +148,17 @@ def _analyse(data: TestData) -> Result:
         tuple(finding for each in results for finding in each.findings),
         tuple(dict.fromkeys(notes)),
         tuple(each for result in results for each in result.conclusions),
+        identified=results[0].identified if results else NOTHING_IDENTIFIED,
     )
 
 
-def _of_group(group: Sequence[TrialData], suffix: str) -> Result:
-    """Trials of one place of the sweep."""
+def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
+    """Trials of one place of the sweep, or all that a model suits."""
     rows: list[dict[str, Cell]] = []
     notes: list[str] = []
     single: list[tuple[float, Estimate]] = []
-    for item in group:
+    planned = all(map(is_planned, group))
+    for item in group if planned else ():  # others may be long, and many
         amplitude = float(str(item.trial.point["amplitude"]))
         try:
             own = metrics(item, _measure)
@@ -165,37 +166,38 @@ def _of_group(group: Sequence[TrialData], suffix: str) -> Result:
             notes.append(f"{item.trial.label}: {error}.")
             continue
         rows.append({"amplitude": amplitude, **own})
-        if own["damping_at_rest"].has_interval:
-            single.append((amplitude, own["damping_at_rest"]))
-    bench, options = bench_of(group[0].trial), _options(group[0].trial)
+        if own[DAMPING].has_interval:
+            single.append((amplitude, own[DAMPING]))
     try:
         found = _fit(group)
     except ValueError as error:
         text = f"No fit of all trials together: {error}."
         tables = (table_of(rows, suffix),) if rows else ()
         return Result(tables, notes=(*notes, text), conclusions=(conclusion(text.rstrip(".")),))
-    joint = estimates_of(found, bench)
+    joint = _told(found, group)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
     shown = trials_of(group)
     figures = list(figures_of(found, suffix, shown))
-    if single:
-        amplitudes = np.array([each for each, _ in single])
-        figures.append(
-            damping_figure(
-                amplitudes,
-                [each for _, each in single],
-                joint,
-                options.damping_ratio,
-                suffix,
-                shown,
-            )
-        )
-    return Result(
+    sizes = [each.amplitude for each in found.fit.records]
+    told = [joint[name] for name in QUANTITIES if name in joint]
+    if single or (not planned and len(told) == len(QUANTITIES) and joint[DAMPING].has_interval):
+        ratio = (data.model or options_of(group[0])).damping_ratio
+        amplitudes = np.array([each for each, _ in single] or sizes)
+        alone = [each for _, each in single]
+        figures.append(damping_figure(amplitudes, alone, joint, ratio, suffix, shown))
+    largest = max(options_of(group[0]).amplitudes) if planned else max(sizes)
+    result = Result(
         (table_of([*rows, {"amplitude": "all", **joint}], suffix),),
         tuple(figures),
-        tuple(Finding.of(joint[name], place) for name in QUANTITIES),
+        tuple(Finding.of(each, place) for each in told),
         (*notes, *remarks(found)),
-        (_conclusion(joint, max(options.amplitudes)),),
+        (_conclusion(joint, largest),),
+    )
+    if data.model is None:
+        return result
+    parameters, missed, more = identified(data, found, joint, planned)
+    return replace(
+        result, tables=(*result.tables, missed), notes=(*result.notes, *more), identified=parameters
     )
 
 
@@ -227,4 +229,10 @@ EXPERIMENT = Experiment(
     fit=below_breakaway,
     warnings=_warnings,
     requires={DRIVE_TORQUE: "the torque that moves the load", GYRO_RATE: "how the load answers"},
+    model=Model(
+        name="presliding",
+        summary="stiffness, damping and inertia from small motions below breakaway",
+        options=PreslidingOptions,
+        suits=usable,
+    ),
 )

@@ -1,0 +1,1 @@
+"""Any motion: its force by inverse dynamics, for the experiments that identify from it."""

@@ -1,0 +1,361 @@
+"""What the motions of a rig say of it: delay first, then terms, then how sure each number is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.inverse.choosing import Structure, choose, structure
+from campaign.estimation.inverse.coefficients import estimates, shifts
+from campaign.estimation.inverse.delay import find_delay
+from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.position_period import find_period
+from campaign.estimation.inverse.regression import Regression
+from campaign.estimation.inverse.rows import all_rows, rows
+from campaign.estimation.inverse.simulation import relative_rate_error
+from campaign.estimation.inverse.terms import (
+    DIRECTIONAL,
+    SYMMETRIC,
+    TERMS,
+    Term,
+    periodic,
+)
+from campaign.estimation.inverse.validation import Prediction, improvement, relative_error
+from campaign.experiments.any_motion.instrumented import (
+    NORMAL_95,
+    Instruments,
+    held_against,
+    instruments,
+    told_delay,
+)
+from campaign.experiments.any_motion.motions import Moved, never_moved
+from campaign.reason import Cause
+
+SQUARED = "_squared"
+"""Behind the name of a term over temperature: the term by which that may bend."""
+ROUNDS = 4
+"""Most times that terms are chosen at a delay, and the delay is found anew with them."""
+BENDS = Cause(
+    "friction bends",
+    "friction bends over these rates: it is one share of a sum, and nothing by itself",
+)
+STATED = Cause("stated", "stated")
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A structure, at a delay, and how it predicts what it was not fitted to.
+
+    Attributes:
+        delay: s.
+        predictions: of each piece of the validation; empty without any.
+        validation: relative residual there; None without any.
+        gain: by how much that is lower than of the plain directional model; None likewise.
+        simulated: relative error of the rate that is simulated from the force; NaN where nobody
+            did that, or nobody can.
+    """
+
+    structure: Structure
+    delay: float
+    predictions: tuple[Prediction, ...] = ()
+    validation: Estimate | None = None
+    gain: Estimate | None = None
+    simulated: float = math.nan
+
+
+@dataclass(frozen=True)
+class InverseDynamics:
+    """All that was found.
+
+    Attributes:
+        delay: of the force, with what a loop may have to do with it; or as it was stated.
+        plain: symmetric and directional model without any delay, as anybody would fit them.
+        tried: all structures, those of `plain` first.
+        chosen: index in `tried`.
+        squares: of the chosen structure's terms, by name, with their systematic parts.
+        estimates: the same as they are told, held against instruments.
+        instruments: of the chosen structure, or None.
+        no_instruments: why there are none, or none along a wanted motion.
+        biased: whether least squares differ from instruments by more than scatter explains, so
+            that these are told.
+        period: over position, that was tried; None without any.
+    """
+
+    pieces: tuple[Moved, ...]
+    filtering: Filtering
+    delay: Estimate
+    tried: tuple[Tried, ...]
+    chosen: int
+    squares: dict[str, Estimate]
+    estimates: dict[str, Estimate]
+    instruments: Instruments | None
+    no_instruments: str
+    biased: bool
+    period: float | None
+
+    @property
+    def best(self) -> Tried:
+        """The chosen one."""
+        return self.tried[self.chosen]
+
+    @property
+    def fit(self) -> Regression:
+        """Of the chosen structure."""
+        return self.best.structure.fit
+
+    @property
+    def matters(self) -> dict[str, float]:
+        """Size of each coefficient, by name, below which its force does not matter here."""
+        return dict(zip(self.best.structure.names, map(float, self.fit.matters), strict=True))
+
+
+def find(
+    pieces: Sequence[Moved],
+    unseen: Sequence[Moved],
+    filtering: Filtering,
+    *,
+    delay: float | None = None,
+    terms: Sequence[Term] | None = None,
+    linear: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> InverseDynamics:
+    """Identify from `pieces`; `unseen` is predicted when everything is chosen.
+
+    Args:
+        delay: of the force (s); None: it is found, and taken out where it is surely there.
+        terms: the structure; None: it is chosen.
+        linear: whether the axis travels: no gravity over an angle then.
+        say: is told which step of four this is; the first has read the motion.
+
+    Raises ValueError where the motions cannot tell even the symmetric model.
+    """
+    motions = [each.motion for each in pieces]
+    say("step 2 of 4, delay and terms")
+    plain = _plain(motions, filtering)
+    start = tuple(terms) if terms is not None else plain[-1].terms
+    late = _delay(motions, start, filtering, delay)
+    shift = _taken_out(late, delay)
+    period = None
+    more, picked = [structure(motions, start, filtering, shift)], 0
+    for _ in range(ROUNDS if terms is None else 0):
+        period = _period(motions, more[picked].terms, filtering, shift)
+        candidates = _candidates(motions, period, linear=linear)
+        more, picked = choose(motions, start, candidates, filtering, shift)
+        # What the terms lacked may have looked like a delay, and the other way round.
+        late = _delay(motions, more[picked].terms, filtering, delay)
+        before, shift = shift, _taken_out(late, delay)
+        if abs(shift - before) <= (late.standard_error or 0.0):
+            shift = before
+            # Beside gravity no ripple shows: it is looked for again in what the new terms leave.
+            again = _period(motions, more[picked].terms, filtering, shift)
+            if again == period or repeats(more[picked]):
+                break
+    else:
+        more = [structure(motions, each.terms, filtering, shift) for each in more]
+    offset = len(plain)
+    found = [(each, 0.0) for each in plain] + [(each, shift) for each in more]
+    picked += offset
+    unseen_motions = [each.motion for each in unseen]
+    told = {*range(len(plain)), picked}
+    say("step 3 of 4, predictions")
+    tried = _validated(found, motions, unseen_motions, filtering, told)
+    best = tried[picked]
+    say("step 4 of 4, instruments")
+    squares = _estimates(best, motions, filtering, late)
+    held, why = instruments(
+        pieces,
+        best.structure.terms,
+        best.structure.fit.values,
+        filtering,
+        best.delay,
+        stated=delay is not None,
+    )
+    estimates, biased = held_against(squares, held)
+    if terms is None:
+        estimates = _without_shares(estimates, best.structure.terms)
+    return InverseDynamics(
+        tuple(pieces),
+        filtering,
+        told_delay(late, held),
+        tuple(tried),
+        picked,
+        squares,
+        estimates,
+        held,
+        why,
+        biased,
+        period,
+    )
+
+
+def _plain(motions: Sequence[Motion], filtering: Filtering) -> list[Structure]:
+    """The usual models without any delay; of one direction alone only that one's friction."""
+    everything = replace(filtering, slowest=0.0)
+    missing = tuple(f"_{way}" for way in never_moved(motions, filtering.slowest))
+    if not missing:
+        sets = (SYMMETRIC, DIRECTIONAL)
+        return [structure(motions, [TERMS[n] for n in names], everything) for names in sets]
+    # Dry friction and a constant force are one column there, and standstill tells neither.
+    names = [name for name in DIRECTIONAL if not name.endswith(missing)]
+    moving_only = filtering if filtering.slowest > 0 else everything
+    return [structure(motions, [TERMS[name] for name in names], moving_only)]
+
+
+def _delay(
+    motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering, stated: float | None
+) -> Estimate:
+    if stated is not None:
+        return Estimate.without_interval("delay", stated, "s", STATED(), origin=Origin.GIVEN)
+    return find_delay(motions, terms, filtering)
+
+
+def _taken_out(late: Estimate, stated: float | None) -> float:
+    """The delay that is reckoned with: one that was found where scatter alone does not explain it.
+
+    It predicts what comes, be it a delay or what a loop makes of noise; how far the two may be
+    apart is in the systematic part of every coefficient.
+    """
+    low, high = late.low, late.high
+    sure = low is not None and high is not None and (low > 0 or high < 0)
+    return late.value if sure or stated is not None else 0.0
+
+
+def _candidates(
+    motions: Sequence[Motion], period: float | None, *, linear: bool
+) -> list[Sequence[Term]]:
+    names: list[tuple[str, ...]] = [("spring",), ("square_root",), ("quadratic",)]
+    if not linear:
+        names.append(("gravity_sine", "gravity_cosine"))
+    if all(motion.temperature is not None for motion in motions):
+        names += [("coulomb_over_temperature",), ("viscous_over_temperature",)]
+    found: list[Sequence[Term]] = [[TERMS[name] for name in group] for group in names]
+    if period is not None:
+        waves = periodic(period)
+        found += [waves[:2], waves[2:]]
+    return found
+
+
+def _period(
+    motions: Sequence[Motion], start: Sequence[Term], filtering: Filtering, delay: float
+) -> float | None:
+    fit = structure(motions, start, filtering, delay).fit
+    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
+    place = [rows(motion, own, filtering).columns for motion in motions]
+    whole = np.concatenate(place)
+    interval = filtering.decimation / motions[0].sample_rate
+    return find_period(whole[:, 0], whole[:, 1], np.concatenate(fit.residuals), interval)
+
+
+def repeats(which: Structure) -> bool:
+    """Whether something that repeats over position is in it."""
+    return any(name.startswith(("cogging", "ripple")) for name in which.names)
+
+
+def _validated(
+    found: Sequence[tuple[Structure, float]],
+    motions: Sequence[Motion],
+    unseen: Sequence[Motion],
+    filtering: Filtering,
+    moved: Collection[int],
+) -> list[Tried]:
+    """Each structure with its predictions of what it was not fitted to; some also as they move."""
+    told: list[Tried] = []
+    reference: tuple[Prediction, ...] = ()
+    for index, (which, delay) in enumerate(found):
+        predictions = tuple(predicted(motion, which, filtering, delay) for motion in unseen)
+        one = Tried(which, delay, predictions)
+        if index in moved:
+            one = replace(one, simulated=_simulated(unseen or motions, which, delay))
+        if predictions:
+            if set(which.names) == set(DIRECTIONAL) and delay == 0.0 and not reference:
+                reference = predictions
+            whole = together(predictions)
+            gain = improvement("gain", together(reference), whole) if reference else None
+            one = replace(one, validation=relative_error("validation", whole), gain=gain)
+        told.append(one)
+    return told
+
+
+def _simulated(motions: Sequence[Motion], which: Structure, delay: float) -> float:
+    try:
+        return relative_rate_error(motions, which.terms, which.fit.values, delay)
+    except ValueError:
+        return math.nan
+
+
+def predicted(motion: Motion, which: Structure, filtering: Filtering, delay: float) -> Prediction:
+    """What a structure says of another motion."""
+    piece = all_rows(motion, which.terms, filtering, delay)
+    return Prediction(piece.time, piece.force, piece.columns @ which.fit.values)
+
+
+def together(predictions: Sequence[Prediction]) -> Prediction:
+    """Several motions as one."""
+    return Prediction(
+        np.concatenate([each.time for each in predictions]),
+        np.concatenate([each.force for each in predictions]),
+        np.concatenate([each.predicted for each in predictions]),
+    )
+
+
+def _estimates(
+    best: Tried, motions: Sequence[Motion], filtering: Filtering, late: Estimate
+) -> dict[str, Estimate]:
+    """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
+    fit, terms = best.structure.fit, best.structure.terms
+    parts = {
+        "band": shifts(fit, motions, terms, filtering.half_band, best.delay),
+        "slow": shifts(fit, motions, terms, filtering.faster, best.delay),
+    }
+    if late.origin is not Origin.GIVEN:
+        parts["delay"] = shifts(
+            fit, motions, terms, filtering, best.delay + _doubt(best, late, motions[0])
+        )
+    bends = [TERMS[f"{term.name}{SQUARED}"] for term in terms if f"{term.name}{SQUARED}" in TERMS]
+    if bends:
+        parts["curve over temperature"] = _moved_by(bends, best, motions, filtering)
+    return estimates(fit, terms, parts)
+
+
+def _moved_by(
+    bends: Sequence[Term], best: Tried, motions: Sequence[Motion], filtering: Filtering
+) -> Array | None:
+    """How far coefficients go with further terms, shape (k,); None where these are not told."""
+    own = best.structure
+    try:
+        other = structure(motions, (*own.terms, *bends), filtering, best.delay)
+    except ValueError:
+        return None
+    return np.asarray(np.abs(other.fit.values[: len(own.terms)] - own.fit.values))
+
+
+def _without_shares(
+    estimates: Mapping[str, Estimate], terms: Sequence[Term]
+) -> dict[str, Estimate]:
+    """Without intervals of friction where a term that bends was added because it fits better.
+
+    It stands in for whatever bends friction, most often a Stribeck curve; what is called Coulomb
+    and viscous friction then takes what is too much of it elsewhere.
+    """
+    if not any(term.family == "bend" for term in terms):
+        return dict(estimates)
+    shares = {term.name for term in terms if term.family == "bend"}
+    return {
+        name: Estimate.without_interval(
+            name, one.value, one.unit, BENDS(), method=one.method, origin=Origin.NOT_DETERMINED
+        )
+        if name in shares or name.startswith(("coulomb", "viscous"))
+        else one
+        for name, one in estimates.items()
+    }
+
+
+def _doubt(best: Tried, late: Estimate, motion: Motion) -> float:
+    """By how much the delay may be wrong (s, 1 sigma): a sample where it was not taken out."""
+    if best.delay == 0.0 or math.isnan(late.half_width):
+        return 1.0 / motion.sample_rate
+    return late.half_width / NORMAL_95

@@ -1,0 +1,176 @@
+"""Tables of inverse dynamics: structures, deviations, instruments, correlations, filters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from campaign.estimation.inverse.regression import Regression
+from campaign.estimation.inverse.terms import Term
+from campaign.experiments.any_motion.instrumented import Instruments, differs
+from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried
+from campaign.reason import Cause
+from campaign.result import Cell, Column, Table
+
+STRONG = 0.9
+"""Correlation from which on two coefficients are told to go together."""
+AS_THEY_ARE = Cause(
+    "sum over rows", "a sum over all rows: what it would be of other rows, blocks say"
+)
+DEVIATION = Cause("deviation", "a deviation, not a quantity of the rig")
+
+
+def structures_table(found: InverseDynamics) -> Table:
+    """Every structure that was tried: how well it does on its rows, on blocks, on other motions."""
+    columns = [
+        Column("terms", "Terms"),
+        Column("delay", "Delay", "s", "ms", exact=True),
+        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
+        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
+        Column("criterion", "BIC", exact=True),
+        Column("simulated", "Rate after 1 s", "", "percent", reason=AS_THEY_ARE()),
+    ]
+    validated = found.tried[0].validation is not None
+    if validated:
+        columns += [
+            Column("validation", "Validation", "", "percent"),
+            Column("gain", "Lower than plain by", "", "percent"),
+        ]
+    columns.append(Column("condition", "Condition", exact=True))
+    rows = []
+    for index, each in enumerate(found.tried):
+        row: dict[str, Cell] = {
+            "terms": ("→ " if index == found.chosen else "") + formula(each),
+            "delay": each.delay,
+            "residual": each.structure.fit.relative,
+            "held_out": each.structure.held_out,
+            "criterion": each.structure.criterion,
+            "simulated": each.simulated if np.isfinite(each.simulated) else None,
+            "condition": each.structure.fit.condition,
+        }
+        if validated:
+            row |= {"validation": each.validation, "gain": each.gain}
+        rows.append(row)
+    note = (
+        "The arrow shows the chosen one. Residuals are shares of the force (norms); BIC counts "
+        "rows by what they are worth, and compares structures of one delay; “rate after 1 s”: the "
+        "motion that the model makes of the recorded force, released every second"
+    )
+    told = (
+        ". “Lower than plain by”: the validation residual of both directions without delay less "
+        "this one's, on the same rows."
+    )
+    return Table(
+        "structures", "What was tried", tuple(columns), tuple(rows), note=note + (told * validated)
+    )
+
+
+def formula(tried: Tried) -> str:
+    """`a, v+, v-, (v > 0), -(v < 0), q`."""
+    return ", ".join(term.symbol for term in tried.structure.terms)
+
+
+def deviations_table(key: str, title: str, tried: Tried) -> Table:
+    """Coefficients of one structure with ordinary deviations and those with autocorrelation."""
+    fit = tried.structure.fit
+    half, rule, twice = fit.by_bandwidth
+    reason = DEVIATION()
+    columns = (
+        Column("term", "Coefficient"),
+        Column("unit", "Unit"),
+        Column("value", "Value"),
+        Column("ordinary", "Ordinary", reason=reason),
+        Column("half", f"HAC, {half.lags:.3g} lags", reason=reason),
+        Column("rule", f"HAC, {rule.lags:.3g} lags", reason=reason),
+        Column("twice", f"HAC, {twice.lags:.3g} lags", reason=reason),
+        Column("used", "Used", reason=reason),
+    )
+    rows: tuple[Mapping[str, Cell], ...] = tuple(
+        {
+            "term": term.name,
+            "unit": term.unit,
+            "value": f"{fit.values[i]:.7g}",
+            "ordinary": float(fit.ordinary[i]),
+            "half": float(half.values[i]),
+            "rule": float(rule.values[i]),
+            "twice": float(twice.values[i]),
+            "used": float(fit.robust[i]),
+        }
+        for i, term in enumerate(tried.structure.terms)
+    )
+    note = (
+        f"Standard deviations (1 sigma). Residual {100 * fit.relative:.4f} % of the force, "
+        f"condition number {fit.condition:.5g}; {fit.count} rows are worth {fit.effective:.0f}. "
+        "Ordinary deviations hold for residuals that do not know of each other; these do. The "
+        "largest is used where half and twice the bandwidth differ by more than 1.3."
+    )
+    return Table(key, title, columns, rows, note=note)
+
+
+def instruments_table(found: InverseDynamics, held: Instruments) -> Table:
+    """Least squares beside instruments, and which of the two is told."""
+    rows: list[Mapping[str, Cell]] = [
+        {
+            "term": term.name,
+            "unit": term.unit,
+            "squares": found.squares[term.name],
+            "instruments": held.estimates[term.name],
+            "strength": held.strength(index),
+        }
+        for index, term in enumerate(found.best.structure.terms)
+    ]
+    columns = (
+        Column("term", "Coefficient"),
+        Column("unit", "Unit"),
+        Column("squares", "Least squares"),
+        Column("instruments", "Instruments"),
+        Column("strength", "F, first stage", exact=True),
+    )
+    return Table(
+        "instruments",
+        f"Instruments {held.along}",
+        columns,
+        tuple(rows),
+        note=instruments_note(found),
+    )
+
+
+def instruments_note(found: InverseDynamics) -> str:
+    """What the comparison comes to."""
+    held = found.instruments
+    if held is None:
+        return ""
+    if found.biased:
+        return (
+            "The two differ by more than scatter explains: noise of the motion biases least "
+            "squares (or, where that is quiet, what filters make of jumps of friction). What "
+            "instruments say is told, and goes to the bench file; predictions are of least "
+            "squares, which predict what the same loop does of the same noise."
+        )
+    alike = "How far the two differ is a systematic part (“instruments”) of what least squares say."
+    if held.of_wanted:
+        return f"{alike} They do not differ by more than scatter explains: no bias shows."
+    undecided = (
+        f"{alike} They decide nothing: a recorded force may have been made, by a loop, of the very "
+        "noise that instruments are to be free of."
+    )
+    if not differs(found.squares, held):
+        return undecided
+    return (
+        "The two differ by more than scatter explains: noise of the motion, or what disturbed it "
+        "unrecorded, biases one of them. Record the motion that was wanted to tell which. "
+        f"{undecided}"
+    )
+
+
+def correlated(fit: Regression, terms: tuple[Term, ...]) -> Iterator[tuple[str, str, float]]:
+    """Pairs of coefficients that go together, the strongest first."""
+    matrix = fit.correlation
+    pairs = [
+        (terms[i].name, terms[j].name, float(matrix[i, j]))
+        for i in range(len(terms))
+        for j in range(i)
+        if abs(matrix[i, j]) >= STRONG
+    ]
+    yield from sorted(pairs, key=lambda pair: -abs(pair[2]))

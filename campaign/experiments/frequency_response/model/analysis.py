@@ -1,0 +1,350 @@
+"""Frequency response of any motion: modes, margins, distortion, and the two masses of a drive.
+
+Sines, repeated odd multisines and any other recording each give a response; a rational function
+with a delay tells its modes, and two inertias on a spring what the sensors' places allow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
+from campaign.estimation.frequency.one_inertia import RIGID
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency.welch import Estimator
+from campaign.estimation.gate import admitted, admitted_together
+from campaign.estimation.intervals import MODEL_MISFIT
+from campaign.experiments.frequency_response.model.axis_numbers import by_rule, odd_distortion
+from campaign.experiments.frequency_response.model.distortion_tables import distortion_tables
+from campaign.experiments.frequency_response.model.figures import figures
+from campaign.experiments.frequency_response.model.frequency_fit import (
+    Band,
+    FrequencyFit,
+    Masses,
+    best_source,
+    found_in,
+    masses,
+    too_few,
+)
+from campaign.experiments.frequency_response.model.signals import Excited, usable
+from campaign.experiments.frequency_response.model.sources import Reading, sources
+from campaign.experiments.frequency_response.model.tables import (
+    correlations_table,
+    fits_table,
+    margins_table,
+    masses_table,
+    modes_table,
+    sources_table,
+)
+from campaign.experiments.frequency_response.model.validation import Validation, models, validated
+from campaign.experiments.frequency_response.model.validation_shown import (
+    residual_figures,
+    validation_conclusions,
+    validation_figures,
+    validation_tables,
+)
+from campaign.experiments.interface import Model, TestData, TrialData
+from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen
+from campaign.physics.bench import Bench
+from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.units import Frequency, Time
+
+TORQUE_CONSTANT = "motor.torque_constant"
+LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
+AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
+MORE_PHASES = (
+    f"record {FEWEST_REALISATIONS} realisations with other phases, which tell inertias and "
+    "stiffness as well"
+)
+LOWER = "excite further below the antiresonance, above what friction holds"
+SURELY = 3.0
+"""Standard deviations by which a delay lies below zero where it is told."""
+MEANINGS = (
+    ("total_inertia", "Inertia of the whole drive, seen at the load.", "kg m^2", LOWER),
+    ("motor_inertia", "Inertia that the torque drives directly.", "kg m^2", LOUDER),
+    ("load_inertia", "Inertia behind the spring.", "kg m^2", LOUDER),
+    ("stiffness", "Stiffness of the spring between the two inertias.", "N m/rad", LOUDER),
+    ("damping", "Damping of that spring.", "N m s/rad", LOUDER),
+    ("resonance", "Frequency at which both inertias swing against each other.", "Hz", LOUDER),
+    ("resonance_damping", "Damping ratio of that resonance.", "", LOUDER),
+    ("antiresonance", "Frequency of what lies behind the spring alone.", "Hz", LOUDER),
+    ("antiresonance_damping", "Damping ratio of what lies behind the spring alone.", "", LOUDER),
+)
+"""Of a two-mass drive: attribute, meaning, unit, what to measure next."""
+APPENDAGE = {
+    "load_inertia": "appendage.inertia",
+    "antiresonance": "appendage.frequency",
+    "antiresonance_damping": "appendage.damping_ratio",
+}
+"""Keys of the bench for an elastic part that the sensor sees only through the load."""
+
+
+class FrequencyResponseOptions(Options):
+    """Options of a frequency response."""
+
+    excited: Excited = "auto"
+    """input: the torque was decided outside of any loop; reference: a loop made it, and the command
+    is what came into that from outside; auto: as the trials' modes say."""
+    estimator: Estimator = "H1"
+    """Of recordings whose torque was decided outside: H1 (noise on the rate), H2 (on the torque),
+    Hv (on both)."""
+    resolution: Frequency | None = Field(default=None, gt=0)
+    """Of averaged spectra; absent: a sixteenth of all that was recorded is one segment."""
+    period: Time | None = Field(default=None, gt=0)
+    """Of a multisine in recordings of which no command says it; absent: as the command repeats."""
+    lowest: Frequency = Field(default=0.0, ge=0)
+    """Lowest frequency that is fitted: friction bends responses below."""
+    highest: Frequency = Field(default=1e5, gt=0)
+    """Highest frequency that is fitted."""
+    order: int = Field(default=6, ge=1, le=8)
+    """Highest order of a denominator that is tried."""
+    place: Literal["auto", "driven", "behind"] = "auto"
+    """Where the load's sensor is: on the inertia that the torque drives, or behind the spring."""
+
+
+def _analyse(data: TestData) -> Result:
+    options: FrequencyResponseOptions = data.model
+    how = Reading(options.excited, options.estimator, options.resolution, options.period)
+    measured, remarks = sources(data.trials, data.bench, how)
+    if not measured:
+        raise ValueError(" ".join(dict.fromkeys(remarks)) or "no trial gives a response")
+    band = Band(options.lowest, options.highest, options.order)
+    found = [found_in(each, band) for each in measured]
+    best = best_source(found)
+    found.sort(key=lambda each: (each is not best, -each.source.rms))  # what tells most comes first
+    torque = _torque_uncertainty(data.bench)
+    told = masses(best, data.bench, options.place, band, torque, found)
+    parameters = tuple(_parameters(told, best or found[0]))
+    fits = tuple(models(found, told, band))
+    unseen: Sequence[TrialData] = ()
+    if data.validation:
+        unseen, why = usable(data.validation)
+        if why:
+            raise ValueError(f"of the validation {why}")
+    validation = validated(data.trials, unseen, data.bench, how, fits)
+    tables = (
+        sources_table(found),
+        masses_table(told),
+        correlations_table(told, _told_names(parameters)),
+        modes_table(found),
+        margins_table(found),
+        *distortion_tables(found),
+        fits_table(found, told),
+        *validation_tables(validation),
+    )
+    return Result(
+        tables=tuple(each for each in tables if each is not None and each.rows),
+        figures=(
+            *validation_figures(validation),
+            *figures(found, told),
+            *residual_figures(found, fits),
+        ),
+        findings=tuple(_findings(found, parameters)),
+        notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
+        conclusions=(
+            *_conclusions(best or found[0], told),
+            *_undetermined(parameters),
+            *validation_conclusions(validation),
+        ),
+        identified=Identified(
+            parameters,
+            correlations=_correlations(told, parameters),
+            unseen=_unseen(validation),
+        ),
+    )
+
+
+def _unseen(validation: Validation) -> Unseen | None:
+    """Of the model that does best: the output that it makes of the unseen torque."""
+    outputs = [each.output for each in validation.predictions if each.output is not None]
+    return Unseen(min(each.value for each in outputs), "motion") if outputs else None
+
+
+def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tuple[str, str], float]:
+    """By scatter, of the numbers that are told."""
+    if told.drive is None:
+        return {}
+    names = _told_names(parameters)
+    return {pair: share for pair, share in told.drive.correlations.items() if {*pair} <= names}
+
+
+def _told_names(parameters: Sequence[Parameter]) -> set[str]:
+    return {each.estimate.name for each in parameters if each.estimate.has_interval}
+
+
+def _validation_notes(validation: Validation) -> Iterator[str]:
+    yield from (f"Of the validation: {each}" for each in validation.remarks)
+
+
+def _torque_uncertainty(bench: Bench) -> float | None:
+    """Relative, of the torque constant; None where nobody has said it."""
+    known = bench.known_uncertainty(TORQUE_CONSTANT)
+    if known is None or bench.motor is None:
+        return None
+    return known / bench.motor.torque_constant
+
+
+def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:
+    hangs_on_load = dict(told.places) == {"load": "motor"}
+    if told.drive is None or told.drive.misfit:
+        few = too_few(best.source)
+        reason = few or told.reason
+        if told.drive is not None:
+            reason = MODEL_MISFIT(why=told.drive.misfit)
+        local = _local_of_axis(told, best)
+        for name, meaning, unit, advice in MEANINGS:
+            nothing = Estimate.without_interval(name, math.nan, unit, reason)
+            estimate = admitted(local.get(name, nothing))
+            key = APPENDAGE.get(name, "") if hangs_on_load and estimate.has_interval else ""
+            yield Parameter(estimate, meaning, unit, key, MORE_PHASES if few else advice)
+        return
+    keys = {"total_inertia": "axis.inertia", **(APPENDAGE if hangs_on_load else {})}
+    passed = admitted_together({each[0]: getattr(told.axis, each[0]) for each in MEANINGS}, {})
+    for name, meaning, unit, advice in MEANINGS:
+        # A damping that friction adds to may be left open alone: then the others are told.
+        key = "" if told.bent else keys.get(name, "")
+        yield Parameter(passed[name], meaning, unit, key, AMPLITUDES if told.bent else advice)
+
+
+def _local(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
+    """Numbers of a mode where no model of the whole drive fits, by name: extrema, of too few
+    realisations, and else a mode on top of a smooth response.
+
+    The antiresonance of the latter is that of a part behind the spring only for a sensor at the
+    driven inertia. An extremum below the resonance is there for no other.
+    """
+    if too_few(best.source):
+        extrema = best.modes.get("motor", best.modes.get("load", ()))
+        return {one.name: one for mode in extrema for one in (mode.frequency, mode.damping)}
+    if not best.local:
+        return {}
+    side: Side = "motor" if "motor" in best.local else "load"
+    mode = best.local[side]
+    found = {"resonance": mode.frequency, "resonance_damping": mode.damping_ratio}
+    if side == "motor" or told.places.get(side) == "motor":
+        found["antiresonance"] = mode.antiresonance
+    return {name: replace(each, name=name) for name, each in found.items()}
+
+
+def _local_of_axis(told: Masses, best: FrequencyFit) -> dict[str, Estimate]:
+    """The same, with friction's part, which extrema have."""
+    odd = 0.0 if too_few(best.source) else odd_distortion(best.source)
+    return {name: by_rule(each, odd) for name, each in _local(told, best).items()}
+
+
+def _findings(found: Sequence[FrequencyFit], parameters: Sequence[Parameter]) -> Iterator[Finding]:
+    for each in parameters:
+        yield Finding.of(each.estimate, {})
+    for one in found:
+        conditions = {"response": one.source.name}
+        if one.margins is not None:
+            for margin in ("bandwidth", "phase_margin", "gain_margin"):
+                yield Finding.of(getattr(one.margins, margin), conditions)
+
+
+def _notes(found: Sequence[FrequencyFit], told: Masses, remarks: Sequence[str]) -> Iterator[str]:
+    yield from remarks
+    for each in found:
+        yield from each.source.remarks
+        yield from each.remarks
+    if told.drive is not None and told.drive.misfit:
+        yield (
+            f"Two inertias on a spring are no model of this response: {told.drive.misfit}. Narrow "
+            "the band (lowest, highest) to where friction does not bend it, or excite it by "
+            "repeated multisines, whose scatter holds what friction does."
+        )
+    yield from _early(found)
+    if told.reason:
+        yield f"Two inertias on a spring are not determined: {told.reason}."
+    if told.bent:
+        yield told.bent
+    if told.lowest:
+        yield (
+            f"Two inertias on a spring were fitted from {told.lowest:.3g} Hz on: further down, "
+            "what the drive answers is not theirs alone, as friction makes it."
+        )
+    if told.drive is not None and told.drive.rigid:
+        yield f"Two inertias are not told: {RIGID()}."
+    if told.how:
+        place = "at the driven inertia" if "motor" in told.places.values() else "behind the spring"
+        yield f"The load's sensor is taken to be {place}: {told.how}."
+    yield (
+        "A response of a drive with friction holds for its excitation. Below the breakaway torque "
+        "friction is a spring: what looks like a mode there is that of the inertia on its bristles."
+    )
+
+
+def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
+    """Of rates that answer before their torque, which no drive does."""
+    for each in found:
+        for side, chosen in each.fits.items():
+            fit = chosen.fit
+            if fit.misfit or fit.delay + SURELY * float(fit.scatter[-1, -1]) ** 0.5 >= 0:
+                continue
+            yield (
+                f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
+                "the torque. Either friction turns its phase (a second amplitude tells), or the "
+                "torque is recorded late, or a controller holds it and it is sampled at points: "
+                "then gain and inertia are off by up to a few percent at the highest frequencies, "
+                "and no scatter shows that. A lower highest line, or a faster controller, makes it "
+                "small."
+            )
+
+
+def _conclusions(best: FrequencyFit, told: Masses) -> Iterator[Conclusion]:
+    drive = told.drive if told.bent else told.axis
+    local = {name: admitted(each) for name, each in _local_of_axis(told, best).items()}
+    stands_out = [name for name, each in local.items() if each.origin is Origin.MEASURED]
+    if (drive is None or drive.misfit) and "resonance" in stands_out:
+        mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
+        if "antiresonance" in stands_out:
+            mode += [", with an antiresonance at ", Amount(local["antiresonance"], "Hz")]
+        yield Conclusion((*mode, "; no two inertias on a spring were found."))
+    whose = "At this excitation the response is that of a drive that" if told.bent else "The drive"
+    if drive is not None and drive.resonance.has_interval:
+        parts: list[str | Amount] = [f"{whose} resonates at ", Amount(drive.resonance, "Hz")]
+        if drive.antiresonance.has_interval:
+            parts += [", with an antiresonance at ", Amount(drive.antiresonance, "Hz")]
+        if drive.total_inertia.has_interval:
+            parts += ["; all of it has an inertia of ", Amount(drive.total_inertia, "kg m^2")]
+        yield Conclusion((*parts, "."))
+    elif drive is not None and drive.total_inertia.has_interval:
+        inertia = Amount(drive.total_inertia, "kg m^2")
+        yield Conclusion((f"{whose} moves as one inertia of ", inertia, "."))
+    if told.bent:
+        yield Conclusion(("What of that is friction's, a second amplitude would tell.",))
+    if best.margins is None:
+        return
+    margins = best.margins
+    if margins.phase_margin.has_interval:
+        margin = Amount(margins.phase_margin, "deg")
+        yield Conclusion(("The rate loop has a phase margin of ", margin, "."))
+
+
+def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
+    """Where no number is determined: which, why, and what to measure."""
+    if any(each.estimate.origin is Origin.MEASURED for each in parameters):
+        return
+    alike: dict[tuple[str, str], list[str]] = {}
+    for each in parameters:
+        why = str(each.estimate.reason), each.advice
+        alike.setdefault(why, []).append(each.estimate.name.replace("_", " "))
+    for (reason, advice), names in alike.items():
+        told = f"Not determined: {', '.join(names)}. Reason: {reason}. To measure: {advice}."
+        yield Conclusion((told,))
+
+
+MODEL = Model(
+    name="frequency_response",
+    summary="Response of torque to rate: modes, margins, distortion, two masses on a spring",
+    options=FrequencyResponseOptions,
+    suits=usable,
+    analyse=_analyse,
+)

@@ -1,0 +1,313 @@
+"""What each response comes to: order, modes, margins, and the two masses of the best of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from campaign.estimation.elastic_mode import ElasticMode, elastic_mode
+from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
+from campaign.estimation.frequency.drive import TwoMass
+from campaign.estimation.frequency.extrema import extrema, relative_scatter
+from campaign.estimation.frequency.margins import chosen_margins, measured_margins
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.modes import Mode, chosen_modes
+from campaign.estimation.frequency.orders import Chosen, chosen_order
+from campaign.estimation.frequency.two_mass import two_mass
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.servo import ServoCharacteristics
+from campaign.experiments.frequency_response.model.axis_numbers import (
+    UNKNOWN,
+    Weaker,
+    by_rule,
+    odd_distortion,
+    of_axis,
+)
+from campaign.experiments.frequency_response.model.sources import Source, fitted_part
+from campaign.physics.bench import Bench
+from campaign.reason import NONE, Cause, Reason
+
+TOLD_APART = 10.0
+"""Schwarz' criterion by which one place of the sensor must fit better than the other."""
+AMBIGUOUS = Cause(
+    "place of the sensor not known",
+    "the response is that of a sensor at the driven inertia as well as behind the spring: say "
+    "which (place), or excite up to above the antiresonance",
+)
+TOO_FEW = Cause(
+    "too few realisations",
+    "{realisations} realisations tell no variance to weigh a fit with; {fewest} are the fewest",
+)
+NOTHING_FITTED = Cause("no response fitted", "no response could be fitted")
+NO_FIT = Cause("fit failed", "{error}")
+
+NARROWER = (2.0, 4.0, 8.0)
+"""times the first frequency: from there on two inertias are tried where friction bends the rest."""
+WEAKER = 0.8
+"""Share of the strongest excitation below which another one is weaker."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Of what is fitted (Hz), and the highest order of a denominator."""
+
+    lowest: float
+    highest: float
+    order: int
+
+
+@dataclass(frozen=True)
+class FrequencyFit:
+    """What one source comes to.
+
+    Attributes:
+        fits, modes: by side; a side is missing where nothing could be fitted. Modes of too few
+            realisations are extrema of the response, with friction's part.
+        local: modes on top of a response that no function fits, by side.
+        margins: of its loop, by a fit where one fits and else between the points.
+        loop_fit: of its loop.
+        remarks: sentences: what could not be found, and why.
+    """
+
+    source: Source
+    fits: Mapping[Side, Chosen]
+    modes: Mapping[Side, tuple[Mode, ...]]
+    local: Mapping[Side, ElasticMode] = field(default_factory=dict)
+    margins: ServoCharacteristics | None = None
+    loop_fit: Chosen | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Masses:
+    """The two-mass drive, and where the sensors are taken to be.
+
+    Attributes:
+        drive: with the response's numbers; None where it is not that of one, and `reason` says why.
+        axis: the same with numbers of the axis: their intervals hold friction's part, too.
+        places: `motor` for a sensor at the driven inertia, `load` behind the spring, by side.
+        how: how the places are known, in words.
+        lowest: frequency from which on it was fitted (Hz), where it is no model of the whole band.
+        bent: where numbers of the axis cannot be told from the response's, why: a sentence.
+    """
+
+    drive: TwoMass | None
+    source: Source | None
+    reason: Reason = NONE
+    axis: TwoMass | None = None
+    places: Mapping[Side, Side] = field(default_factory=dict)
+    how: str = ""
+    bent: str = ""
+    lowest: float = 0.0
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether numbers of the axis are others than the response's."""
+        return self.axis is not self.drive
+
+
+def found_in(source: Source, band: Band) -> FrequencyFit:
+    """Fits, modes and margins of one source."""
+    fits: dict[Side, Chosen] = {}
+    remarks: list[str] = []
+    modes: dict[Side, tuple[Mode, ...]] = {}
+    if few := too_few(source):
+        remarks.append(
+            f"{source.name}: {few}: no function is fitted. Modes are extrema of the response, "
+            "between its lines."
+        )
+        modes = {side: _extrema(source, side, band) for side in source.best}
+    else:
+        for side in source.responses:
+            part = fitted_part(source, side, band.lowest, band.highest)
+            try:
+                fits[side] = chosen_order(part, band.order)
+            except ValueError as error:
+                remarks.append(f"{source.name}, {side}: {error}.")
+    modes |= {side: chosen_modes(fit) for side, fit in fits.items() if not fit.fit.misfit}
+    local: dict[Side, ElasticMode] = {}
+    for side in source.responses:
+        if side in modes:
+            continue
+        part = fitted_part(source, side, band.lowest, band.highest)
+        mode = elastic_mode(part.response)
+        if mode is not None:
+            local[side] = mode
+    margins, loop_fit = None, None
+    if source.loop is not None and not few:
+        margins, loop_fit, why = _margins(source.loop, source.every, band)
+        if why:
+            remarks.append(f"{source.name}: {why}.")
+    return FrequencyFit(source, fits, modes, local, margins, loop_fit, tuple(remarks))
+
+
+def too_few(source: Source) -> Reason:
+    """Why nothing is fitted to repeated multisines; false where there are enough."""
+    few = [best.excitation.realisations for best in source.best.values()]
+    if min(few, default=FEWEST_REALISATIONS) < FEWEST_REALISATIONS:
+        return TOO_FEW(realisations=min(few), fewest=FEWEST_REALISATIONS)
+    return NONE
+
+
+def _extrema(source: Source, side: Side, band: Band) -> tuple[Mode, ...]:
+    measured, scatter = source.responses[side], relative_scatter(source.best[side])
+    kept = (measured.frequency >= band.lowest) & (measured.frequency <= band.highest)
+    told = extrema(
+        measured.frequency[kept],
+        np.abs(measured.values[kept]),
+        None if scatter is None else scatter[kept],
+    )
+    # Much friction damps a mode away, and has extrema of its own.
+    odd = odd_distortion(source)
+    return tuple(replace(mode, frequency=by_rule(mode.frequency, odd)) for mode in told)
+
+
+def _margins(
+    loop: MeasuredResponse, every: int, band: Band
+) -> tuple[ServoCharacteristics | None, Chosen | None, str]:
+    part = loop.at(np.isfinite(loop.values)).at(slice(None, None, every))
+    part = part.between(band.lowest, band.highest)
+    try:
+        fit = chosen_order(part, band.order, stable=False)
+        if not fit.fit.misfit:
+            return chosen_margins(fit), fit, ""
+        why = f"no function fits the loop ({fit.fit.misfit}); margins are read between its points"
+        return measured_margins(part), fit, why
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return None, None, f"no margins: {error}"
+
+
+def best_source(found: Sequence[FrequencyFit]) -> FrequencyFit | None:
+    """From which parameters are told: one that fits, multisines before sines before the rest.
+
+    Of several multisines the strongest: the share of friction in it is the least.
+    """
+    fitted = [each for each in found if each.fits]
+    if not fitted:
+        return None
+    ranks = {"multisine": 0, "sines": 1, "records": 2}
+
+    def rank(each: FrequencyFit) -> tuple[bool, int, int, float]:
+        misfit = all(fit.fit.misfit for fit in each.fits.values())
+        return misfit, -len(each.fits), ranks[each.source.kind], -each.source.rms
+
+    return min(fitted, key=rank)
+
+
+def masses(
+    found: FrequencyFit | None,
+    bench: Bench,
+    place: str,
+    band: Band,
+    torque: float | None,
+    others: Sequence[FrequencyFit] = (),
+) -> Masses:
+    """The two-mass drive of the best source.
+
+    Args:
+        place: `driven`, `behind` or `auto`, of the load's sensor.
+        torque: relative standard uncertainty of the torque constant, if it is known.
+        others: further sources: one of less excitation tells how far friction bends the response.
+    """
+    if found is None:
+        return Masses(None, None, NOTHING_FITTED())
+    source = found.source
+    first = min(float(each.frequency[0]) for each in source.responses.values())
+    try:
+        told = _placed(source, bench, place, band, torque)
+        for factor in () if band.lowest > 0 else NARROWER:
+            if told.drive is None or not told.drive.misfit:
+                break
+            higher = replace(band, lowest=factor * first)
+            other = _narrower(source, bench, place, higher, torque)
+            if other is not None and other.drive is not None and not other.drive.misfit:
+                told, band = replace(other, lowest=higher.lowest), higher
+        if told.drive is None or told.drive.misfit:
+            return replace(told, axis=told.drive)
+        return _with_axis(told, source, [each.source for each in others], band)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return Masses(None, source, NO_FIT(error=str(error)))
+
+
+def _narrower(
+    source: Source, bench: Bench, place: str, band: Band, torque: float | None
+) -> Masses | None:
+    """In less of the band; None where too little of it is left."""
+    try:
+        return _placed(source, bench, place, band, torque)
+    except ValueError:
+        return None
+
+
+def _placed(source: Source, bench: Bench, place: str, band: Band, torque: float | None) -> Masses:
+    parts = {
+        side: fitted_part(source, side, band.lowest, band.highest) for side in source.responses
+    }
+    if "motor" in parts:
+        places: dict[Side, Side] = {side: side for side in parts}
+        return Masses(two_mass(parts, torque_uncertainty=torque), source, places=places)
+    part, how = parts["load"], "as place says"
+    if place == "auto" and bench.appendage is not None:
+        place, how = "driven", "the bench has an elastic part that hangs on the load"
+    tried = {}
+    if place in ("auto", "driven"):
+        tried["driven"] = two_mass({"motor": part}, torque_uncertainty=torque)
+    if place in ("auto", "behind"):
+        tried["behind"] = two_mass({"load": part}, torque_uncertainty=torque)
+    if place == "auto":
+        fits = [name for name, drive in tried.items() if not drive.misfit] or list(tried)
+        rigid = [name for name in fits if tried[name].rigid]
+        least = min(tried[name].criterion for name in fits)
+        if rigid and tried[rigid[0]].criterion < least + TOLD_APART:
+            fits = rigid[:1]  # one inertia is driven, wherever its sensor is
+        if len(fits) > 1:
+            apart = tried["driven"].criterion - tried["behind"].criterion
+            if abs(apart) < TOLD_APART:
+                return Masses(None, source, AMBIGUOUS())
+            fits = ["behind"] if apart > 0 else ["driven"]
+        place = fits[0]
+        how = "" if tried[place].rigid else "the response fits that place better"
+    side: Side = "motor" if place == "driven" else "load"
+    return Masses(tried[place], source, places={"load": side}, how=how)
+
+
+def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Band) -> Masses:
+    """With numbers of the axis: a response to less excitation tells friction's part in them."""
+    if told.drive is None:
+        return told
+    odd = odd_distortion(source)
+    weaker = [each for each in others if each.best and 0 < each.rms < WEAKER * source.rms]
+    weaker = [each for each in weaker if odd and set(each.responses) == set(source.responses)]
+    tried = []
+    for each in weaker:
+        with suppress(ValueError):  # too little of the band is left
+            tried.append(Weaker(_weaker_drive(told, each, band), source.rms / each.rms))
+    axis = of_axis(told.drive, odd, tried)
+    bent = ""
+    if axis.total_inertia.reason in UNKNOWN or axis.resonance.reason in UNKNOWN:
+        bent = (
+            f"Odd distortion is {100 * odd:.0f} % of the output: friction bends the response, by "
+            "how much one amplitude does not tell. Repeat it at half the amplitude or at twice of "
+            "it; until then its numbers are those of this response, not of the axis, and none of "
+            "them goes to the bench."
+        )
+    return replace(told, axis=axis, bent=bent)
+
+
+def _weaker_drive(told: Masses, other: Source, band: Band) -> TwoMass:
+    """Of a weaker excitation, from where it fits best: friction bends more of its band."""
+    first = min(float(each.frequency[0]) for each in other.responses.values())
+    tried = []
+    for lowest in {band.lowest, *(max(factor * first, band.lowest) for factor in NARROWER)}:
+        parts = {
+            told.places[side]: fitted_part(other, side, lowest, band.highest)
+            for side in other.responses
+        }
+        with suppress(ValueError):  # too little of the band is left
+            tried.append(two_mass(parts, rigid=told.drive is not None and told.drive.rigid))
+    if not tried:
+        raise ValueError("the weaker excitation has too few frequencies")
+    return min(tried, key=lambda each: (bool(each.misfit), each.excess))

@@ -1,0 +1,160 @@
+"""What of a trial is input, output and reference of a response, and which stretches have no gap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from campaign.channels import (
+    COMMAND,
+    DRIVE_TORQUE,
+    GYRO_RATE,
+    MOTOR_ANGLE,
+    MOTOR_RATE,
+    RELATIVE_ANGLE,
+    RELATIVE_RATE,
+)
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency_response import Array
+from campaign.experiments.interface import TrialData
+from campaign.physics.bench import Bench
+from campaign.trial import Recording
+
+SENSORS: Mapping[Side, tuple[str, ...]] = {
+    "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
+    "motor": (MOTOR_RATE, MOTOR_ANGLE),
+}
+"""Channels of a side, the best first."""
+ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
+SHARE_TOLERANCE = 1e-6
+"""of a base frequency by which a line may lie off its multiple."""
+
+Excited = Literal["auto", "input", "reference"]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One trial: torque, what answered by side, and what came into its loop from outside.
+
+    Attributes:
+        rate: sample rate (Hz).
+        time, torque: shape (n,); NaN where a sample was lost.
+        answers: rate or angle by side, shape (n,), at the load; `channels` says which.
+        reference: shape (n,); None where nothing is known to come from outside.
+    """
+
+    number: int
+    rate: float
+    time: Array
+    torque: Array
+    answers: Mapping[Side, Array]
+    channels: Mapping[Side, str]
+    reference: Array | None
+
+    @property
+    def leading(self) -> Array:
+        """What was excited: the reference, or the torque where there is none, shape (n,)."""
+        return self.torque if self.reference is None else self.reference
+
+    def is_angle(self, side: Side) -> bool:
+        """Whether the answer of that side is an angle and no rate."""
+        return self.channels[side] in ANGLES
+
+
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
+    """Trials with a torque and a rate or angle that answers it."""
+    moving = [
+        each
+        for each in trials
+        if each.trial.task.mode in ("rate", "torque", "recorded")
+        and DRIVE_TORQUE in each.channel_names()
+        and any(set(names) & each.channel_names() for names in SENSORS.values())
+    ]
+    if moving:
+        return moving, ""
+    return (), "no trial has a drive torque and a rate or angle that answers it"
+
+
+def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
+    """Of one trial. Raises ValueError where what is excited is not known."""
+    task, recording = trial.trial.task, trial.recording()
+    answers, channels = _answers(recording, bench)
+    reference = None
+    command = recording[COMMAND] if COMMAND in recording.channels else None
+    if command is None and task.mode != "recorded":
+        command = task.command.sample(recording.time)
+    if command is not None and np.nanstd(command) > 0:
+        reference = command
+    if reference is None and (
+        excited == "reference" or (excited == "auto" and task.mode == "rate")
+    ):
+        raise ValueError(
+            "its loop is closed and nothing that comes into it is recorded: output over input "
+            "would be a mixture of the drive and its controller"
+        )
+    if reference is None and excited == "auto" and task.mode == "recorded":
+        raise ValueError(
+            "it does not say what was excited: import the command (channel `command`). Only where "
+            "the torque itself was commanded (open loop) use --set frequency_response.excited=input"
+        )
+    n = len(recording.time)
+    duration = float(np.ptp(recording.time)) if n > 1 else 0.0
+    if duration <= 0:
+        raise ValueError("it has no samples")
+    return Signals(
+        trial.trial.number,
+        (n - 1) / duration,
+        recording.time,
+        recording[DRIVE_TORQUE],
+        answers,
+        channels,
+        reference,
+    )
+
+
+def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dict[Side, str]]:
+    answers: dict[Side, Array] = {}
+    channels: dict[Side, str] = {}
+    for side, names in SENSORS.items():
+        for name in names:
+            if name not in recording.channels or name in channels.values():
+                continue
+            samples = recording[name]
+            if not np.nanstd(samples) > 0:
+                continue
+            if side == "motor":
+                if bench.ratio is None:
+                    continue  # a motor's angle says nothing of the load's without a ratio
+                samples = samples / bench.ratio
+            answers[side], channels[side] = samples, name
+            break
+    if not answers:
+        only = bench.ratio is None and any(name in recording.channels for name in SENSORS["motor"])
+        why = ": a motor's angle says nothing of the load's without the bench's [gear] ratio"
+        raise ValueError(f"nothing that answers its torque moves{why if only else ''}")
+    return answers, channels
+
+
+def whole_stretches(parts: Sequence[Array], shortest: int) -> list[slice]:
+    """Where all signals have numbers, for `shortest` samples or more."""
+    good = np.all([np.isfinite(part) for part in parts], axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
+    pairs = edges.reshape(-1, 2)
+    return [slice(int(a), int(b)) for a, b in pairs if b - a >= shortest]
+
+
+def base_frequency(frequencies: Sequence[float]) -> float:
+    """The largest of which all frequencies (Hz) are multiples; zero where there is none."""
+    base = 0.0
+    for each in frequencies:
+        one, other = each, base
+        while other > SHARE_TOLERANCE * each:
+            rest = one % other
+            if other - rest < SHARE_TOLERANCE * each:
+                rest = 0.0
+            one, other = other, rest
+        base = one
+    return base if base > 1e-3 * min(frequencies, default=0.0) else 0.0

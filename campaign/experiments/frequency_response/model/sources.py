@@ -1,0 +1,420 @@
+"""Responses of trials that belong together: sines, repeated multisines, and any other recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from campaign.estimate import Window
+from campaign.estimation.frequency.best_linear import BestLinear, best_linear
+from campaign.estimation.frequency.measured import MeasuredResponse, open_from_closed
+from campaign.estimation.frequency.multisine import Lines
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency.welch import Estimator, Record, welch_response
+from campaign.estimation.frequency.welch import Excited as Excitation
+from campaign.estimation.frequency_response import Array, make_response
+from campaign.estimation.local_fit import FRICTION
+from campaign.estimation.sine_point import SinePoint, sine_point
+from campaign.experiments.frequency_response.model.amplitudes import Recorded, by_amplitude, size_of
+from campaign.experiments.frequency_response.model.repeating import (
+    found_repeating,
+    repeated,
+    unused,
+)
+from campaign.experiments.frequency_response.model.signals import (
+    Excited,
+    Signals,
+    base_frequency,
+    signals,
+    whole_stretches,
+)
+from campaign.experiments.interface import TrialData
+from campaign.physics.bench import Bench
+from campaign.signals import MultiSine, Sine
+from campaign.units import rate_here
+
+STEADY = "steady"
+FEWEST_SINES = 6
+"""frequencies below which sines are no response."""
+GAP = 3.0
+"""Ratio of neighbours in size from which on the smaller is none of the excited lines."""
+HANN_APART = 2
+"""Lines of a Hann window from which on neighbours hardly know of each other."""
+EXCITED_SHARE = 0.03
+"""of the largest line of a reference, in amplitude, from which on a line counts as excited."""
+
+
+SIZES = ("amplitude", "rms")
+"""Names of conditions that state the amplitude of a multisine, which is measured."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One response, by side, and what it was measured with.
+
+    Attributes:
+        name: of it, for people.
+        kind: `sines`, `multisine` or `records`.
+        excitation: what a best linear approximation belongs to, in words.
+        trials: their numbers.
+        responses: torque to rate at the load, by side of the sensor.
+        loop: error to rate of a closed rate loop, where there is one.
+        best: what repeated multisines told besides, by side.
+        every: of how many points one is fitted to; the others know of their neighbours.
+        remarks: sentences: what could not be told, and why.
+    """
+
+    name: str
+    kind: str
+    excitation: str
+    trials: tuple[int, ...]
+    responses: Mapping[Side, MeasuredResponse]
+    loop: MeasuredResponse | None = None
+    best: Mapping[Side, BestLinear] = field(default_factory=dict)
+    every: int = 1
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def rms(self) -> float:
+        """Of the torque of repeated multisines (N m); zero for all else."""
+        return max((each.excitation.rms for each in self.best.values()), default=0.0)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How trials are read: see the options of the method."""
+
+    excited: Excited
+    estimator: Estimator
+    resolution: float | None
+    period: float | None
+
+
+def sources(
+    trials: Sequence[TrialData], bench: Bench, how: Reading
+) -> tuple[list[Source], list[str]]:
+    """All that the trials hold, and sentences about those that hold none."""
+    groups: dict[tuple[str, ...], list[TrialData]] = {}
+    for trial in trials:
+        groups.setdefault(_key(trial, how), []).append(trial)
+    found, remarks = [], list(unused(trials, bench))
+    refused: dict[str, list[str]] = {}
+    for (kind, *_, period), group in groups.items():
+        make = {"sines": _of_sines, "multisine": _of_multisine, "records": _of_records}[kind]
+        label = _label(group)
+        try:
+            told, lost = _all_signals(group, bench, how)
+        except ValueError as error:
+            refused.setdefault(str(error), []).append(label)
+            continue
+        remarks += lost
+        parts = {label: told}
+        if kind == "multisine":
+            sized = [
+                (size_of(part, float(period)), part) for part in by_amplitude(told, float(period))
+            ]
+            parts = {f"{label}, {size}": part for size, part in sized}
+            if len(sized) > 1:
+                sizes = ", ".join(f"{size} ({len(part)} trials)" for size, part in sized)
+                remarks.append(f"{label}: grouped by the recorded rms of the excitation: {sizes}.")
+        for name, part in parts.items():
+            try:
+                found.append(make(name, part, how))
+            except ValueError as error:
+                remarks.append(f"{name}: {error}.")
+    remarks += [
+        f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
+    ]
+    return found, remarks
+
+
+def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:
+    """Trials of the same key are one measurement."""
+    task, command = trial.trial.task, trial.trial.task.command
+    own = {"frequency", "seed", "realisation", "realization"}
+    point = {k: v for k, v in trial.trial.point.items() if k.rsplit(".", 1)[-1] not in own}
+
+    def common(but: Collection[str] = ()) -> tuple[str, ...]:
+        stated = [f"{k}={v}" for k, v in point.items() if k.rsplit(".", 1)[-1] not in but]
+        return (trial.trial.test, task.mode, task.compensation, *stated)
+
+    if isinstance(command, Sine) and task.mode in ("rate", "torque"):
+        return ("sines", *common())
+    if isinstance(command, MultiSine) and task.mode in ("rate", "torque"):
+        period = _period(command, task.duration)
+        if period is not None:
+            lines = ",".join(f"{each * period:.0f}" for each in command.frequencies)
+            return ("multisine", *common(SIZES), lines, f"{period:.9g}")
+    found = how.period if how.period is not None else repeated(trial, how.excited)
+    if found is not None and task.duration >= found:
+        return ("multisine", *common(SIZES), f"{found:.9g}")
+    return ("records", *common())
+
+
+def _period(command: MultiSine, duration: float) -> float | None:
+    """Of a multisine that repeats at least once; None for any other."""
+    base = base_frequency(command.frequencies)
+    return 1.0 / base if base > 0 and duration * base > 1.0 - 1e-6 else None
+
+
+def _label(group: Sequence[TrialData]) -> str:
+    first = group[0].trial
+    told = [first.test]
+    if first.task.mode != "recorded":
+        told.append(first.task.mode)
+    if first.task.compensation != "none":
+        told.append(first.task.compensation)
+    return ", ".join(told)
+
+
+def _all_signals(
+    group: Sequence[TrialData], bench: Bench, how: Reading
+) -> tuple[list[Recorded], list[str]]:
+    found, remarks = [], []
+    for trial in group:
+        try:
+            found.append((trial, signals(trial, bench, how.excited)))
+        except ValueError as error:
+            remarks.append(f"{trial.trial.label}: {error}.")
+    if not found:
+        raise ValueError(remarks[0].split(": ", 1)[-1].rstrip("."))
+    return found, sorted(set(remarks))
+
+
+def _as_rates(measured: MeasuredResponse, told: Signals, side: Side) -> MeasuredResponse:
+    """An angle's response times 2 pi i f is its rate's."""
+    if not told.is_angle(side):
+        return measured
+    return measured.times(np.asarray(2j * np.pi * measured.frequency))
+
+
+def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
+    remarks: list[str] = []
+    points: dict[Side, list[SinePoint]] = {side: [] for side in told[0][1].answers}
+    loop = []
+    for trial, signal in told:
+        task = trial.trial.task
+        command = task.command
+        if not isinstance(command, Sine):
+            continue
+        cut = _steady(trial, signal.time)
+        frequency, time = command.frequency, signal.time[cut]
+        try:
+            for side in points:
+                if side in signal.answers:
+                    answer = signal.answers[side][cut]
+                    points[side].append(sine_point(time, signal.torque[cut], answer, frequency))
+            if task.mode == "rate" and signal.reference is not None and "load" in signal.answers:
+                answer = signal.answers["load"][cut]
+                loop.append(sine_point(time, signal.reference[cut], answer, frequency))
+        except ValueError as error:
+            remarks.append(f"{trial.trial.label}: {error}.")
+    responses = {
+        side: _as_rates(MeasuredResponse.of(make_response(each)), told[0][1], side)
+        for side, each in points.items()
+        if len({point.frequency for point in each}) >= FEWEST_SINES
+    }
+    if not responses:
+        raise ValueError(f"fewer than {FEWEST_SINES} frequencies are no response")
+    first = next(iter(responses.values())).frequency
+    closed = None
+    if len(loop) >= FEWEST_SINES and not told[0][1].is_angle("load"):
+        closed = open_from_closed(MeasuredResponse.of(make_response(loop)))
+    amplitude = max(abs(t.trial.task.command.amplitude) for t, _ in told)  # type: ignore[union-attr]
+    in_rate = told[0][0].trial.task.mode == "rate"
+    largest = rate_here(amplitude) if in_rate else f"{amplitude:.4g} N·m"
+    excitation = (
+        f"{len(first)} single sines from {first[0]:.4g} to {first[-1]:.4g} Hz, "
+        f"amplitude up to {largest}"
+    )
+    numbers = tuple(trial.trial.number for trial, _ in told)
+    return Source(name, "sines", excitation, numbers, responses, closed, remarks=tuple(remarks))
+
+
+def _steady(trial: TrialData, time: Array) -> slice:
+    """The window that is measured: the one named so, or the task's."""
+    task = trial.trial.task
+    named = [each for each in trial.trial.windows if each.name == STEADY]
+    window = named[0] if named else Window(STEADY, *task.window)
+    half = 0.5 * (time[1] - time[0])
+    first, last = np.searchsorted(time, (window.start - half, window.stop - half))
+    return slice(int(first), int(last))
+
+
+def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
+    remarks: list[str] = []
+    rate = told[0][1].rate
+    period = _period_of(told[0][0], how)
+    if how.period is None and not isinstance(told[0][0].trial.task.command, MultiSine):
+        remarks.append(found_repeating(period))
+    samples = round(period * rate)
+    if abs(samples - period * rate) > 1e-3:
+        raise ValueError(f"its period of {period:.6g} s is no whole number of samples")
+    kept, numbers = [], []
+    periods = min(len(signal.time) // samples for _, signal in told)
+    for trial, signal in told:
+        parts = [signal.torque, *signal.answers.values()]
+        if signal.reference is not None:
+            parts.append(signal.reference)
+        # The last whole periods: a transient has most time to pass.
+        tail = slice(len(signal.time) - periods * samples, len(signal.time))
+        if periods < 1 or not all(np.all(np.isfinite(part[tail])) for part in parts):
+            remarks.append(f"{trial.trial.label}: a period has lost samples; it is left out.")
+            continue
+        kept.append((signal, tail))
+        numbers.append(trial.trial.number)
+    if not kept:
+        raise ValueError("no whole period without a lost sample")
+    with_reference = all(signal.reference is not None for signal, _ in kept)
+    reference = _stacked([(s.reference, t) for s, t in kept]) if with_reference else None
+    torque = _stacked([(s.torque, t) for s, t in kept])
+    lines = _lines(told[0][0], period, torque if reference is None else reference, periods)
+    acts_on: Excitation = "reference" if reference is not None else "input"
+    best: dict[Side, BestLinear] = {}
+    responses: dict[Side, MeasuredResponse] = {}
+    for side in kept[0][0].answers:
+        answer = _stacked([(s.answers[side], t) for s, t in kept])
+        found = best_linear(torque, answer, rate, periods, lines, acts_on, reference)
+        best[side], responses[side] = found, _as_rates(found.response, kept[0][0], side)
+    closed = None
+    if told[0][0].trial.task.mode == "rate" and reference is not None:
+        closed = _loop_of(kept, reference, rate, periods, lines)
+    first = next(iter(best.values()))
+    remarks += first.undetermined
+    return Source(
+        name,
+        "multisine",
+        _named(first, told[0][0]),
+        tuple(numbers),
+        responses,
+        closed,
+        best,
+        remarks=tuple(remarks),
+    )
+
+
+def _named(best: BestLinear, trial: TrialData) -> str:
+    """The excitation in words; of a loop what came into it, too."""
+    torque = str(replace(best.excitation, unit="N·m"))
+    command = trial.trial.task.command
+    if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
+        return torque
+    rms = float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
+    return f"{torque}, of a rate of rms {rate_here(rms)} that was asked for"
+
+
+def _loop_of(
+    kept: Sequence[tuple[Signals, slice]],
+    reference: Array,
+    rate: float,
+    periods: int,
+    lines: Lines,
+) -> MeasuredResponse | None:
+    signal = kept[0][0]
+    if "load" not in signal.answers or signal.is_angle("load"):
+        return None
+    answer = _stacked([(s.answers["load"], t) for s, t in kept])
+    error = reference - answer
+    return best_linear(error, answer, rate, periods, lines, "reference", reference).response
+
+
+def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
+    return np.stack([part[cut] for part, cut in parts if part is not None])
+
+
+def _period_of(trial: TrialData, how: Reading) -> float:
+    task = trial.trial.task
+    found = _period(task.command, task.duration) if isinstance(task.command, MultiSine) else None
+    return found or how.period or repeated(trial, how.excited) or task.duration
+
+
+def _lines(trial: TrialData, period: float, leading: Array, periods: int) -> Lines:
+    """Excited lines: those of the command, or those that stand out of what leads.
+
+    They stand out by the widest gap in size there is below the largest: what a drive distorts, or
+    a loop puts beside them, may be a tenth of what was asked.
+    """
+    command = trial.trial.task.command
+    if isinstance(command, MultiSine):
+        return np.sort(np.round(np.array(command.frequencies) * period).astype(np.int64))
+    size = np.mean(np.abs(np.fft.rfft(leading, axis=1))[:, ::periods], axis=0)
+    size[0] = 0.0
+    falling = np.sort(size[size > EXCITED_SHARE * np.max(size)])[::-1]
+    steps = falling[:-1] / falling[1:]
+    least = EXCITED_SHARE * np.max(size)
+    if len(steps) and np.max(steps) > GAP:
+        least = math.sqrt(float(np.prod(falling[np.argmax(steps) :][:2])))
+    return np.flatnonzero(size > least).astype(np.int64)
+
+
+def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
+    rates = {round(signal.rate, 6) for _, signal in told}
+    if len(rates) > 1:
+        raise ValueError("its trials were sampled at different rates")
+    rate = told[0][1].rate
+    segment = None if how.resolution is None else round(rate / how.resolution)
+    excited = _what_is_excited(told, how)
+    responses: dict[Side, MeasuredResponse] = {}
+    for side in told[0][1].answers:
+        records = _records(told, side, segment or 64, None)
+        found = welch_response(records, excited, how.estimator, segment)
+        responses[side] = _as_rates(_coherent(found), told[0][1], side)
+    closed = None
+    if told[0][0].trial.task.mode == "rate" and not told[0][1].is_angle("load"):
+        records = _records(told, "load", segment or 64, "error")
+        closed = _coherent(welch_response(records, "reference", segment=segment))
+    first = next(iter(responses.values()))
+    if len(first.frequency) < FEWEST_SINES:
+        raise ValueError("hardly a frequency is coherent: the recording excites nothing")
+    numbers = tuple(trial.trial.number for trial, _ in told)
+    excitation = f"whatever {len(told)} trials moved by; {first.method}"
+    return Source(
+        name,
+        "records",
+        excitation,
+        numbers,
+        responses,
+        closed,
+        every=HANN_APART,
+    )
+
+
+def _what_is_excited(told: Sequence[Recorded], how: Reading) -> Excitation:
+    if how.excited != "auto":
+        return how.excited
+    return "input" if told[0][0].trial.task.mode == "torque" else "reference"
+
+
+def _records(told: Sequence[Recorded], side: Side, shortest: int, what: str | None) -> list[Record]:
+    """Stretches without a lost sample; `what`: `error` for reference less output as the input."""
+    records = []
+    for _, signal in told:
+        if side not in signal.answers:
+            continue
+        answer, reference, input_ = signal.answers[side], signal.reference, signal.torque
+        if what == "error" and reference is not None:
+            input_ = reference - answer
+        parts = [input_, answer] + ([] if reference is None else [reference])
+        for cut in whole_stretches(parts, shortest):
+            inner = None if reference is None else reference[cut]
+            records.append(Record(round(signal.rate, 6), input_[cut], answer[cut], inner))
+    if not records:
+        raise ValueError("no stretch without a lost sample is long enough")
+    return records
+
+
+def _coherent(found: MeasuredResponse) -> MeasuredResponse:
+    """Points whose error is below a fifth of their size."""
+    return found.at(found.error < 0.2 * np.abs(found.values))
+
+
+def fitted_part(source: Source, side: Side, lowest: float, highest: float) -> MeasuredResponse:
+    """What is fitted to: within the band, of neighbours that know of each other one."""
+    measured = source.responses[side].between(lowest, highest).at(slice(None, None, source.every))
+    if source.kind != "sines":
+        return measured
+    scatter = 2.0 * (FRICTION * np.abs(measured.values)) ** 2
+    return replace(measured, variance=measured.variance + scatter)

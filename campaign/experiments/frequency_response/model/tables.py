@@ -1,0 +1,251 @@
+"""Tables of frequency responses: what was measured, orders, modes, margins, two masses."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.drive import TwoMass
+from campaign.estimation.frequency.one_inertia import METHOD as RIGID_METHOD
+from campaign.estimation.frequency.orders import order_of
+from campaign.estimation.frequency.two_mass import METHOD
+from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
+from campaign.result import Column, Table
+
+NAME = Column("source", "Response", exact=True)
+SENSOR = Column("side", "Sensor", exact=True)
+
+
+def sources_table(found: Sequence[FrequencyFit]) -> Table:
+    """What each response was measured with: a best linear approximation belongs to that."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "excitation": each.source.excitation,
+            "trials": len(each.source.trials),
+            "points": max(len(r.frequency) for r in each.source.responses.values()),
+        }
+        for each in found
+    ]
+    return Table(
+        "responses",
+        "Responses, and what they were measured with",
+        (
+            NAME,
+            Column("excitation", "Excitation", exact=True),
+            Column("trials", "Trials", exact=True),
+            Column("points", "Frequencies", exact=True),
+        ),
+        tuple(rows),
+        note="Of a nonlinear drive each response holds for its own excitation.",
+    )
+
+
+def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
+    """The function chosen for each response, and the two masses beside it."""
+    rows: list[dict[str, Any]] = []
+    for each in found:
+        parts = [(str(side), fit) for side, fit in each.fits.items()]
+        if each.loop_fit is not None:
+            parts.append(("loop", each.loop_fit))
+        for side, chosen in parts:
+            up, down = order_of(chosen.fit)
+            delay = chosen.fit.scatter[-1, -1] ** 0.5
+            late = Estimate.without_interval("delay", chosen.fit.delay, "s", chosen.fit.misfit)
+            if not chosen.fit.misfit:
+                low, high = (chosen.fit.delay + sign * 1.96 * delay for sign in (-1.0, 1.0))
+                late = Estimate("delay", chosen.fit.delay, "s", low, high, 0.95)
+            rows.append(
+                {
+                    "source": each.source.name,
+                    "side": side,
+                    "order": f"{up} / {down}",
+                    "excess": chosen.fit.excess,
+                    "delay": late,
+                    "condition": chosen.fit.condition,
+                    "says": str(chosen.fit.misfit) or "fits",
+                }
+            )
+        drive = masses.drive
+        if drive is not None and masses.source is each.source:
+            sides = ", ".join(masses.places)
+            rows.append(
+                {
+                    "source": each.source.name,
+                    "side": sides,
+                    "order": drive_name(drive),
+                    "excess": drive.excess,
+                    "condition": drive.condition,
+                    "says": str(drive.misfit) or "fits",
+                }
+            )
+    return Table(
+        "functions",
+        "Functions fitted, with a delay",
+        (
+            NAME,
+            SENSOR,
+            Column("order", "Order", exact=True),
+            Column("excess", "Square over expected", exact=True),
+            Column("delay", "Delay", "s", "ms"),
+            Column("condition", "Condition", exact=True),
+            Column("says", "Verdict", exact=True),
+        ),
+        tuple(rows),
+        note="Condition number of the weighted Jacobian with columns of one length: large where "
+        "parameters are hardly told apart. Order of numerator and denominator by Schwarz' "
+        "criterion. A function that leaves more than scatter is a misfit: what follows from it "
+        "has no interval.",
+    )
+
+
+def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
+    """Resonances and antiresonances."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "side": side,
+            "kind": "antiresonance" if mode.is_zero else "resonance",
+            "frequency": mode.frequency,
+            "damping": mode.damping,
+        }
+        for each in found
+        for side, modes in each.modes.items()
+        for mode in modes
+    ]
+    for each in found:
+        for side, local in each.local.items():
+            for kind, frequency, damping in (
+                ("resonance", local.frequency, local.damping_ratio),
+                ("antiresonance", local.antiresonance, None),
+            ):
+                rows.append(
+                    {
+                        "source": each.source.name,
+                        "side": side,
+                        "kind": f"{kind}, on top of a smooth response",
+                        "frequency": frequency,
+                        "damping": damping,
+                    }
+                )
+    if not rows:
+        return None
+    return Table(
+        "modes",
+        "Resonances and antiresonances",
+        (
+            NAME,
+            SENSOR,
+            Column("kind", "Kind", exact=True),
+            Column("frequency", "Frequency", "Hz", "Hz"),
+            Column("damping", "Damping ratio", ""),
+        ),
+        tuple(rows),
+    )
+
+
+def margins_table(found: Sequence[FrequencyFit]) -> Table | None:
+    """Bandwidth and margins of each loop."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.source.name,
+            "bandwidth": each.margins.bandwidth,
+            "phase": each.margins.phase_margin,
+            "gain": each.margins.gain_margin,
+        }
+        for each in found
+        if each.margins is not None
+    ]
+    if not rows:
+        return None
+    return Table(
+        "margins",
+        "Bandwidth and margins of the rate loop",
+        (
+            NAME,
+            Column("bandwidth", "Bandwidth", "Hz", "Hz"),
+            Column("phase", "Phase margin", "rad", "deg"),
+            Column("gain", "Gain margin", "dB", "dB"),
+        ),
+        tuple(rows),
+        note="A margin beyond the last frequency is a bound.",
+    )
+
+
+def masses_table(masses: Masses) -> Table | None:
+    """The drive of the response, and that of the axis where friction makes it another.
+
+    None where it is no model of the response, and for one inertia, unless friction is in it.
+    """
+    drive, axis = masses.drive, masses.axis
+    if drive is None or axis is None or drive.misfit or (drive.rigid and not masses.is_bent):
+        return None
+    columns: tuple[Column, ...] = (
+        Column("motor_inertia", "Driven inertia", "kg m^2", "kg m^2"),
+        Column("load_inertia", "Inertia behind the spring", "kg m^2", "kg m^2"),
+        Column("total_inertia", "Sum", "kg m^2", "kg m^2"),
+        Column("stiffness", "Stiffness", "N m/rad", "N m/rad"),
+        Column("damping", "Damping", "N m s/rad", "N m s/rad"),
+        Column("resonance", "Resonance", "Hz", "Hz"),
+        Column("resonance_damping", "Its damping ratio"),
+        Column("antiresonance", "Antiresonance", "Hz", "Hz"),
+        Column("inertia_ratio", "Inertia ratio"),
+    )
+    spring = (
+        " A spring that holds the driven inertia is part of the model: friction before it slides."
+        if drive.grounded
+        else ""
+    )
+    if drive.rigid:
+        columns = tuple(each for each in columns if each.name == "total_inertia")
+    rows = {"the axis": axis}
+    if masses.is_bent:
+        rows = {"the response": drive, **rows}
+        spring += (
+            " Of the response: at this excitation, by scatter alone. Of the axis: with what "
+            "friction may have in it, as other excitations or the odd distortion tell."
+        )
+    return Table(
+        "one-inertia" if drive.rigid else "two-masses",
+        "One inertia" if drive.rigid else "Two inertias on a spring",
+        (*columns, Column("of", "Of", exact=True)),
+        tuple(
+            {**{column.name: getattr(each, column.name) for column in columns}, "of": whose}
+            for whose, each in rows.items()
+        ),
+        note=f"{RIGID_METHOD if drive.rigid else METHOD}.{spring}",
+    )
+
+
+def drive_name(drive: TwoMass) -> str:
+    """What was fitted, for people."""
+    return "one inertia" if drive.rigid else "two inertias"
+
+
+def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
+    """Pairs of the numbers of the two masses that have these names, the most alike first."""
+    if masses.drive is None:
+        return None
+    pairs = [
+        (one, other, share)
+        for (one, other), share in masses.drive.correlations.items()
+        if {one, other} <= {*names}
+    ]
+    pairs.sort(key=lambda each: -abs(each[2]))
+    if not pairs:
+        return None
+    return Table(
+        "correlations",
+        "How numbers of the two inertias go together",
+        (
+            Column("one", "Number"),
+            Column("other", "and"),
+            Column("share", "Correlation", exact=True),
+        ),
+        tuple(
+            {"one": one.replace("_", " "), "other": other.replace("_", " "), "share": share}
+            for one, other, share in pairs
+        ),
+        note="By scatter alone: what a wrong torque constant or friction does, moves them as well.",
+    )

@@ -1,0 +1,278 @@
+"""Models held against responses and recordings that they were not fitted to, and their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.output_error import (
+    Simulated,
+    output_error,
+    simulated_output,
+)
+from campaign.estimation.frequency.prediction import HeldAgainst, held_against
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
+from campaign.experiments.frequency_response.model.signals import Signals, signals, whole_stretches
+from campaign.experiments.frequency_response.model.sources import (
+    Reading,
+    Source,
+    fitted_part,
+    sources,
+)
+from campaign.experiments.frequency_response.model.tables import drive_name
+from campaign.experiments.interface import TrialData
+from campaign.physics.bench import Bench
+from campaign.reason import Reason
+from campaign.signals import MultiSine
+
+FUNCTION = "rational function"
+FEWEST_LINES = 3
+OTHER_SIZE = 1.2
+"""Ratio of two excitations' rms from which on a response with friction is not the same."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A fitted response of one sensor, whatever it was fitted as.
+
+    Attributes:
+        source: what it was fitted to; `side`: the sensor.
+        lowest, highest: of the band that it was fitted in (Hz).
+        value, jacobian: response (n,), and its derivative by the parameters (n, p), by Hz.
+        covariance: of the parameters, shape (p, p).
+        poles: (rad/s).
+        misfit: why it is no model of what it was fitted to; none where it may be one.
+    """
+
+    name: str
+    source: Source
+    side: Side
+    lowest: float
+    highest: float
+    value: Callable[[Array], ComplexArray]
+    jacobian: Callable[[Array], ComplexArray]
+    covariance: Array
+    poles: ComplexArray
+    misfit: Reason
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """One response that was not fitted, and one model.
+
+    Attributes:
+        source: the unseen response's.
+        output: relative error of the simulated output there; None where none could be simulated.
+        first: that of the first recording.
+        is_angle: whether the output is an angle, and no rate.
+    """
+
+    source: Source
+    model: Model
+    against: HeldAgainst
+    output: Estimate | None
+    first: Simulated | None
+    is_angle: bool = False
+
+
+@dataclass(frozen=True)
+class Validation:
+    """All predictions, the simulated outputs of what was fitted, and sentences.
+
+    Attributes:
+        own: by model: relative error of the output simulated from the recordings it was fitted to.
+    """
+
+    predictions: tuple[Prediction, ...] = ()
+    own: tuple[tuple[Model, Estimate], ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def models(found: Sequence[FrequencyFit], told: Masses, band: Band) -> Iterator[Model]:
+    """All that were fitted, those of the two masses after the functions of their source."""
+    for each in found:
+        for side, chosen in each.fits.items():
+            fit = chosen.fit
+
+            def slope(frequency: Array, fit=fit) -> ComplexArray:  # type: ignore[no-untyped-def]
+                return np.asarray(fit.value(frequency)[:, None] * fit.log_jacobian(frequency))
+
+            yield Model(
+                FUNCTION, each.source, side, fit.lowest, fit.highest, fit.value, slope,
+                fit.scatter, fit.poles, fit.misfit,
+            )  # fmt: skip
+        if told.drive is not None and told.source is each.source:
+            yield from _masses(told, each.source, band)
+
+
+def _masses(told: Masses, source: Source, band: Band) -> Iterator[Model]:
+    drive = told.drive
+    for side, place in told.places.items():
+        if drive is None or (drive.misfit and not drive.covariance.size):
+            continue
+        lowest = max(band.lowest, told.lowest)
+        part = fitted_part(source, side, lowest, band.highest)
+
+        def value(frequency: Array, drive=drive, place=place) -> ComplexArray:  # type: ignore[no-untyped-def]
+            return np.asarray(drive.value(frequency, place))
+
+        def slope(frequency: Array, drive=drive, place=place) -> ComplexArray:  # type: ignore[no-untyped-def]
+            return np.asarray(drive.jacobian(frequency, place))
+
+        ends = float(part.frequency[0]), float(part.frequency[-1])
+        poles = np.polynomial.polynomial.polyroots(drive.polynomials(place)[1])
+        yield Model(
+            drive_name(drive), source, side, *ends, value, slope, drive.covariance,
+            np.asarray(poles, dtype=complex), drive.misfit,
+        )  # fmt: skip
+
+
+def validated(
+    fitted: Sequence[TrialData],
+    unseen: Sequence[TrialData],
+    bench: Bench,
+    how: Reading,
+    fits: Sequence[Model],
+) -> Validation:
+    """Every model held against what was not fitted; without any against its own recordings.
+
+    Raises ValueError where nothing of the validation is a response.
+    """
+    own = tuple(_own(fitted, bench, how, fits))
+    if not unseen:
+        return Validation(own=own)
+    told, remarks = sources(unseen, bench, how)
+    remarks += _same_course(fitted, unseen)
+    if not told:
+        raise ValueError(f"of the validation {' '.join(remarks) or 'no trial gives a response'}")
+    found = []
+    for source in told:
+        for side, measured in source.responses.items():
+            for model in _nearest(fits, source, side):
+                one = _predicted(source, model, measured, unseen, bench, how)
+                if one is None:
+                    remarks.append(
+                        f"{source.name}: too few frequencies lie where models were fitted."
+                    )
+                    continue
+                found.append(one)
+                remarks += _other_size(source, model.source)
+    return Validation(tuple(found), own, tuple(dict.fromkeys(remarks)))
+
+
+def _same_course(fitted: Sequence[TrialData], unseen: Sequence[TrialData]) -> list[str]:
+    """That what distorts repeats itself with a multisine, so that only noise is new."""
+    own = {str(each.trial.task.command) for each in fitted if _is_multisine(each)}
+    again = [each for each in unseen if _is_multisine(each) and str(each.trial.task.command) in own]
+    if not again:
+        return []
+    told = (
+        f"{len(again)} of its {len(unseen)} trials have a multisine that the model was fitted to, "
+        "phases and all: what friction adds to it repeats itself, and differences look smaller "
+        "than they are. Other phases (another seed) would show them."
+    )
+    return [told]
+
+
+def _is_multisine(trial: TrialData) -> bool:
+    return isinstance(trial.trial.task.command, MultiSine)
+
+
+def _nearest(fits: Sequence[Model], source: Source, side: Side) -> list[Model]:
+    """Of each name the model whose excitation was most alike; the first one where none says it."""
+    found = []
+    for name in dict.fromkeys(each.name for each in fits):
+        some = [each for each in fits if each.name == name and each.side == side]
+        if some:
+            found.append(min(some, key=lambda each: apart(each.source, source)))
+    return found
+
+
+def apart(one: Source, other: Source) -> float:
+    """How unlike two excitations are in size, as a logarithm; infinite where one has none."""
+    if one.rms <= 0 or other.rms <= 0:
+        return math.inf
+    return abs(math.log(one.rms / other.rms))
+
+
+def _other_size(source: Source, fitted: Source) -> Iterator[str]:
+    if math.log(OTHER_SIZE) < apart(source, fitted) < math.inf:
+        yield (
+            f"{source.name}: its torque has an rms of {source.rms:.3g} N·m, that of what was "
+            f"fitted ({fitted.name}) {fitted.rms:.3g} N·m: with friction the response differs."
+        )
+
+
+def _predicted(
+    source: Source,
+    model: Model,
+    measured: MeasuredResponse,
+    unseen: Sequence[TrialData],
+    bench: Bench,
+    how: Reading,
+) -> Prediction | None:
+    slack = 1.0 + 1e-9
+    part = measured.between(model.lowest / slack, model.highest * slack)
+    part = part.at(slice(None, None, source.every))
+    if len(part.frequency) < FEWEST_LINES:
+        return None
+    at = part.frequency
+    against = held_against(part, model.value(at), model.jacobian(at), model.covariance)
+    trials = [each for each in unseen if each.trial.number in source.trials]
+    simulated = _simulated(trials, bench, how, model)
+    if not simulated:
+        return Prediction(source, model, against, None, None)
+    error = output_error("output_error", simulated, model.lowest)
+    is_angle = signals(trials[0], bench, how.excited).is_angle(model.side)
+    return Prediction(source, model, against, error, simulated[0], is_angle)
+
+
+def _own(
+    fitted: Sequence[TrialData], bench: Bench, how: Reading, fits: Sequence[Model]
+) -> Iterator[tuple[Model, Estimate]]:
+    for model in fits:
+        trials = [each for each in fitted if each.trial.number in model.source.trials]
+        simulated = _simulated(trials, bench, how, model)
+        if simulated:
+            yield model, output_error("output_error", simulated, model.lowest)
+
+
+def _simulated(
+    trials: Sequence[TrialData], bench: Bench, how: Reading, model: Model
+) -> list[Simulated]:
+    """What the recorded torque makes of the model, beside what was recorded; whatever is too short
+    is left out.
+    """
+    found = []
+    for trial in trials:
+        try:
+            told = signals(trial, bench, how.excited)
+        except ValueError:
+            continue
+        if model.side in told.answers:
+            found += list(_stretches(told, model))
+    return found
+
+
+def _stretches(told: Signals, model: Model) -> Iterator[Simulated]:
+    answer, is_angle = told.answers[model.side], told.is_angle(model.side)
+
+    def response(frequency: Array) -> ComplexArray:
+        value = model.value(frequency)
+        return np.asarray(value / (2j * np.pi * frequency) if is_angle else value)
+
+    poles = np.append(model.poles, 0.0) if is_angle else model.poles
+    for cut in whole_stretches([told.torque, answer], 2):
+        band = model.lowest, model.highest
+        try:
+            one = simulated_output(told.torque[cut], answer[cut], told.rate, response, poles, *band)
+        except ValueError:
+            continue  # too short
+        yield Simulated(one.time + float(told.time[cut][0]), one.measured, one.simulated)

@@ -1,0 +1,1 @@
+"""Inverse dynamics: inertia and friction of any motion, by regression of the force."""

@@ -1,0 +1,335 @@
+"""Inverse dynamics of any motion: inertia and friction by regression of the force.
+
+The force of a motion is a sum of terms (`estimation.inverse.terms`); their coefficients follow
+from least squares on filtered rows, with deviations that know of autocorrelation, and are held
+against instruments from a simulated motion. Delay first, then structure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from pydantic import Field
+
+from campaign.channels import DRIVE_TORQUE
+from campaign.errors import UsageError
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import admitted_together, refused
+from campaign.estimation.inverse.terms import TERMS
+from campaign.experiments.any_motion.figures import figures
+from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
+from campaign.experiments.any_motion.motions import force_of, read, usable, with_slowest
+from campaign.experiments.any_motion.tables import (
+    correlated,
+    deviations_table,
+    instruments_note,
+    instruments_table,
+    structures_table,
+)
+from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.shared.directions import with_offset
+from campaign.experiments.shared.imported_scale import with_scale
+from campaign.experiments.shared.recorded_motion import analysis, nothing_to_plan
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen, is_value
+from campaign.reason import Cause
+from campaign.result import Amount, Conclusion, Finding, Result, Table
+from campaign.text import words
+from campaign.units import AngularRate, Frequency, Time
+
+FRICTION = "friction.load"
+BENCH = {
+    "coulomb": f"{FRICTION}.coulomb_torque",
+    "viscous": f"{FRICTION}.viscous_friction",
+    "coulomb_positive": f"{FRICTION}.coulomb_torque",
+    "coulomb_negative": f"{FRICTION}.negative.coulomb_torque",
+    "viscous_positive": f"{FRICTION}.viscous_friction",
+    "viscous_negative": f"{FRICTION}.negative.viscous_friction",
+    "inertia": "axis.inertia",
+}
+"""Where coefficients go that a bench has a place for: a plain friction model of steady sliding."""
+PLAIN = frozenset(BENCH) | {"offset"}
+NO_BASE = Cause(
+    "no base", "neither inertia nor dry friction is determined, so that nothing beside them is"
+)
+SEARCHED = Cause(
+    "searched", "it is the best of a search, an eighth of a period apart over the travel"
+)
+ADVICE = {
+    "inertia": "move with more acceleration at the same speeds: a multisine, or shorter ramps",
+    "viscous": "move at more, and further apart, steady speeds",
+    "coulomb": "reverse more often, and slide more slowly",
+    "spring": "move over more of the travel",
+    "gravity": "move over more of the travel",
+    "offset": "move as much in one direction as in the other",
+}
+"""By the beginning of a term's name: what tells its coefficient better."""
+
+SUMMARY = "inertia and friction of any motion, by regression of the force"
+
+
+class InverseDynamicsOptions(Options):
+    """Options of inverse dynamics."""
+
+    low_pass: Frequency | None = Field(default=None, gt=0)
+    """Corner of the zero-phase low-pass of the motion; absent: 100 Hz, or a fifth of the sample
+    rate where that is less."""
+    decimation: int | None = Field(default=None, ge=1, le=1000)
+    """Of how many samples one is kept, behind a low-pass; absent: to about 100 Hz."""
+    skip: Time = Field(default=0.0, ge=0)
+    """Left out at the beginning of each motion."""
+    slowest: AngularRate | None = Field(default=None, ge=0)
+    """Rate below which the axis counts as standing still, and rows are left out; absent: 2 % of
+    its fastest."""
+    delay: Time | None = None
+    """By how much the force acts later than recorded; absent: it is found."""
+    terms: tuple[str, ...] = ()
+    """Names of the model's terms; absent: they are chosen."""
+
+
+def _identify(data: TestData, options: InverseDynamicsOptions) -> Result:
+    terms = None
+    if options.terms:
+        unknown = [name for name in options.terms if name not in TERMS]
+        if unknown:
+            raise UsageError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
+        terms = [TERMS[name] for name in options.terms]
+    data.say("step 1 of 4, the motion")
+    filtering, pieces, unseen = read(data, options.low_pass, options.decimation, options.skip)
+    filtering = with_slowest(filtering, pieces, options.slowest)
+    found = find(
+        pieces,
+        unseen,
+        filtering,
+        delay=options.delay,
+        terms=terms,
+        linear=data.bench.is_linear,
+        say=data.say,
+    )
+    parameters = tuple(_parameters(found, data))
+    return Result(
+        tables=tuple(_tables(found)),
+        figures=tuple(figures(found)),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=tuple(_notes(found, data)),
+        conclusions=tuple(_conclusions(found, parameters)),
+        identified=Identified(
+            parameters,
+            correlations=_correlations(found),
+            settings=_settings(parameters, data),
+            # A ripple has a period that was found; another recording may not show it.
+            again={"terms": tuple(name for name in found.best.structure.names if name in TERMS)},
+            unseen=Unseen(found.best.validation.value)
+            if found.best.validation is not None
+            else None,
+        ),
+    )
+
+
+def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
+    fit = found.fit
+    together = {
+        name: (other, share)
+        for one, two, share in correlated(fit, found.best.structure.terms)
+        for name, other in ((one, two), (two, one))
+    }
+    scaled = {name: _scaled(one, data) for name, one in found.estimates.items()}
+    told = with_offset(_with_base(admitted_together(scaled, found.matters)), "coulomb")
+    dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
+    slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
+    for term in found.best.structure.terms:
+        one = told[term.name]
+        bench = BENCH.get(term.name, "") if slides or term.name == "inertia" else ""
+        advice = next((text for key, text in ADVICE.items() if term.name.startswith(key)), "")
+        if term.name in together:
+            other, share = together[term.name]
+            advice = (
+                f"the motion hardly tells it from {other} (correlation {share:.2f}): {advice}"
+                if advice
+                else f"move so that it differs from {other} (correlation {share:.2f})"
+            )
+        yield Parameter(one, term.meaning, bench=bench, advice=advice)
+    if found.period is not None and repeats(found.best.structure):
+        period = Estimate.without_interval("position_period", found.period, "rad", SEARCHED())
+        yield Parameter(period, "Distance over which force or friction repeats.", "deg")
+    late = found.delay
+    if late.origin is not Origin.GIVEN:
+        yield Parameter(
+            late,
+            "By how much the force acts later than it is recorded.",
+            display="ms",
+            advice="record faster, or with sharper reversals",
+        )
+
+
+def _with_base(told: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Further terms are told beside inertia or dry friction, and not alone: the rest of nothing."""
+    base = {name for name in told if name == "inertia" or name.startswith("coulomb")}
+    if any(told[name].origin is not Origin.NOT_DETERMINED for name in base):
+        return told
+    further = {name: one for name, one in told.items() if name not in base}
+    return told | {
+        name: refused(one, NO_BASE())
+        for name, one in further.items()
+        if one.origin is Origin.MEASURED
+    }
+
+
+def one_way(found: InverseDynamics) -> str:
+    """The only direction it moves in; empty where it does in both."""
+    names = set(found.best.structure.names)
+    ways = [way for way in ("positive", "negative") if f"coulomb_{way}" in names]
+    return ways[0] if len(ways) == 1 else ""
+
+
+def _is_plain(found: InverseDynamics) -> bool:
+    """Whether the chosen terms are those that a bench's friction model has."""
+    return {term.name for term in found.best.structure.terms} <= PLAIN
+
+
+def _scaled(one: Estimate, data: TestData) -> Estimate:
+    """With what a wrong constant of the force would do to it."""
+    if one.origin is Origin.NOT_DETERMINED:
+        return one
+    first = data.trials[0]
+    return with_scale(_with_constant(one, data), first, force_of(first))
+
+
+def _with_constant(one: Estimate, data: TestData) -> Estimate:
+    if data.bench.motor is None or _from_elsewhere(data):
+        return one
+    return with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
+
+
+def _from_elsewhere(data: TestData) -> bool:
+    """Whether a mapping says what the columns are worth, and so how sure that is."""
+    return bool(data.trials[0].trial.recording)
+
+
+def _tables(found: InverseDynamics) -> Iterator[Table]:
+    yield structures_table(found)
+    for number, each in enumerate(found.tried[:2]):
+        if each.delay == 0.0 and number != found.chosen:
+            name = "both directions alike" if "coulomb" in each.structure.names else "by direction"
+            yield deviations_table(f"plain-{number + 1}", f"Plain fit, {name}", each)
+    yield deviations_table("chosen", "The chosen model and its deviations", found.best)
+    if found.instruments is not None:
+        yield instruments_table(found, found.instruments)
+
+
+def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
+    filtering = found.filtering
+    yield (
+        f"Position low-passed at {filtering.low_pass:g} Hz without phase, differentiated twice; "
+        f"one of {filtering.decimation} samples is kept behind the same low-pass on both sides; "
+        f"{filtering.skip} samples were left out at each beginning."
+    )
+    held = found.instruments
+    if held is None:
+        yield f"No instruments: {found.no_instruments}."
+    elif not held.of_wanted:
+        yield f"No instruments along the wanted motion: {found.no_instruments}."
+    if found.biased:
+        yield instruments_note(found)
+    if any(each.reason in BENDS for each in found.estimates.values()):
+        yield (
+            "A term that bends over the rate was added because it predicts better. It stands in "
+            "for whatever bends friction, most often a Stribeck curve, which `--model whole_model` "
+            "fits: shares of it are told without intervals."
+        )
+    late = found.delay
+    if math.isnan(late.value):
+        yield f"The delay of the force is not determined: {late.reason}."
+    if way := one_way(found):
+        yield (
+            f"The axis moves in the {way} direction only: friction of the other is not known, and "
+            "what is called Coulomb friction holds every constant force as well, such as a weight "
+            "or a sensor's zero. Friction goes to no bench file."
+        )
+    if (force := force_of(data.trials[0])) != DRIVE_TORQUE:
+        yield (
+            f"The force is {force}, measured at the load: what motor and gear need themselves, "
+            "their inertia and friction, is not in it."
+        )
+    for one, two, share in correlated(found.fit, found.best.structure.terms):
+        yield (
+            f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
+            "the motion hardly tells them apart, and only their sum is known well."
+        )
+    if not _is_plain(found):
+        yield (
+            "Friction of the chosen model is a sum of terms that mean something together, over the "
+            "rates of this motion only; a bench file has no place for it, and gets the inertia. "
+            "`--model whole_model` fits the friction models that it has a place for."
+        )
+    if len(data.trials) > 1:
+        yield f"{len(data.trials)} trials were fitted together."
+
+
+def _conclusions(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Conclusion]:
+    by_name = {each.estimate.name: each.estimate for each in parameters}
+    if "inertia" in by_name and not math.isnan(by_name["inertia"].value):
+        parts: list[str | Amount] = ["The inertia is ", Amount(by_name["inertia"], "kg m^2")]
+        if (late := by_name.get("delay")) is not None and found.best.delay != 0.0:
+            low, high = late.combined
+            surely = low is None or high is None or low > 0 or high < 0
+            tail = " later than it is recorded"
+            tail += "" if surely else ", or not at all later: its interval holds zero"
+            parts += [", and the force acts ", Amount(late, "ms"), tail]
+        yield Conclusion((*parts, "."))
+    best = found.best
+    if best.validation is not None:
+        parts = ["The model leaves ", Amount(best.validation, "percent"), " of an unseen torque"]
+        if best.gain is not None and best.gain.value != 0.0:
+            without = " of it than without delay and further terms"
+            parts += [", lower by ", Amount(best.gain, "percent"), without]
+        yield Conclusion((*parts, "."))
+
+
+def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:
+    held, terms = found.instruments, found.best.structure.terms
+    fit = held.found.fit if found.biased and held is not None else found.fit
+    matrix = fit.correlation
+    return {
+        (terms[i].name, terms[j].name): float(matrix[i, j])
+        for i in range(len(terms))
+        for j in range(i)
+    }
+
+
+def _settings(
+    parameters: Sequence[Parameter], data: TestData
+) -> dict[str, tuple[object, str, str]]:
+    """What a bench's friction needs besides: no Stribeck part was looked for, so it has none."""
+    if "load" in data.bench.friction:
+        return {}
+    by_name = {each.estimate.name: each for each in parameters}
+    coulomb = by_name.get("coulomb", by_name.get("coulomb_positive"))
+    if coulomb is None or not coulomb.bench:
+        return {}
+    told: dict[str, tuple[object, str, str]] = {
+        f"{FRICTION}.model": ("coulomb", "", "the plain friction of steady sliding"),
+    }
+    for name, each in by_name.items():
+        one = each.estimate
+        if name in BENCH and name.startswith("viscous") and not each.bench:
+            fitted = 0.0 if one.kind == "at most" else max(one.value, 0.0)
+            told[BENCH[name]] = (fitted, "N m s/rad", "as fitted, and not determined")
+    return told
+
+
+EXPERIMENT = Experiment(
+    name="inverse_dynamics",
+    summary=SUMMARY,
+    options=InverseDynamicsOptions,
+    trials=nothing_to_plan,
+    analyse=analysis(InverseDynamicsOptions, usable, _identify),
+    model=Model(
+        "inverse_dynamics",
+        SUMMARY,
+        InverseDynamicsOptions,
+        usable,
+    ),
+)

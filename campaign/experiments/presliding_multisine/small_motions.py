@@ -1,0 +1,204 @@
+"""Trials as small motions below breakaway: which are, which are not and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
+from campaign.estimation.inverse.motion import whole_pieces
+from campaign.estimation.presliding_dynamics.plant import Array
+from campaign.estimation.presliding_dynamics.record import FEWEST, Assumed, Record
+from campaign.estimation.presliding_dynamics.start import first_plant
+from campaign.experiments.interface import TrialData
+from campaign.experiments.presliding_multisine.dynamics import record_of, with_torques_known
+from campaign.experiments.presliding_multisine.options import PreslidingMultisineOptions
+from campaign.signals import Zero
+
+MOTION = (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE)
+MOST_SAMPLES = 300_000
+"""of all trials together that nobody planned as small motions; the simulation follows each."""
+BEYOND = 2.0
+"""Corner of the low-pass over the highest frequency that the load answers to."""
+ONLY_RAMPS = 0.1
+"""of a torque that a straight line leaves over, below which it has no reversal."""
+EXPLAINED = 0.5
+"""of the torque's variance that inertia, damping, spring and friction have to explain."""
+DIRECTION = 0.5
+"""Friction that changes with the direction, over that which grows with the angle: more slides."""
+
+
+def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
+    """Trials that stay below breakaway, or why there are none.
+
+    Where some were planned for it (`presliding_multisine`), these. Else what was done in open loop
+    or recorded elsewhere, as far as it comes back to where it was.
+    """
+    shown = [
+        each
+        for each in trials
+        if DRIVE_TORQUE in each.channel_names() and each.channel_names() & set(MOTION)
+    ]
+    planned = [each for each in shown if is_planned(each)]
+    if planned:
+        return planned, ""
+    found: list[TrialData] = []
+    whys: list[str] = []
+    samples = 0
+    for each in shown:
+        if why := _not_even(each):
+            whys.append(why)
+            continue
+        samples += round(each.trial.task.duration * each.trial.task.sample_rate)
+        if samples > MOST_SAMPLES:
+            whys.append(f"{each.trial.label}: more than {MOST_SAMPLES} samples; take a part of it")
+            break
+        try:
+            record = small_motion(each)
+        except ValueError as error:
+            whys.append(str(error))
+            continue
+        if why := slides(record):
+            whys.append(f"{record.named}: {why}")
+        else:
+            found.append(each)
+    if found:
+        return found, ""
+    names = f"{DRIVE_TORQUE} and {' or '.join(MOTION)}"
+    return (), f"no trial is a small motion below breakaway ({_told(whys) or f'none has {names}'})"
+
+
+def _told(whys: Sequence[str]) -> str:
+    more = len(whys) - 1
+    return whys[0] + (f"; and so on of {more} more" if more else "") if whys else ""
+
+
+def is_planned(data: TrialData) -> bool:
+    """Whether it is a small motion by its plan, so that nobody has to look."""
+    return data.trial.kind == "presliding_multisine"
+
+
+def small_motion(data: TrialData) -> Record:
+    """The record of a trial. Raises ValueError with the reason where it holds too little."""
+    if is_planned(data):
+        return record_of(data, 1.0 / options_of(data).lowest)
+    if not data.trial.recording:
+        return record_of(data)
+    recording, label = data.recording(), data.trial.label
+    torque = recording[DRIVE_TORQUE]
+    pieces = whole_pieces(np.isfinite(torque), FEWEST)
+    if not pieces:
+        raise ValueError(f"{label}: its torque has no {FEWEST} samples without a lost one")
+    piece = max(pieces, key=lambda each: len(torque[each]))
+    name = _measured(data)
+    values = recording[name][piece]
+    return Record(
+        1.0 / data.trial.task.sample_rate,
+        torque[piece],
+        rate=None if name == RELATIVE_ANGLE else values,
+        angle=values if name == RELATIVE_ANGLE else None,
+        at_rest=False,  # nobody says how a recording from elsewhere begins
+        label=label,
+    )
+
+
+def records_of(trials: Sequence[TrialData]) -> list[Record]:
+    """Of small motions, with all that is known of their torque."""
+    return with_torques_known(trials, [small_motion(each) for each in trials])
+
+
+def span_of(trials: Sequence[TrialData], records: Sequence[Record]) -> tuple[float, float]:
+    """Lowest and highest frequency (Hz) of all trials."""
+    spans = [_span(*each) for each in zip(trials, records, strict=True)]
+    return min(low for low, _ in spans), max(high for _, high in spans)
+
+
+def _span(data: TrialData, record: Record) -> tuple[float, float]:
+    """That a trial shows."""
+    if is_planned(data):
+        options = options_of(data)
+        return options.lowest, options.highest
+    return 1.0 / float(record.time[-1]), record.highest_frequency()
+
+
+def options_of(data: TrialData) -> PreslidingMultisineOptions:
+    """Of a planned trial."""
+    return PreslidingMultisineOptions.model_validate(data.trial.options, context={"si": True})
+
+
+def slides(record: Record) -> str:
+    """Why a record is no small motion below breakaway; empty where it is one.
+
+    Regression of the low-passed torque on acceleration, rate, angle and direction: bristles make
+    it grow with the angle, and sliding makes it jump with the direction.
+    """
+    if _only_ramps(record.torque):
+        return "its torque only rises or falls: without a reversal nothing shows that it returns"
+    try:
+        first_plant([record], Assumed())
+    except ValueError as error:
+        return str(error)
+    torque, angle, rate, acceleration = _smooth(record)
+    x = np.linspace(-1.0, 1.0, len(torque))
+    columns = np.column_stack([angle, np.sign(rate), rate, acceleration])
+    # Offset and drift; of an angle that is the integral of a rate, the drift is a parabola.
+    trend = np.linalg.qr(np.vander(x, 3))[0]
+    columns = columns - trend @ (trend.T @ columns)
+    torque = torque - trend @ (trend.T @ torque)
+    size = np.linalg.norm(columns, axis=0)
+    if not np.all(size > 0) or not np.any(torque):
+        return "its motion holds nothing"
+    shares, *_ = np.linalg.lstsq(columns / size, torque, rcond=None)
+    left = torque - columns / size @ shares
+    spring, direction = shares[:2]
+    if left @ left > (1.0 - EXPLAINED) * (torque @ torque):
+        return "its torque and its motion do not belong together, or are hardly more than noise"
+    if spring <= 0 or direction > DIRECTION * spring:
+        return "it slides: its torque goes with the direction, not with the angle"
+    return ""
+
+
+def _only_ramps(torque: Array) -> bool:
+    """Whether a torque is a straight line, but for little of it."""
+    x = np.linspace(-1.0, 1.0, len(torque))
+    left = torque - np.polyval(np.polyfit(x, torque, 1), x)
+    return bool(np.std(left) < ONLY_RAMPS * np.std(torque))
+
+
+def _smooth(record: Record) -> tuple[Array, Array, Array, Array]:
+    """Torque, angle, rate and acceleration behind one and the same low-pass without phase."""
+    from scipy.signal import butter, sosfiltfilt
+
+    values = record.rate if record.rate is not None else np.asarray(record.angle)
+    there = np.isfinite(values)
+    values = np.interp(record.time, record.time[there], values[there])
+    corner = min(BEYOND * record.highest_frequency() * record.step, 0.2)
+    sos = butter(2, 2.0 * corner, output="sos")
+    torque, values = sosfiltfilt(sos, record.torque), sosfiltfilt(sos, values)
+    rate = values if record.rate is not None else np.gradient(values, record.step)
+    angle = values if record.rate is None else np.cumsum(values - np.mean(values)) * record.step
+    return torque, angle, rate, np.gradient(rate, record.step)
+
+
+def _not_even(data: TrialData) -> str:
+    """Why a trial is not looked at; empty where it is."""
+    task, label = data.trial.task, data.trial.label
+    if data.trial.recording:
+        return ""
+    if task.mode != "torque":
+        return f"{label}: its loop moved it on purpose, beyond breakaway"
+    return "" if isinstance(task.base_acceleration, Zero) else f"{label}: the hull moves"
+
+
+def _measured(data: TrialData) -> str:
+    """The channel of the motion: what was recorded before what was made of it."""
+    told = data.trial.recording.get("channels")
+    made = {
+        str(each.get("name"))
+        for each in (told if isinstance(told, list) else [])
+        if isinstance(each, dict) and each.get("how", "column") != "column"
+    }
+    names = data.channel_names()
+    order = [each for each in (GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE) if each in names]
+    return next((each for each in order if each not in made), order[-1])

@@ -1,0 +1,49 @@
+"""Any recorded motion as the trials of an experiment that plans none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TypeVar
+
+from campaign.experiments.interface import Suits, TestData
+from campaign.experiments.shared.common import failures_note
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.result import Result
+from campaign.trial import TrialRequest
+
+AnyOptions = TypeVar("AnyOptions", bound=Options)
+
+
+def nothing_to_plan(options: Options, bench: Bench) -> Iterable[TrialRequest]:
+    """Raises ValueError: nobody plans such trials."""
+    raise ValueError(
+        "a motion is what somebody recorded, so there is nothing to plan: give it "
+        "[[test.recording]] and `campaign import` it"
+    )
+
+
+def analysis(
+    kind: type[AnyOptions], suits: Suits, identify: Callable[[TestData, AnyOptions], Result]
+) -> Callable[[TestData], Result]:
+    """The analysis by `identify`, with the options of the model, or else of the recorded test.
+
+    Where there is no result, `identify` raises ValueError; a report then gets a note.
+    """
+
+    def analyse(data: TestData) -> Result:
+        if data.model is not None:
+            return identify(data, data.model)
+        notes = failures_note(data)
+        trials, why = suits(tuple(data.completed()))
+        if not trials:
+            return Result(notes=(*notes, f"{why}."))
+        options = kind.model_validate(trials[0].trial.options, context={"si": True})
+        try:
+            found = identify(replace(data, trials=tuple(trials)), options)
+        except ValueError as error:
+            return Result(notes=(*notes, f"{error}."))
+        return replace(found, notes=(*notes, *found.notes))
+
+    return analyse

@@ -1,0 +1,1 @@
+"""Whole model: friction models along any motion, fitted through the engine and compared."""

@@ -1,0 +1,252 @@
+"""Whole friction models along any motion, fitted through the engine and compared on unseen motion.
+
+The friction models of this program meet the measured rate, with their own state; inertia, delay and
+linear terms are fitted with them. What has no information goes to no bench file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from pydantic import Field
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import admitted
+from campaign.estimation.inverse.terms import Term
+from campaign.experiments.any_motion.inverse_fit import InverseDynamics
+from campaign.experiments.any_motion.inverse_fit import find as find_inverse
+from campaign.experiments.any_motion.motions import Moved, force_of, read, usable, with_slowest
+from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.shared.imported_scale import with_scale
+from campaign.experiments.shared.recorded_motion import analysis, nothing_to_plan
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.experiments.whole_model.parts import telling_parts
+from campaign.experiments.whole_model.shown import figures, models_table, values_table
+from campaign.experiments.whole_model.whole_model_fit import Fit, find, product
+from campaign.options import Options
+from campaign.parameter import Identified, Parameter, Unseen
+from campaign.reason import Cause, Reason
+from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.text import words
+from campaign.units import Frequency, Time
+
+FRICTION = "friction.load"
+FORCES = (
+    "inertia",
+    "coulomb",
+    "viscous",
+    "static_torque",
+    "bristle",
+    "spring",
+    "offset",
+    "cogging",
+)
+"""Beginnings of names whose numbers grow with the force's constant."""
+RATIO = "static_over_coulomb"
+"""of both directions, or the beginning of the name of one's own."""
+PARTS = Cause(
+    "parts of the motion",
+    "fitted to {used:.0f} of {recorded:.0f} s, in the {parts} parts that tell most of friction: a "
+    "fit of all takes too long",
+)
+STILL = 0.25
+"""of the rate below which a plain regression takes an axis for standing: curves begin there."""
+LINEAR = ("spring", "gravity", "cogging")
+"""Beginnings of terms of a plain regression that no friction model stands in for."""
+ADVICE = {
+    RATIO: "slide more slowly, and reverse more often",
+    "stribeck_velocity": "slide at more speeds between rest and the fastest",
+    "bristle": "stay below breakaway: `presliding_multisine` measures it",
+    "coulomb": "reverse more often",
+    "viscous": "slide at more, and further apart, speeds",
+    "inertia": "move with more acceleration at the same speeds",
+    "spring": "move over more of the travel",
+}
+
+SUMMARY = "friction models along any motion, fitted through the engine and compared"
+
+
+class WholeModelOptions(Options):
+    """Options of whole models."""
+
+    low_pass: Frequency | None = Field(default=None, gt=0)
+    """As of `inverse_dynamics`."""
+    decimation: int | None = Field(default=None, ge=1, le=1000)
+    """As of `inverse_dynamics`."""
+    skip: Time = Field(default=0.0, ge=0)
+    """As of `inverse_dynamics`."""
+    starts: int = Field(default=2, ge=1, le=50)
+    """Fits of each model, the first from plain inverse dynamics and the others at random."""
+    model: str = ""
+    """Name of the model whose numbers are told; absent: the one that does best."""
+
+
+def _identify(data: TestData, options: WholeModelOptions) -> Result:
+    data.say("the motion")
+    filtering, whole, unseen = read(data, options.low_pass, options.decimation, options.skip)
+    moves = with_slowest(filtering, whole, None)
+    pieces = telling_parts(whole, moves)
+    if pieces is not whole:  # parts lie behind what is skipped
+        unseen = tuple(each.part(slice(moves.skip, None)) for each in unseen)
+        moves = replace(moves, skip=0)
+    filtering = replace(moves, slowest=STILL * moves.slowest)
+    regression = find_inverse(pieces, unseen, moves, linear=data.bench.is_linear)
+    extra = _linear_terms(regression)
+    held = regression.instruments
+    known = held.delay if held is not None and held.of_wanted else None
+    found = find(pieces, unseen, filtering, extra, options.starts, data.say, known=known)
+    names = [each.model.name for each in found.fits]
+    if options.model and options.model not in names:
+        raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
+    if options.model:
+        found = replace(found, best=names.index(options.model))
+    best = found.fits[found.best]
+    parameters = tuple(_parameters(best, data))
+    return Result(
+        tables=(models_table(found), *(values_table(each) for each in found.fits)),
+        figures=tuple(figures(found, regression, unseen)),
+        findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+        notes=tuple(_notes(best)),
+        conclusions=tuple(_conclusions(best)),
+        identified=Identified(
+            parameters,
+            correlations=best.fit.correlation,
+            settings=_settings(best, parameters),
+            again={"model": best.model.name},
+            unseen=Unseen(best.validation.value) if best.validation is not None else None,
+            left_out=_left_out(whole, pieces),
+        ),
+    )
+
+
+def _left_out(whole: Sequence[Moved], parts: Sequence[Moved]) -> tuple[Reason, ...]:
+    """Of long recordings."""
+    if parts is whole:
+        return ()
+    used, recorded = (
+        sum(len(each.motion.time) / each.motion.sample_rate for each in side)
+        for side in (parts, whole)
+    )
+    return (PARTS(used=used, recorded=recorded, parts=len(parts)),)
+
+
+def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
+    terms = found.best.structure.terms
+    return tuple(term for term in terms if term.name.startswith(LINEAR))
+
+
+def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
+    told = dict(best.fit.estimates)
+    keys = {each.unknown.name: each for each in best.model.numbers if not each.over}
+    meanings = {each.unknown.name: each.meaning for each in best.model.numbers}
+    meanings |= {term.name: term.meaning for term in best.extra}
+    meanings["inertia"] = "What resists acceleration."
+    meanings["delay"] = "By how much the force acts later than it is recorded."
+    for name, estimate in told.items():
+        bench = "axis.inertia" if name == "inertia" else ""
+        if name in keys:
+            bench = f"{FRICTION}.{keys[name].key}"
+        advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
+        display = "ms" if name == "delay" else ""
+        one = admitted(_scaled(estimate, data))
+        yield Parameter(one, meanings.get(name, ""), display, bench, advice)
+    for each in best.model.numbers:
+        if not each.over:
+            continue
+        ratio = told[each.unknown.name]
+        base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+        share = best.fit.correlation.get((ratio.name, base), 0.0)
+        share = share or best.fit.correlation.get((base, ratio.name), 0.0)
+        way = base.removeprefix("coulomb")
+        made = product(f"static_torque{way}", ratio, told[base], share)
+        meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
+        advice = ADVICE[RATIO]
+        made = admitted(_scaled(made, data))
+        yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", advice)
+
+
+def _scaled(one: Estimate, data: TestData) -> Estimate:
+    """With what a wrong constant of the force would do to it."""
+    if not one.name.startswith(FORCES) or one.origin is Origin.NOT_DETERMINED:
+        return one
+    first = data.trials[0]
+    if data.bench.motor is not None and not first.trial.recording:
+        one = with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
+    return with_scale(one, first, force_of(first))
+
+
+def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[object, str, str]]:
+    """The model's name, and numbers that the motion leaves open: a bench needs them, too."""
+    stated = {each.bench for each in parameters}
+    told: dict[str, tuple[object, str, str]] = {
+        f"{FRICTION}.model": (best.model.model, "", "fitted")
+    }
+    values = best.values
+    flat = {each.unknown.name: each for each in best.model.numbers if not each.over}
+    for name, estimate in best.fit.estimates.items():
+        if name in flat and f"{FRICTION}.{flat[name].key}" not in stated:
+            each = flat[name]
+            told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, str(estimate.reason))
+    for each in best.model.numbers:
+        if each.over and f"{FRICTION}.{each.key}" not in stated:
+            base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+            value = values[each.unknown.name] * values[base]
+            told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
+    return told
+
+
+def _notes(best: Fit) -> Iterator[str]:
+    for name, each in best.fit.estimates.items():
+        if each.origin is not Origin.MEASURED:
+            yield f"{name.replace('_', ' ')} is not known: {each.reason}."
+    for (one, two), share in best.fit.correlation.items():
+        if abs(share) >= 0.9:
+            yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."
+    for name, ratio in best.fit.estimates.items():
+        if not name.startswith(RATIO):
+            continue
+        way = name.removeprefix(RATIO).lstrip("_")
+        where = f"In the {way} direction static" if way else "Static"
+        low, high = ratio.combined
+        if ratio.origin is Origin.MEASURED and high is not None and high < 1.0:
+            yield f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
+        elif ratio.origin is not Origin.MEASURED or low is None or low <= 1.0:
+            yield (
+                f"{where} friction is not told from Coulomb friction: there is no Stribeck part "
+                "that this motion could identify."
+            )
+    yield (
+        "Each model met the rate that was measured, in steps of the recording; a loop that was "
+        "closed on that rate is in the data, and not in the model."
+    )
+
+
+def _conclusions(best: Fit) -> Iterator[Conclusion]:
+    told = best.fit.estimates
+    names = [name for name in ("coulomb", "coulomb_positive", "coulomb_negative") if name in told]
+    parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
+    for index, name in enumerate(names):
+        way = name.removeprefix("coulomb").strip("_")
+        parts += [", and "] if index else []
+        parts += [Amount(told[name], "N m"), f" in the {way} direction" if way else ""]
+    yield Conclusion((*parts, "."))
+    if best.validation is not None:
+        yield Conclusion(
+            ("This model leaves ", Amount(best.validation, "percent"), " of an unseen torque.")
+        )
+
+
+EXPERIMENT = Experiment(
+    name="whole_model",
+    summary=SUMMARY,
+    options=WholeModelOptions,
+    trials=nothing_to_plan,
+    analyse=analysis(WholeModelOptions, usable, _identify),
+    model=Model(
+        "whole_model",
+        SUMMARY,
+        WholeModelOptions,
+        usable,
+    ),
+)

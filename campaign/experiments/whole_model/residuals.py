@@ -1,0 +1,90 @@
+"""What a friction model leaves over of the force of motions, for any values of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array, Filtering, Motion, decimated, first_kept
+from campaign.estimation.inverse.rows import all_rows, late_force, moving
+from campaign.estimation.inverse.terms import TERMS, Term
+from campaign.estimation.whole_model import Values
+from campaign.experiments.whole_model.along import Along
+from campaign.experiments.whole_model.models import Model
+
+STEPS = 10
+"""Simulated steps of a row at least: rates of a motion are low-passed, and rows all the more."""
+KEPT = 16
+"""Simulations that are kept: more than a model has numbers. Derivatives by inertia, delay and
+linear terms ask for the friction of the point itself."""
+
+
+def steps_between(filtering: Filtering) -> int:
+    """Samples from one simulated step to the next: rows remain where they are."""
+    most = max(1, filtering.decimation // STEPS)
+    return next(n for n in range(most, 0, -1) if filtering.decimation % n == 0)
+
+
+class Residuals:
+    """Of a model along motions; all but friction is linear in its values, and filtered once."""
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        model: Model,
+        extra: Sequence[Term],
+        motions: Sequence[Motion],
+        filtering: Filtering,
+        every: int = 1,
+    ) -> None:
+        """names: of the values. every: samples from one simulated step to the next."""
+        terms = (TERMS["inertia"], *extra)
+        self._places = [names.index(term.name) for term in terms]
+        self._own = [names.index(each.name) for each in model.unknowns]
+        self._delay = names.index("delay")
+        self._model = model
+        self._forces = [late_force(motion, filtering) for motion in motions]
+        self._columns = [all_rows(motion, terms, filtering).columns for motion in motions]
+        self._moves = [moving(motion, filtering) for motion in motions]
+        self._along = [Along(*_thinned(motion, every)) for motion in motions]
+        self._counts = [-(-(len(each.time) - filtering.skip) // every) for each in motions]
+        self._decimation = filtering.decimation // every
+        self._friction = lru_cache(KEPT)(self._simulated)
+
+    def __call__(self, values: Values) -> list[Array]:
+        """Of rows in which the axis moves, one array of shape (n,) for each motion."""
+        return [
+            (force - said) * moves
+            for force, said, moves in zip(
+                self.forces(values), self.modelled(values), self._moves, strict=True
+            )
+        ]
+
+    def forces(self, values: Values) -> list[Array]:
+        """Recorded ones, as late as they are."""
+        return [each.at(values[self._delay]) for each in self._forces]
+
+    def modelled(self, values: Values) -> list[Array]:
+        """What the model asks for."""
+        linear = np.array([values[place] for place in self._places])
+        friction = self._friction(tuple(values[place] for place in self._own))
+        return [
+            columns @ linear + each for columns, each in zip(self._columns, friction, strict=True)
+        ]
+
+    def _simulated(self, own: Values) -> list[Array]:
+        named = {u.name: value for u, value in zip(self._model.unknowns, own, strict=True)}
+        options = self._model.options(named)
+        return [
+            decimated(each.friction(options)[-count:, None], self._decimation)[:, 0]
+            for each, count in zip(self._along, self._counts, strict=True)
+        ]
+
+
+def _thinned(motion: Motion, every: int) -> tuple[Array, float, float]:
+    """Every so many rates, the last among them, their sample rate, and where they begin."""
+    first = first_kept(len(motion.rate), every)
+    rates = motion.rate[first::every]
+    return rates, motion.sample_rate / every, float(motion.position[first])

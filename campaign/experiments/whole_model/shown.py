@@ -1,0 +1,179 @@
+"""Tables and figures of friction models along motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array, Motion
+from campaign.estimation.inverse.rows import all_rows, moving, rows
+from campaign.estimation.inverse.terms import Term
+from campaign.estimation.inverse.terms import columns as columns_of
+from campaign.estimation.inverse.validation import Prediction
+from campaign.experiments.any_motion.figures import FORCE, LEFT, PLACE, RATE, TIME, apart
+from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried, together
+from campaign.experiments.any_motion.motions import Moved
+from campaign.experiments.any_motion.tables import AS_THEY_ARE
+from campaign.experiments.whole_model.whole_model_fit import Fit, Whole
+from campaign.physics.friction import friction_models
+from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
+
+FINE = 200
+PLAIN = "plain regression"
+
+
+def models_table(found: Whole) -> Table:
+    """Every model: on its rows, on blocks it did not see, on other motions."""
+    columns = [
+        Column("model", "Friction model"),
+        Column("numbers", "Numbers", exact=True),
+        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
+        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
+        Column("criterion", "BIC", exact=True),
+        Column("agreeing", "Starts that agree"),
+    ]
+    validated = found.fits[0].validation is not None
+    if validated:
+        columns += [
+            Column("validation", "Validation", "", "percent"),
+            Column("gain", "Lower than the first by", "", "percent"),
+        ]
+    rows_: list[Mapping[str, Cell]] = []
+    for index, each in enumerate(found.fits):
+        row: dict[str, Cell] = {
+            "model": ("→ " if index == found.best else "") + each.model.name,
+            "numbers": len(each.fit.values),
+            "residual": each.relative,
+            "held_out": each.held_out,
+            "criterion": each.criterion if np.isfinite(each.criterion) else None,
+            "agreeing": f"{each.fit.found.agreeing} of {len(each.fit.found.starts)}",
+        }
+        if validated:
+            row |= {"validation": each.validation, "gain": each.gain}
+        rows_.append(row)
+    note = (
+        "The arrow shows the one that does best on blocks that it was not fitted to (every third "
+        "of twelve). BIC counts the rows by what they are worth for each model."
+    )
+    return Table("models", "Friction models", tuple(columns), tuple(rows_), note=note)
+
+
+def values_table(fit: Fit) -> Table:
+    """The numbers of a model with its intervals."""
+    rows_: tuple[Mapping[str, Cell], ...] = tuple(
+        {"number": name, "unit": each.unit, "value": each}
+        for name, each in fit.fit.estimates.items()
+    )
+    columns = (Column("number", "Number"), Column("unit", "Unit"), Column("value", "Value"))
+    key = fit.model.name.replace(",", "").replace(" ", "-")
+    return Table(key, f"Numbers of {fit.model.name}", columns, rows_)
+
+
+def figures(
+    found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]
+) -> Iterator[Figure]:
+    """Friction over rate, and what models leave over."""
+    yield _curve_figure(found, plain)
+    if unseen:
+        yield _left_figure(found, plain, unseen)
+
+
+def _curve_figure(found: Whole, plain: InverseDynamics | None) -> Figure:
+    """Measured force less inertia and linear terms, with each model's steady friction."""
+    best = found.fits[found.best]
+    rate, rest = _measured(found, best)
+    top = float(np.abs(rate).max())
+    near = top * np.geomspace(1e-3, 1.0, FINE)
+    sweep = np.concatenate([-near[::-1], [np.nan], near])
+    curves = [Curve(rate, rest, "rows", "measured", "points")]
+    if plain is not None:
+        curves.append(Curve(sweep, _regressed(_plainest(plain), sweep), PLAIN, PLAIN))
+    curves += [
+        Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in found.fits
+    ]
+    return Figure(
+        key="steady-friction",
+        title="Friction of the fitted models",
+        caption="Torque less what accelerates the inertia (dots: rows), and the friction of steady "
+        "sliding of each fitted model; the plain regression is least squares without any delay. "
+        "Rows beside the lines were not steady.",
+        alt="Friction torque over rate with the curves of the fitted models.",
+        panels=(Panel(RATE, FORCE, tuple(curves), marks=(Mark("", y=0.0),)),),
+        trials=tuple(dict.fromkeys(piece.trial for piece in found.pieces)),
+    )
+
+
+def _measured(found: Whole, best: Fit) -> tuple[Array, Array]:
+    values = best.values
+    own = (Term("v", "", "", "", lambda m: m.rate), Term("a", "", "", "", lambda m: m.acceleration))
+    terms = (*own, *best.extra)
+    rate, rest = [], []
+    for piece in found.pieces:
+        made = rows(piece.motion, terms, found.filtering, values["delay"])
+        linear = made.columns[:, 1] * values["inertia"]
+        for index, term in enumerate(best.extra):
+            linear = linear + made.columns[:, 2 + index] * values[term.name]
+        moves = moving(piece.motion, found.filtering) > 0.0
+        rate.append(made.columns[moves, 0])
+        rest.append((made.force - linear)[moves])
+    return np.concatenate(rate), np.concatenate(rest)
+
+
+def _steady(fit: Fit, rate: Array) -> Array:
+    model = friction_models()[fit.model.model]
+    options = model.options.model_validate(fit.model.options(fit.values), context={"si": True})
+    found = np.full(len(rate), np.nan)
+    there = np.isfinite(rate)
+    found[there] = model.steady_state(options, rate[there])
+    return found
+
+
+def _plainest(plain: InverseDynamics) -> Tried:
+    """Both directions of their own, without delay, as anybody would fit them."""
+    return plain.tried[min(1, len(plain.tried) - 1)]
+
+
+def _regressed(fitted: Tried, rate: Array) -> Array:
+    """Friction of a regression at steady rates."""
+    still = np.zeros(len(rate))
+    steady = Motion(time=still, position=still, rate=rate, acceleration=still, force=still)
+    return columns_of(steady, fitted.structure.terms) @ fitted.structure.fit.values
+
+
+def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]) -> Figure:
+    """Validation residuals of up to four models over time, rate and angle."""
+    told: list[tuple[str, Prediction]] = []
+    if plain is not None:
+        reference = _plainest(plain)
+        if reference.predictions:
+            told.append((PLAIN, together(reference.predictions)))
+    told += [(each.model.name, together(each.predictions)) for each in found.fits]
+    place = _places(found, unseen)
+    panels = []
+    for name, prediction in told[-4:]:
+        left = prediction.residuals
+        title = f"{name}: {100 * prediction.relative:.2f} %"
+        panels += [
+            Panel(TIME, LEFT, (
+                Curve(*apart(prediction.time, left), "", "measured", "thin"),
+            ), title),
+            Panel(RATE, LEFT, (Curve(place[:, 1], left, "", "measured", "points"),)),
+            Panel(PLACE, LEFT, (Curve(place[:, 0], left, "", "measured", "points"),)),
+        ]  # fmt: skip
+    return Figure(
+        key="left-over",
+        title="What each model leaves over of the validation",
+        caption="Residuals of the validation motion, to which nothing was fitted, over time, rate "
+        "and angle, on one scale. A model that knew everything would leave noise.",
+        alt="Residual torque of each model over time, rate and angle.",
+        panels=tuple(panels),
+        across=3,
+        one_scale=True,
+    )
+
+
+def _places(found: Whole, unseen: Sequence[Moved]) -> Array:
+    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
+    parts = [all_rows(each.motion, own, found.filtering).columns for each in unseen]
+    return np.concatenate(parts)

@@ -1,1 +1,0 @@
-"""Methods of identification: one file each."""

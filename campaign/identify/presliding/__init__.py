@@ -1,1 +1,0 @@
-"""Which recordings are small motions below breakaway, as the presliding method needs them."""

@@ -1,1 +1,0 @@
-"""Friction models of this program along archived motions, fitted through the engine."""

@@ -1,0 +1,203 @@
+"""What friction has to do with the numbers of a response: on `platform`, whose truth is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.frequency.drive import TwoMass
+from campaign.experiments.frequency_response.model.axis_numbers import (
+    BENT,
+    FRICTION,
+    UNKNOWN,
+    Weaker,
+    by_rule,
+    of_axis,
+)
+from campaign.parameter import Parameter
+from campaign.physics.bench import Bench
+from campaign.protocol.bench_file import load_bench
+from campaign.reason import Reason
+from campaign.result import Result
+from tests.estimation.coverage import holds
+from tests.experiments.asked import asked
+from tests.experiments.laboratory import Done, execute, trials
+
+AMPLITUDES = ("4.5 deg/s", "9 deg/s")
+
+
+@cache
+def platform() -> Bench:
+    return cast("Bench", load_bench("platform"))
+
+
+@cache
+def shaken(amplitude: str) -> tuple[Done, ...]:
+    """Seven realisations; their numbers and seeds are no other amplitude's."""
+    first = 100 * AMPLITUDES.index(amplitude)
+    made = trials("excitation", platform(), {"signal": "multisine", "amplitude": amplitude})
+    return execute(
+        each.model_copy(update={"number": first + k, "seed": 1000 + first + k})
+        for k, each in enumerate(made, start=1)
+    )
+
+
+@cache
+def identified(*amplitudes: str) -> Result:
+    done = [each for amplitude in amplitudes for each in shaken(amplitude)]
+    return asked("frequency_response", done)
+
+
+def truths() -> Mapping[str, float]:
+    on = platform()
+    whole, hung = on.axis.inertia, on.appendage
+    assert whole is not None
+    assert hung is not None
+    return {
+        "total_inertia": whole,
+        "motor_inertia": whole - hung.inertia,
+        "load_inertia": hung.inertia,
+        "antiresonance": hung.frequency,
+        "resonance": hung.frequency * math.sqrt(whole / (whole - hung.inertia)),
+    }
+
+
+def told(found: Result) -> Mapping[str, Parameter]:
+    return {each.estimate.name: each for each in found.identified.parameters}
+
+
+def rows(found: Result) -> Mapping[str, Mapping[str, Any]]:
+    """Of the table of the two masses, by whose numbers they are."""
+    (table,) = [each for each in found.tables if each.key == "two-masses"]
+    return {str(row["of"]): row for row in table.rows}
+
+
+def words(found: Result) -> str:
+    return " ".join(
+        part if isinstance(part, str) else "#" for each in found.conclusions for part in each.parts
+    )
+
+
+@pytest.mark.slow
+def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
+    found = identified(AMPLITUDES[0])
+    for name, parameter in told(found).items():
+        assert parameter.estimate.origin is Origin.NOT_DETERMINED, name
+        assert not parameter.estimate.has_interval, name
+        assert parameter.estimate.reason in UNKNOWN
+        assert parameter.bench == ""
+        assert "second amplitude" in parameter.advice
+    whose = rows(found)
+    assert list(whose) == ["the response", "the axis"]
+    # Its own inertia and antiresonance are known well, and are not those of the axis.
+    for name in ("total_inertia", "antiresonance"):
+        assert whose["the response"][name].has_interval
+        assert not holds(whose["the response"][name], truths()[name])
+        assert not whose["the axis"][name].has_interval
+    assert "At this excitation the response is that of a drive" in words(found)
+    assert any("Repeat it at half the amplitude" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_two_amplitudes_tell_the_axis() -> None:
+    found = identified(*AMPLITUDES)
+    parameters, whose = told(found), rows(found)
+    for name, truth in truths().items():
+        estimate = parameters[name].estimate
+        assert estimate.systematic[0].source == FRICTION
+        assert holds(estimate, truth), (name, estimate.value, estimate.combined, truth)
+        assert estimate.half_width < 0.5 * truth
+        # What friction has in it is apart from the scatter, which the response keeps.
+        assert whose["the response"][name].systematic_uncertainty == 0.0
+        assert whose["the axis"][name] == estimate
+    assert parameters["total_inertia"].bench == "axis.inertia"
+    assert parameters["antiresonance"].bench == "appendage.frequency"
+    # Friction damps the mode more than anything else does: nothing of that goes to the bench.
+    assert parameters["antiresonance_damping"].bench == ""
+    assert "The drive resonates at" in words(found)
+
+
+# The rule, by numbers alone
+
+
+def number(name: str, value: float, error: float = 0.001) -> Estimate:
+    half = 1.96 * error * value
+    return Estimate(
+        name, value, "", value - half, value + half, 0.95, standard_error=error * value
+    )  # fmt: skip
+
+
+def drive(**values: float) -> TwoMass:
+    """One with these numbers; the others are not determined."""
+    names = (
+        "motor_inertia", "load_inertia", "total_inertia", "stiffness", "damping", "resonance",
+        "resonance_damping", "antiresonance", "antiresonance_damping", "inertia_ratio",
+    )  # fmt: skip
+    nothing = {
+        name: Estimate.without_interval(name, math.nan, "", Reason("test", "not looked at"))
+        for name in names
+    }
+    told_ = {name: number(name, value) for name, value in values.items()}
+    return TwoMass(
+        **{**nothing, **told_},
+        misfit="",
+        excess=1.0,
+        criterion=0.0,
+        sides=("motor",),
+        point=np.zeros(8),
+        grounded=False,
+    )
+
+
+def parts(found: TwoMass, name: str) -> Sequence[float | None]:
+    return [each.standard_uncertainty for each in getattr(found, name).systematic]
+
+
+def test_without_distortion_the_response_is_the_axis() -> None:
+    one = drive(total_inertia=2.0)
+    assert of_axis(one, 0.0, ()) is one
+
+
+def test_little_distortion_widens_and_much_withholds() -> None:
+    one = drive(total_inertia=2.0, resonance=12.0, damping=3.0)
+    little = of_axis(one, 0.01, ())
+    assert parts(little, "total_inertia") == [pytest.approx(0.02)]
+    assert parts(little, "resonance") == [pytest.approx(0.006)]
+    # What friction adds to a damping no level of distortion bounds.
+    assert little.damping.reason in UNKNOWN
+    much = of_axis(one, 1.01 * BENT, ())
+    assert much.total_inertia.reason == much.resonance.reason == UNKNOWN()
+    assert math.isnan(much.total_inertia.value)
+    assert by_rule(number("antiresonance", 11.0), 0.0).systematic == ()
+
+
+def test_a_share_that_falls_slowly_is_still_held() -> None:
+    """Of a bias that falls with the root of the rms, as bristles' does where they begin to slip."""
+    for bias, fall in ((0.05, 0.5), (0.05, 1.0), (0.01, 0.5)):
+        strong = drive(total_inertia=2.0 * (1.0 - bias))
+        weak = drive(total_inertia=2.0 * (1.0 - bias * 2.0**fall))
+        found = of_axis(strong, 0.1, [Weaker(weak, 2.0)])
+        assert holds(found.total_inertia, 2.0)
+        assert found.total_inertia.origin is Origin.MEASURED
+
+
+def test_the_weaker_that_says_most_counts_and_agreement_is_no_proof() -> None:
+    strong = drive(total_inertia=2.0)
+    far, near = Weaker(drive(total_inertia=1.8), 2.0), Weaker(drive(total_inertia=2.0), 2.0)
+    both = of_axis(strong, 0.1, [near, far])
+    assert parts(both, "total_inertia") == parts(of_axis(strong, 0.1, [far]), "total_inertia")
+    # Two amplitudes at which friction does alike agree, too.
+    assert parts(of_axis(strong, 0.1, [near]), "total_inertia") == [pytest.approx(0.015)]
+
+
+def test_a_weaker_that_fits_nothing_tells_nothing() -> None:
+    misfit = replace(drive(), misfit="it leaves more than scatter")
+    found = of_axis(drive(total_inertia=2.0), 0.1, [Weaker(misfit, 2.0)])
+    assert found.total_inertia.reason in UNKNOWN

@@ -1,0 +1,172 @@
+"""Motions that tell nothing: what is refused of them, and what goes to no bench."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPERATURE
+from campaign.estimate import Origin
+from campaign.estimation import gate
+from campaign.estimation.inverse.motion import Filtering
+from campaign.experiments.any_motion.motions import moved
+from campaign.experiments.motion import friction_map
+from campaign.experiments.motion.sliding import points_of, slower
+from campaign.parameter import Identified
+from campaign.physics.bench import Bench
+from campaign.trial import Channel, Recording
+from tests.experiments.asked import asked
+
+RATE = 1000.0
+TIME = np.arange(20_000) / RATE
+NOISE = np.random.Generator(np.random.PCG64(5)).standard_normal((2, len(TIME)))
+SWING = 0.3 * np.sin(2.0 * np.pi * TIME) + 0.2 * np.sin(2.0 * np.pi * 0.37 * TIME)
+
+RIG = {"name": "rig", "axis": {"name": "tilt", "inertia": 1.0}}
+"""kg m^2"""
+
+
+def driven(angle: np.ndarray, torque: np.ndarray) -> Any:
+    return recorded(
+        Channel(RELATIVE_ANGLE, "rad", "angle", "deg", angle),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
+    )
+
+
+def recorded(*made: Channel) -> Any:
+    """A trial that has nothing but these."""
+    channels = {each.name: each for each in made}
+    recording = Recording(TIME[: len(made[0].samples)], channels)
+    task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
+    trial = SimpleNamespace(
+        number=1,
+        kind="motion",
+        point={},
+        can_use=(),
+        task=task,
+        bench=RIG,
+        recording={"channels": []},
+    )
+    return SimpleNamespace(
+        trial=trial,
+        estimates=(),
+        recording=lambda: recording,
+        channel_names=lambda: frozenset(channels),
+    )
+
+
+def identified(angle: np.ndarray, torque: np.ndarray) -> Identified:
+    return asked("inverse_dynamics", [driven(angle, torque)]).identified
+
+
+@pytest.mark.parametrize(
+    ("angle", "torque", "message"),
+    [
+        (np.zeros_like(TIME), NOISE[0], "stands still"),
+        (1e-5 * np.round(NOISE[1]), 1.0 + 0.02 * NOISE[0], "stands still"),
+        (SWING, np.zeros_like(TIME), "zero throughout"),
+    ],
+)
+def test_what_does_not_move_or_is_not_driven_is_refused(
+    angle: np.ndarray, torque: np.ndarray, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        identified(angle, torque)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.3])
+def test_a_rate_that_does_not_change_tells_nothing(rate: float) -> None:
+    """Its noise adds up to a motion that goes further and further, and is none."""
+    measured = rate + 0.01 * NOISE[1]
+    torque = Channel(DRIVE_TORQUE, "N m", "torque", "N m", 1.0 + 0.02 * NOISE[0])
+    trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", measured), torque)
+    with pytest.raises(ValueError, match="constant but for its sensor's noise"):
+        moved((trial,), Filtering.for_rate(RATE))
+    swings = np.gradient(SWING, TIME) + measured
+    trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", swings), torque)
+    assert moved((trial,), Filtering.for_rate(RATE))
+
+
+def test_small_and_slow_motion_over_coarse_counts_is_none_of_these() -> None:
+    counts = np.round(5.0 * np.sin(0.3 * TIME))
+    assert moved((driven(counts, NOISE[0]),), Filtering.for_rate(RATE))
+
+
+def test_a_constant_load_is_no_friction() -> None:
+    found = identified(SWING, 2.0 + 0.02 * NOISE[0])
+    assert [each.bench for each in found.parameters if each.bench] == []
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    for name in ("inertia", "coulomb_positive", "coulomb_negative"):
+        assert told[name].kind == "at most" or told[name].origin is Origin.NOT_DETERMINED
+
+
+def test_a_force_with_its_sign_swapped_is_told_and_goes_to_no_bench() -> None:
+    rate = np.gradient(SWING, TIME)
+    force = 2.0 * np.gradient(rate, TIME) + 3.0 * np.sign(rate) + 0.5 * rate + 0.02 * NOISE[0]
+    places = [each.bench for each in identified(SWING, force).parameters]
+    assert "axis.inertia" in places
+    found = identified(SWING, -force)
+    assert [each.bench for each in found.parameters if each.bench] == []
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    for name in ("inertia", "coulomb_positive", "coulomb_negative"):
+        assert told[name].reason in gate.UNPHYSICAL
+        assert dict(told[name].reason.values)["cause"] == gate.OPPOSITE_SIGNS.code
+
+
+def strokes(speeds: tuple[float, ...]) -> Any:
+    """A trial of strokes out and back, 2 s each, under 3 N m of dry friction."""
+    rate = np.repeat([way * speed for speed in speeds for way in (1.0, -1.0)], 2000)
+    torque = 3.0 * np.sign(rate) + 0.02 * NOISE[0][: len(rate)]
+    trial = recorded(
+        Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", rate + 1e-4 * NOISE[1][: len(rate)]),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", torque),
+    )
+    trial.trial.options, trial.trial.windows = {}, ()
+    return trial
+
+
+def test_slow_strokes_that_count_as_standstill_are_counted() -> None:
+    """One recording of strokes at several speeds: the slowest are below 3 % of the fastest."""
+    trial = strokes((1.0, 0.5, 0.02, 0.01))
+    found, _ = points_of((trial,), Bench.model_validate(RIG, context={"si": True}), 0.5)
+    assert sorted(point.speed for point in found) == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=0.01)
+    assert slower((trial,), Bench.model_validate(RIG, context={"si": True}), 0.5, found) == 4
+
+
+def test_friction_that_falls_exponentially_with_heat_is_held_by_a_line_over_it() -> None:
+    """0.8 N m at 20 degC; what the line misses of its curve is a systematic part."""
+    warm = 20.0 + 15.0 * (1.0 - np.exp(-TIME / 7.0))
+    rate = np.gradient(SWING, TIME)
+    dry = 0.8 * np.exp(-(warm - 20.0) / 30.0) * np.sign(rate)
+    force = 0.1 * np.gradient(rate, TIME) + dry + 0.1 * rate + 0.01 * NOISE[0]
+    trial = recorded(
+        Channel(RELATIVE_ANGLE, "rad", "angle", "deg", SWING),
+        Channel(DRIVE_TORQUE, "N m", "torque", "N m", force),
+        Channel(TEMPERATURE, "degC", "temperature", "degC", warm),
+    )
+    found = asked("inverse_dynamics", [trial]).identified
+    told = {each.estimate.name: each.estimate for each in found.parameters}
+    assert "coulomb_over_temperature" in told
+    for way in ("positive", "negative"):
+        one = told[f"coulomb_{way}"]
+        sources = {part.source: part.standard_uncertainty or 0.0 for part in one.systematic}
+        assert sources["curve over temperature"] > 0.003
+        low, high = one.combined
+        assert low is not None
+        assert high is not None
+        assert low <= 0.8 <= high
+
+
+def test_trials_and_slow_strokes_that_are_not_in_a_map_are_reasons() -> None:
+    trials = (strokes((1.0, 0.5, 0.02, 0.01)), strokes((0.0,)))
+    for number, trial in enumerate(trials, 1):
+        trial.trial.number = number
+    found = asked("friction_map", trials, shortest="0.5 s").identified
+    without, slow = found.left_out
+    assert without in friction_map.NO_STRETCH
+    assert dict(without.values) == {"count": 1, "total": 2, "numbers": "2"}
+    assert slow in friction_map.TOO_SLOW
+    assert dict(slow.values) == {"count": 4}

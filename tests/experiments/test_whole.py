@@ -1,0 +1,210 @@
+"""Friction models along motions: what the engine makes of them, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_position
+from campaign.estimation.unknowns import Unknown
+from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
+from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.whole_model.along import Along
+from campaign.experiments.whole_model.models import Sizes, models
+from campaign.experiments.whole_model.whole_model_fit import _with_band, find, product, resolved
+from campaign.physics.friction.stribeck import StribeckOptions, steady_state
+from campaign.reason import Reason
+from tests.estimation.coverage import holds, rejected
+from tests.estimation.rigs import random_rigs
+
+CURVE = {
+    "model": "stribeck",
+    "coulomb_torque": 2.0,
+    "static_torque": 1.2,
+    "stribeck_velocity": 0.1,
+    "viscous_friction": 0.5,
+    "negative": {"coulomb_torque": 2.5, "viscous_friction": 0.8},
+}
+
+
+def swinging() -> Motion:
+    time = np.arange(5000) / 1000.0
+    omega = 2 * np.pi * 0.7
+    return Motion(time, -np.cos(omega * time) / omega, np.sin(omega * time), time, time)
+
+
+def test_friction_along_a_motion_is_that_of_its_curve() -> None:
+    motion = swinging()
+    options = StribeckOptions.model_validate(CURVE, context={"si": True})
+    found = Along(motion.rate, motion.sample_rate).friction(CURVE)
+    moves = np.abs(motion.rate) > 0.02
+    assert found[moves] == pytest.approx(steady_state(options, motion.rate)[moves], rel=2e-3)
+
+
+def test_a_line_is_fitted_with_the_intervals_of_its_closed_form() -> None:
+    draw = np.random.default_rng(1)
+    x = np.linspace(0.0, 1.0, 400)
+    y = 2.0 + 3.0 * x + 0.1 * draw.standard_normal(400)
+    unknowns = [Unknown("level", -10.0, 10.0, 0.0), Unknown("slope", 0.1, 100.0, 1.0, True)]
+    fit = fit_model(unknowns, {}, lambda v: [y - v[0] - v[1] * x], starts=1)
+    columns = np.column_stack([np.ones(400), x])
+    exact = np.linalg.lstsq(columns, y, rcond=None)[0]
+    assert fit.values == pytest.approx(exact, rel=1e-4)
+    left = y - columns @ exact
+    error = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * (left @ left) / 398)
+    assert fit.estimates["level"].standard_error == pytest.approx(error[0], rel=0.25)
+    assert fit.estimates["slope"].standard_error == pytest.approx(error[1], rel=0.25)
+
+
+def test_what_nothing_tells_and_what_goes_to_its_bound_has_no_interval() -> None:
+    x = np.linspace(0.0, 1.0, 200)
+    y = 2.0 + 0.01 * np.random.default_rng(1).standard_normal(200)
+    unknowns = [
+        Unknown("level", 0.0, 10.0, 1.0),
+        Unknown("nothing", 0.0, 1.0, 0.5),
+        Unknown("kept", 1.0, 2.0, 1.5),
+    ]
+    fit = fit_model(unknowns, {}, lambda v: [y - v[0] - 0.0 * v[1] - 0.5 * v[2] * x], starts=1)
+    assert fit.estimates["nothing"].origin is Origin.NOT_DETERMINED
+    assert fit.estimates["kept"].origin is Origin.AT_BOUND
+    assert not fit.estimates["kept"].has_interval
+
+
+RATIOS = ("static_over_coulomb_positive", "static_over_coulomb_negative")
+
+
+def test_what_others_do_when_one_is_held_elsewhere_is_that_of_a_fit() -> None:
+    """A line whose slope is held beside its best: the level goes by minus the mean of x."""
+    x = np.linspace(0.0, 1.0, 400)
+    y = 2.0 + 3.0 * x + 0.1 * np.random.default_rng(1).standard_normal(400)
+    unknowns = [Unknown("level", 0.1, 10.0, 1.0, True), Unknown("slope", 0.0, 10.0, 1.0)]
+    fit = fit_model(unknowns, {}, lambda v: [y - v[0] - v[1] * x], starts=1)
+    assert moved_with(fit, "slope", 0.02) == pytest.approx({"level": -0.02 * x.mean()}, rel=0.01)
+
+
+def test_viscous_friction_may_be_much_more_than_a_plain_line_says() -> None:
+    """Where friction falls as sliding sets in, a line through all of it is nearly level."""
+    level = models(Sizes((2.0, 2.0), (0.01, 0.01), 0.5, 1.0))[0]
+    [viscous] = [each for each in level.unknowns if each.name == "viscous"]
+    assert viscous.upper >= 2.0 / 0.5
+
+
+@pytest.mark.slow
+def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It looks like a delay: 0.7 ms of it, and viscous friction is 4 % too large."""
+    monkeypatch.setattr(
+        "campaign.experiments.whole_model.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
+    )
+    rig = random_rigs(16, seed=51, stribeck=True)[1]
+    filtering = Filtering.for_rate(1000.0)
+    motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
+    filtering = replace(filtering, slowest=0.005 * float(np.abs(motion.rate).max()))
+    [found] = find([Moved(1, motion, None)], [], filtering, starts=1).fits
+    assert found.values["delay"] - rig.truth["delay"] > 5e-4
+    for name in ("viscous_positive", "viscous_negative"):
+        estimate = found.fit.estimates[name]
+        assert [part.source for part in estimate.systematic] == ["band", "delay"]
+        assert holds(estimate, rig.truth[name])
+        assert estimate.half_width < 0.15 * estimate.value
+
+
+@pytest.mark.parametrize(
+    ("slow", "stiff", "refused"),
+    [
+        (0.2, 100.0, set()),
+        (0.01, 100.0, {"stribeck_velocity", *RATIOS}),
+        (0.2, 1e6, {"bristle_stiffness", "bristle_damping"}),
+    ],
+)
+def test_what_is_passed_faster_than_rows_show_is_refused(
+    slow: float, stiff: float, refused: set[str]
+) -> None:
+    """A reversal at 4.4 rad/s² takes 2.3 ms through 0.01 rad/s, and rows show 12 ms."""
+    motion = swinging()
+    omega = 2 * np.pi * 0.7
+    motion = replace(motion, acceleration=omega * np.cos(omega * motion.time))
+    model = models(Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5))[2]
+    told = {each.unknown.name: each.unknown.start for each in model.numbers}
+    told |= {"stribeck_velocity": slow, "bristle_stiffness": stiff}
+    found = SimpleNamespace(unknowns=[Unknown(name, -1.0, 1e9, v) for name, v in told.items()])
+    sure = {name: Estimate(name, v, "", v - 0.1, v + 0.1, 0.95) for name, v in told.items()}
+    fit = ModelFit(found, sure, tuple(told.values()), (), None, np.ones(len(told), dtype=bool))
+    kept = resolved(fit, model, [motion], Filtering(100.0, 10)).estimates
+    assert {name for name, each in kept.items() if not each.has_interval} == refused
+
+
+def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
+    """As where the force has the wrong sign: friction goes to nothing; twice that is nothing."""
+
+    def told(name: str, value: float) -> Estimate:
+        return Estimate(name, value, "", 0.8 * value, 1.2 * value, 0.95, "m", freedom=20.0)
+
+    bound = Estimate.without_interval(
+        "coulomb_positive", 0.01, "N m", Reason("test", "at a bound"), origin=Origin.AT_BOUND
+    )
+    estimates = {"coulomb_positive": bound, "delay": told("delay", 1e-3)}
+    names = ("coulomb_negative", "static_over_coulomb_positive", "static_over_coulomb_negative",
+             "stribeck_velocity")  # fmt: skip
+    estimates |= {name: told(name, 2.0) for name in names}
+    fit = ModelFit(None, estimates, (), (), None, np.zeros(0, bool))  # type: ignore[arg-type]
+    found = _with_band(fit, {name: one.value for name, one in estimates.items()}).estimates
+    assert found["static_over_coulomb_positive"].origin is Origin.NOT_DETERMINED
+    assert "went to its bound" in str(found["static_over_coulomb_positive"].reason)
+    # The other direction has friction, and tells both.
+    assert found["static_over_coulomb_negative"].has_interval
+    assert found["stribeck_velocity"].has_interval
+    both = {**estimates, "coulomb_negative": replace(bound, name="coulomb_negative")}
+    fit = replace(fit, estimates=both)
+    found = _with_band(fit, {name: one.value for name, one in both.items()}).estimates
+    assert not any(one.has_interval for one in found.values())
+
+
+def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
+    """Static friction as a ratio times Coulomb friction: scatter by the delta method, parts add."""
+    ratio = Estimate(
+        "ratio", 0.5, "", 0.48, 0.52, 0.95, standard_error=0.01, freedom=50.0,
+        systematic=(Systematic("band", 0.03),),
+    )  # fmt: skip
+    base = Estimate(
+        "coulomb", 20.0, "N m", 19.2, 20.8, 0.95, standard_error=0.4, freedom=50.0,
+        systematic=(Systematic("band", 1.0),),
+    )  # fmt: skip
+    made = product("static", ratio, base, 0.0)
+    assert made.value == 10.0
+    assert made.standard_error == pytest.approx(10.0 * np.hypot(0.01 / 0.5, 0.4 / 20.0))
+    [part] = made.systematic
+    assert part.source == "band"
+    assert part.standard_uncertainty == pytest.approx(20.0 * 0.03 + 0.5 * 1.0)
+    assert product("static", ratio, base, 1.0).standard_error == pytest.approx(10.0 * 0.04)
+    lost = Estimate.without_interval(
+        "ratio", 0.5, "", Reason("test", "nobody knows"), origin=Origin.NOT_DETERMINED
+    )
+    assert product("static", lost, base, 0.0).origin is Origin.NOT_DETERMINED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, pytest.param(10, marks=pytest.mark.statistics)])
+def test_intervals_hold_and_a_jump_of_friction_has_no_bristles(count: int) -> None:
+    """Rigs without bristles: stiffness is refused, whatever a filtered jump looks like."""
+    held: list[bool] = []
+    for rig in random_rigs(count, seed=31, stribeck=True, seconds=15.0):
+        filtering = Filtering.for_rate(1000.0)
+        motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
+        piece = Moved(1, motion, None)
+        slow = 0.25 * with_slowest(filtering, [piece], None).slowest
+        found = find([piece], [], with_slowest(filtering, [piece], slow), starts=1)
+        for name in ("coulomb_positive", "coulomb_negative", "viscous_positive"):
+            estimate = found.fits[1].fit.estimates[name]
+            if estimate.has_interval:
+                held.append(holds(estimate, rig.truth[name]))
+        bristles = found.fits[2].fit.estimates
+        assert bristles["bristle_stiffness"].origin is not Origin.MEASURED
+        assert bristles["bristle_damping"].origin is not Origin.MEASURED
+    assert len(held) >= 2 * count
+    assert rejected({"all": held}, "less") == {}

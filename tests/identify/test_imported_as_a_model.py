@@ -1,0 +1,49 @@
+"""A recording can be imported as the experiment that identifies from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from campaign.access.analysis import analyse_run
+from campaign.archive import open_run
+from campaign.cli.import_command import import_recordings
+from campaign.errors import ExitCode
+from campaign.experiments import experiments
+from campaign.identify import identifying
+from campaign.identify.identification import identify
+from campaign.identify.material import choose
+from tests.estimation.rigs import Rig
+from tests.identify import conftest as rig_files
+from tests.physics.benches import bench
+
+
+@pytest.mark.slow
+def test_its_report_has_the_numbers_of_identify(tmp_path: Path, rig: Rig) -> None:
+    (tmp_path / "rig.toml").write_text(rig_files.RIG, encoding="utf-8")
+    kind = 'kind = "inverse_dynamics"\nlow_pass = "80 Hz"'
+    test = rig_files.TEST.format(name="monday").replace('kind = "motion"', kind)
+    mapping = rig_files.MAPPING + test
+    rig_files.write(tmp_path / "monday.csv", rig, slice(0, 10_000))
+    (tmp_path / "mapping.toml").write_text(mapping, encoding="utf-8")
+    assert (
+        import_recordings([str(tmp_path / "mapping.toml")], tmp_path / "results") is ExitCode.DONE
+    )
+    (path,) = (tmp_path / "results").glob("*.nxs")
+    (reported,) = analyse_run(open_run(path), experiments())
+    chosen, model = choose(path.parent, path.name), "inverse_dynamics"
+    settings = [f"{model}.low_pass=80 Hz"]
+    found = identify(chosen, identifying(), models=[model], settings=settings)
+    (section,) = found.sections
+    assert [each.known for each in reported.result.findings] == [
+        each.estimate for each in section.identified.parameters
+    ]
+    assert {"inertia", "coulomb_positive"} <= {each.quantity for each in reported.result.findings}
+
+
+@pytest.mark.parametrize("kind", ["inverse_dynamics", "whole_model"])
+def test_nobody_plans_one(kind: str) -> None:
+    own = experiments()[kind]
+    with pytest.raises(ValueError, match="nothing to plan"):
+        list(own.trials(own.options(), bench()))
