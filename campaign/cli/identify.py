@@ -17,7 +17,7 @@ from campaign.axis_kind import speaking_of
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
 from campaign.identify.material import Chosen, choose
@@ -58,7 +58,7 @@ def identify_run(
     with _waiting() as say:
         found = identify(
             chosen,
-            identifying(),
+            experiments_by_model(),
             models=models,
             validation=unseen,
             compared=compared,

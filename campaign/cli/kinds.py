@@ -15,7 +15,7 @@ from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 from campaign.export import exports
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
@@ -42,7 +42,7 @@ def list_kinds() -> None:
                 problems.append(kind)
             else:
                 rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
-    rows += [(MODEL, name, kind.model.summary) for name, kind in identifying().items()]
+    rows += [(MODEL, name, kind.model.summary) for name, kind in experiments_by_model().items()]
     print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
         print_note(problem, style="yellow")
@@ -63,7 +63,7 @@ def show_kind(name: str) -> None:
         _show(*BENCH)
         return
     rooms = [room for room in _rooms() if name in room]
-    models = {} if rooms else identifying()
+    models = {} if rooms else experiments_by_model()
     if not rooms and name not in models:
         close = difflib.get_close_matches(name, kind_names(), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
@@ -90,7 +90,7 @@ def show_kind(name: str) -> None:
 def kind_names() -> list[str]:
     """All that `show_kind` knows, sorted."""
     own = (CHANNELS[1], UNITS_KIND[1], BENCH[1])
-    return sorted({*own, *identifying(), *(name for room in _rooms() for name in room)})
+    return sorted({*own, *experiments_by_model(), *(name for room in _rooms() for name in room)})
 
 
 def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:

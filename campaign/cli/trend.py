@@ -13,7 +13,7 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.interrupts import unwinding
 from campaign.resources import templates_folder
 from campaign.trending.page import write_trends
@@ -50,7 +50,7 @@ def trend_of_archives(
     pieces = [_exchange(results, each) for each in exchanged]
     paths = [find_run(results, name) for name in names]
     runs = [open_run(path) for path in paths]
-    trends = follow(runs, experiments(), over, identifying(), models, pieces)
+    trends = follow(runs, experiments(), over, experiments_by_model(), models, pieces)
     last = trends.members[-1].run.path
     folder = output or last.with_name(f"{last.stem[:STEM]}-trend-over-{_slug(over)}")
     page = write_trends(

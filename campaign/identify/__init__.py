@@ -8,7 +8,7 @@ from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
 
 
-def identifying() -> Mapping[str, Experiment]:
+def experiments_by_model() -> Mapping[str, Experiment]:
     """Every experiment whose analysis identifies, by the name of its model.
 
     Packages that cannot be used are left out. A name of the program stays the program's.

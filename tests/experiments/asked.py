@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from campaign.experiments.interface import TestData, TrialData, result_of
 from campaign.experiments.interface import suitable as _suitable
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.options import Options
 from campaign.result import Result
 
@@ -24,11 +24,11 @@ def asked(
     name: str, trials: Iterable[object], validation: Iterable[object] = (), **options: Any
 ) -> Result:
     """As `campaign identify --model NAME`; raises ValueError where there is no result."""
-    own = identifying()[name]
+    own = experiments_by_model()[name]
     data = data_of(trials, validation, own.model.options.model_validate(options))
     return result_of(own, data)
 
 
 def suitable(name: str, trials: Iterable[object]) -> tuple[list[TrialData], str]:
     """The trials that a model can use; where none, why."""
-    return _suitable(identifying()[name], cast("Any", tuple(trials)))
+    return _suitable(experiments_by_model()[name], cast("Any", tuple(trials)))

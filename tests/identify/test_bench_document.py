@@ -11,7 +11,7 @@ from typing import Any, cast
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method
 from campaign.identify.identification import Identification, Section, _with_place
 from campaign.identify.material import Chosen, choose
@@ -76,7 +76,11 @@ def write(results: Path):  # type: ignore[no-untyped-def]
         run = SimpleNamespace(header=header, name=chosen.run.name, identity=chosen.run.identity)
         bench = bench_of(text)
         made = tuple(
-            Section(identifying()[which], None, result=_with_place(Result(identified=each), bench))
+            Section(
+                experiments_by_model()[which],
+                None,
+                result=_with_place(Result(identified=each), bench),
+            )
             for which, each in sections.items()
         )
         found = Identification(

@@ -11,7 +11,7 @@ import pytest
 import tomlkit
 
 from campaign.estimate import Estimate
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.compensations import (
     Entries,
     identified_compensations,
@@ -78,7 +78,7 @@ def entries(text: str, **sections: Sequence[Parameter]) -> Entries:
     bench = bench_of(text)
     made = tuple(
         Section(
-            identifying()[name],
+            experiments_by_model()[name],
             None,
             result=_with_place(Result(identified=Identified(tuple(own))), bench),
         )

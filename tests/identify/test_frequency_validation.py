@@ -14,7 +14,7 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
 from campaign.errors import UsageError
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, identify
 from campaign.identify.material import Chosen, choose
 from campaign.identify.page import _looks, write_identification
@@ -100,7 +100,7 @@ def test_the_same_samples_are_refused_whatever_run_they_are_in(tmp_path: Path) -
     again = chosen(tmp_path / "b", driven(), count=8)  # of which one is new
     assert own.run.identity != again.run.identity
     with pytest.raises(UsageError, match="the same samples as"):
-        identify(own, identifying(), models=("frequency_response",), validation=again)
+        identify(own, experiments_by_model(), models=("frequency_response",), validation=again)
 
 
 def test_the_same_phases_are_told(tmp_path: Path) -> None:
@@ -218,7 +218,7 @@ def identified(path: Path, unseen: Path | None = None) -> Identification:
     other = choose(unseen.parent, unseen.name) if unseen is not None else None
     return identify(
         choose(path.parent, path.name),
-        identifying(),
+        experiments_by_model(),
         models=["frequency_response"],
         validation=other,
     )

@@ -17,7 +17,7 @@ from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments.interface import Model, suitable
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, _section, identify
 from campaign.identify.material import choose
 from campaign.identify.page import _advice, write_identification
@@ -42,7 +42,7 @@ def run(results: Path) -> str:
 def found(results: Path, run: str) -> Identification:
     return identify(
         choose(results, f"{run}:monday"),
-        identifying(),
+        experiments_by_model(),
         models=PLAIN,
         validation=choose(results, f"{run}:tuesday"),
         compared=choose(results, f"{run}:worn"),
@@ -96,7 +96,7 @@ def test_what_changed_is_declared_and_what_did_not_is_not(
     assert holds(worn.difference.difference, 0.1 * rig.truth["coulomb_positive"])
     same = identify(
         choose(results, f"{run}:monday"),
-        identifying(),
+        experiments_by_model(),
         models=PLAIN,
         compared=choose(results, f"{run}:tuesday"),
     ).sections[0]
@@ -186,8 +186,8 @@ def test_a_part_of_nothing_that_suits_is_told_with_reasons(
     results: Path, run: str, tmp_path: Path
 ) -> None:
     chosen = choose(results, f"{run}:monday")
-    for name in identifying():
-        trials, why = suitable(identifying()[name], ())
+    for name in experiments_by_model():
+        trials, why = suitable(experiments_by_model()[name], ())
         assert not trials
         assert why
     assert chosen.trials
@@ -220,9 +220,9 @@ def test_a_recording_that_was_imported_twice_is_not_held_against_itself(
     one = choose(results, f"{run}:monday")
     assert one.run.identity != other.run.identity
     with pytest.raises(UsageError, match=r"the same samples as .*monday in trials"):
-        identify(one, identifying(), models=PLAIN, **{option: other})  # type: ignore[arg-type]
+        identify(one, experiments_by_model(), models=PLAIN, **{option: other})  # type: ignore[arg-type]
     fresh = choose(results, f"{run}:tuesday")
-    assert identify(fresh, identifying(), models=PLAIN, **{option: other}).parameters  # type: ignore[arg-type]
+    assert identify(fresh, experiments_by_model(), models=PLAIN, **{option: other}).parameters  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ["page", "bench", "folder"])
@@ -278,7 +278,8 @@ def test_what_makes_a_part_smaller_is_a_sentence(source: str) -> None:
 def test_a_method_that_nothing_suits_is_counted_as_well() -> None:
     said: list[str] = []
     kind = replace(
-        identifying()["ramps"], model=Model("ramps", "", suits=lambda trials: ((), "no trial"))
+        experiments_by_model()["ramps"],
+        model=Model("ramps", "", suits=lambda trials: ((), "no trial")),
     )
     chosen = cast("Any", SimpleNamespace(name="run", trials=()))
     section = _section(kind, None, cast("Any", None), chosen, None, said.append)

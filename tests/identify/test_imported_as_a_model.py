@@ -11,7 +11,7 @@ from campaign.archive import open_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.experiments import experiments
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
 from tests.estimation.rigs import Rig
@@ -34,7 +34,7 @@ def test_its_report_has_the_numbers_of_identify(tmp_path: Path, rig: Rig) -> Non
     (reported,) = analyse_run(open_run(path), experiments())
     chosen, model = choose(path.parent, path.name), "inverse_dynamics"
     settings = [f"{model}.low_pass=80 Hz"]
-    found = identify(chosen, identifying(), models=[model], settings=settings)
+    found = identify(chosen, experiments_by_model(), models=[model], settings=settings)
     (section,) = found.sections
     assert [each.known for each in reported.result.findings] == [
         each.estimate for each in section.identified.parameters

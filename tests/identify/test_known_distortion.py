@@ -15,7 +15,7 @@ import pytest
 
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
 from campaign.result import Table
@@ -192,7 +192,9 @@ def tables(results: Path) -> dict[str, dict[str, Table]]:
     settings = [f'frequency_response.{option}="{value}"' for option, value in said.items()]
     for name in BENCHES:
         chosen = choose(results, f"{run}:{name}")
-        found = identify(chosen, identifying(), models=("frequency_response",), settings=settings)
+        found = identify(
+            chosen, experiments_by_model(), models=("frequency_response",), settings=settings
+        )
         (own,) = found.sections
         assert own.result is not None, own.problem
         notes = " ".join(own.result.notes)

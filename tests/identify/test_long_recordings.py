@@ -26,7 +26,7 @@ from campaign.experiments.whole_model.models import Sizes, models
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
 from campaign.experiments.whole_model.whole_model_fit import find
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
 from tests.estimation.rigs import random_rigs
@@ -142,7 +142,7 @@ def test_methods_are_counted(results: Path) -> None:
     names = ("friction_map", "inverse_dynamics")
     compared = choose(results, f"{run}:tuesday")
     chosen = choose(results, f"{run}:monday")
-    identify(chosen, identifying(), models=names, compared=compared, say=said.append)
+    identify(chosen, experiments_by_model(), models=names, compared=compared, say=said.append)
 
     heads = [text.split(": ")[0] for text in said]
     assert list(dict.fromkeys(heads)) == [

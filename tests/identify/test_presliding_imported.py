@@ -11,7 +11,7 @@ import pytest
 
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import Section, identify
 from campaign.identify.material import choose
 from tests.estimation.bristle_plants import Array, Interface, Truth, multisine
@@ -81,7 +81,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def section(results: Path, test: str) -> Section:
     run = next(results.glob("*-small.nxs")).stem
-    found = identify(choose(results, f"{run}:{test}"), identifying(), models=("presliding",))
+    found = identify(
+        choose(results, f"{run}:{test}"), experiments_by_model(), models=("presliding",)
+    )
     (own,) = found.sections
     return own
 

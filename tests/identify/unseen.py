@@ -9,7 +9,7 @@ import numpy as np
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 from campaign.identify.identification import Section, identify
 from campaign.identify.material import choose
 
@@ -75,7 +75,7 @@ def identified(results: Path, method: str, *settings: str) -> Section:
     """What one method makes of the only run there is."""
     run = next(path for path in results.glob("*.nxs") if not path.stem.endswith("-results"))
     chosen = choose(results, run.stem)
-    return identify(chosen, identifying(), models=(method,), settings=settings).sections[0]
+    return identify(chosen, experiments_by_model(), models=(method,), settings=settings).sections[0]
 
 
 def told(section: Section) -> dict[str, Estimate]:

@@ -12,7 +12,7 @@ import pytest
 from campaign.cli import trend as command
 from campaign.cli.trend import trend_of_archives
 from campaign.errors import ExitCode, UsageError
-from campaign.identify import identifying
+from campaign.identify import experiments_by_model
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def test_the_page_holds_the_command_and_no_folder_of_anybody(runs: Path, tmp_pat
 def test_parameters_of_a_model_are_followed_by_the_structure_of_the_first_run(
     runs: Path, tmp_path: Path
 ):
-    assert "inverse_dynamics" in identifying()
+    assert "inverse_dynamics" in experiments_by_model()
     names = [f"drift-{n}" for n in range(3)]
     typed(runs, names, tmp_path / "out", ["inverse_dynamics"])
     data = json.loads((tmp_path / "out" / "trend.json").read_text(encoding="utf-8"))
