@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -13,7 +12,8 @@ from campaign.access.analysis import AnalysedTest, analyse_run
 from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
 from campaign.archive.reading.sound_samples import damaged_records
 from campaign.archive.verifying.verification import verify_run
-from campaign.experiments.interface import TestData
+from campaign.experiments.interface import Experiment, TestData
+from campaign.options import Options
 from campaign.recording import ChannelInfo, Ending, Outcome
 from campaign.result import Result
 from campaign.trial import Task, Trial
@@ -39,6 +39,13 @@ def archived(folder: Path) -> Path:
     return writer.seal(RunStatus.COMPLETE, ended=TIME)
 
 
+def experiment_of(analyse: Callable[[TestData], Result]) -> Experiment:
+    """One with this analysis, whose trials are those of a map."""
+    return Experiment(
+        "velocity_map", "", Options, trials=lambda options, bench: (), analyse=analyse
+    )
+
+
 def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
     path = archived(tmp_path)
     with h5py.File(path, "r+") as file:
@@ -51,7 +58,7 @@ def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
 
     (test,) = analyse_run(
         open_run(path),
-        {"velocity_map": SimpleNamespace(analyse=analyse, perturbs_bench=False, most_samples=None)},
+        {"velocity_map": experiment_of(analyse)},
     )
     assert seen == [[1.0, 3.0]]
     assert [trial.trial.number for trial in test.trials] == [1, 3]
@@ -63,8 +70,7 @@ def test_a_damaged_trial_is_left_out_and_the_others_are_analysed(tmp_path):
 
 
 def analysed(path: Path, analyse: Callable[[TestData], Result]) -> AnalysedTest:
-    experiment = SimpleNamespace(analyse=analyse, perturbs_bench=False, most_samples=None)
-    (test,) = analyse_run(open_run(path), {"velocity_map": experiment})
+    (test,) = analyse_run(open_run(path), {"velocity_map": experiment_of(analyse)})
     return test
 
 
