@@ -81,7 +81,8 @@ class AnalysedTest:
             each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
             for each in self.trials
         )
-        measures = self.experiment is not None and self.experiment.measure is not None
+        kind = self.experiment
+        measures = kind is not None and (kind.measure is not None or bool(kind.model.name))
         wanted = measures or bool(self.result.left_out)
         return done and (bool(self.problem) or (wanted and self.result.is_empty))
 

@@ -47,3 +47,17 @@ def test_nobody_plans_one(kind: str) -> None:
     own = experiments()[kind]
     with pytest.raises(ValueError, match="nothing to plan"):
         list(own.trials(own.options(), bench()))
+
+
+def test_an_import_without_a_result_says_so(tmp_path: Path) -> None:
+    """An axis that rests has no dynamics; exit code 6 follows from `lacks_result`."""
+    (tmp_path / "rig.toml").write_text(rig_files.RIG, encoding="utf-8")
+    test = rig_files.TEST.format(name="monday").replace('"motion"', '"inverse_dynamics"')
+    (tmp_path / "mapping.toml").write_text(rig_files.MAPPING + test, encoding="utf-8")
+    lines = (f"{0.001 * n:.3f},0.1,0.1,{0.01 * (n % 7)}" for n in range(4000))
+    (tmp_path / "monday.csv").write_text("\n".join(["t,x,w,f", *lines]), encoding="utf-8")
+    import_recordings([str(tmp_path / "mapping.toml")], tmp_path / "results")
+    (path,) = (tmp_path / "results").glob("*.nxs")
+    (reported,) = analyse_run(open_run(path), experiments())
+    assert reported.lacks_result
+    assert reported.account[0].startswith("no result: ")

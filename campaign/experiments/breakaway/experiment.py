@@ -29,7 +29,7 @@ from campaign.estimation.relative_rate import (
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
 from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
-from campaign.experiments.breakaway.parameters import parameters_of
+from campaign.experiments.breakaway.parameters import conclusions_of, parameters_of
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
@@ -335,8 +335,11 @@ def _analyse(data: TestData) -> Result:
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        breakaway_conclusions(
-            findings, rates, settings, inertia_known=known or not rates, slid=slid
+        (
+            *breakaway_conclusions(
+                findings, rates, settings, inertia_known=known or not rates, slid=slid
+            ),
+            *conclusions_of(parameters),
         ),
         identified=Identified(parameters),
     )

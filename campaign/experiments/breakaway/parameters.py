@@ -8,7 +8,6 @@ much of the torque is the others'. Damping it does not show: nothing is fast on 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 from campaign.estimation.intervals import of_repeats
@@ -16,6 +15,7 @@ from campaign.estimation.presliding import Presliding
 from campaign.experiments.breakaway.means import Ramps, means_of
 from campaign.experiments.interface import TrialData
 from campaign.parameter import Parameter
+from campaign.result import Amount, Conclusion
 
 BREAKAWAY, STRONGEST = "breakaway_torque", "strongest_stiffness"
 WEAKER = "weaker_share"
@@ -51,7 +51,7 @@ def parameters_of(
     for name, quantity in OF_RAMPS.items():
         if quantity in mean:
             yield Parameter(replace(mean[quantity], name=name), MEANINGS[name], advice=ADVICE[name])
-    shares = list(_weaker_shares(ramps, curve_of))
+    shares = list(_weaker_shares(ramps, curve_of, notes))
     seen = [share for share in shares if share > 0.0]
     if 0 < len(seen) < len(shares):
         notes.append(
@@ -64,12 +64,30 @@ def parameters_of(
 
 
 def _weaker_shares(
-    ramps: Ramps, curve_of: Callable[[TrialData, float], Presliding]
+    ramps: Ramps, curve_of: Callable[[TrialData, float], Presliding], notes: list[str]
 ) -> Iterator[float]:
     """Share of the torque that each ramp's weaker interfaces carry: 0 where it shows only one."""
     for item, own in zip(ramps.trials, ramps.found, strict=True):
         if OF_RAMPS[STRONGEST] not in own:
             continue
-        with suppress(ValueError, ArithmeticError):  # of metrics that another version archived
+        try:
             torques = [e.torque for e in curve_of(item, own[BREAKAWAY].value).interfaces]
-            yield sum(torques[1:]) / sum(torques)
+        except (ValueError, ArithmeticError) as error:  # of metrics that another version archived
+            notes.append(f"{item.trial.label} shows no interfaces: {error}.")
+            continue
+        yield sum(torques[1:]) / sum(torques)
+
+
+def conclusions_of(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
+    """Of interfaces that slip before the strongest."""
+    told = {each.estimate.name: each.estimate for each in parameters}
+    if STRONGEST in told and WEAKER in told:
+        yield Conclusion(
+            (
+                "On ramps the interface that carries most has a stiffness of ",
+                Amount(told[STRONGEST]),
+                "; others, which carry ",
+                Amount(told[WEAKER], "percent"),
+                " of the torque, have slipped before.",
+            )
+        )

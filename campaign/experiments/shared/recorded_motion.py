@@ -19,8 +19,8 @@ AnyOptions = TypeVar("AnyOptions", bound=Options)
 def nothing_to_plan(options: Options, bench: Bench) -> Iterable[TrialRequest]:
     """Raises ValueError: nobody plans such trials."""
     raise ValueError(
-        "a motion is what somebody recorded, so there is nothing to plan: give it "
-        "[[test.recording]] and `campaign import` it"
+        "trials of this kind are recorded, so there is nothing to plan: add [[test.recording]] and "
+        "run `campaign import`"
     )
 
 
@@ -44,6 +44,7 @@ def analysis(
             found = identify(replace(data, trials=tuple(trials)), options)
         except ValueError as error:
             return Result(notes=(*notes, f"{error}."))
-        return replace(found, notes=(*notes, *found.notes))
+        warnings = (each.text for each in found.identified.warnings)
+        return replace(found, notes=(*notes, *warnings, *found.notes))
 
     return analyse
