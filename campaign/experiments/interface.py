@@ -139,7 +139,8 @@ class Model:
         summary: one line for `campaign kinds`.
         options: what it accepts, `--set NAME.option=value`; the analysis has them as
             `TestData.model`.
-        suits: recorded trials that the analysis can use. Absent: those of the experiment itself.
+        suits: recorded trials that the analysis can use. Absent: those of the experiment itself
+            that have the channels it requires.
         analyse: what analyses them in place of the experiment's own analysis, which has
             `TestData.model` and `TestData.validation`. Either raises ValueError with a message for
             the user where there is no result.
@@ -230,8 +231,10 @@ def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[
     if experiment.model.suits is not None:
         found, why = experiment.model.suits(trials)
         return list(found), why
-    own = [each for each in trials if each.trial.kind == experiment.name]
-    return own, "" if own else f"no trial is of the kind {experiment.name}"
+    needed = experiment.requires.keys()
+    own = [t for t in trials if t.trial.kind == experiment.name and needed <= t.channel_names()]
+    channels = f" with {' and '.join(needed)}" if needed else ""
+    return own, "" if own else f"there is no trial of {experiment.name}{channels}"
 
 
 def result_of(experiment: Experiment, data: TestData) -> Result:
@@ -287,8 +290,6 @@ def _analysed(experiment: Experiment, data: TestData) -> Result:
     except (ArchiveError, UsageError, IncompleteBenchError):
         raise
     except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
-        if experiment.measure is None:
-            raise
         good, doubts = _measurable(experiment, data)
         if not doubts:
             raise

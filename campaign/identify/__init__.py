@@ -11,10 +11,13 @@ from campaign.experiments.interface import Experiment
 def experiments_by_model() -> Mapping[str, Experiment]:
     """Every experiment whose analysis identifies, by the name of its model.
 
-    Packages that cannot be used are left out. A name of the program stays the program's.
+    Packages that cannot be used are left out. A name of the program stays the program's; one that
+    two packages claim is nobody's, as of every kind.
     """
     kinds = experiments()
-    every = [(kinds.plug_in(name) is None, kind) for name, kind in kinds.described()]
-    own_last = sorted(every, key=lambda each: each[0])
-    found = {kind.model.name: kind for _, kind in own_last if isinstance(kind, Experiment)}
-    return {name: found[name] for name in sorted(found) if name}
+    claims: dict[tuple[str, bool], list[Experiment]] = {}
+    for name, kind in kinds.described():
+        if isinstance(kind, Experiment) and kind.model.name:
+            claims.setdefault((kind.model.name, kinds.plug_in(name) is None), []).append(kind)
+    single = {claim: kind for claim, (kind, *others) in sorted(claims.items()) if not others}
+    return {name: kind for (name, _), kind in single.items()}  # the program's comes last

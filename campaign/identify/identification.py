@@ -54,7 +54,7 @@ class Section:
     """What one model's analysis found of the run.
 
     Attributes:
-        trials: numbers of those that it used.
+        trials: numbers of those that suit it.
         result: None where there is none, and `problem` says why.
         changes: against the run that it is compared with; empty without any.
     """
@@ -236,7 +236,7 @@ def _section(
         problem = f"it failed: {one_line(error)}"
         return Section(experiment, options, numbers, problem=problem)
     if not found.identified.parameters:
-        problem = "; ".join(note.rstrip(".") for note in found.notes) or "it has no parameters"
+        problem = "; ".join(note.rstrip(".") for note in found.notes) or "nothing is identified"
         return Section(experiment, options, numbers, problem=problem)
     return Section(experiment, options, numbers, _with_place(found, bench))
 

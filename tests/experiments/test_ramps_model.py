@@ -9,7 +9,7 @@ from campaign.experiments.breakaway import experiment as breakaway
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
-from campaign.result import Result
+from campaign.result import Amount, Result
 from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import execute, trials
 from tests.physics.benches import RATIO, bench
@@ -35,6 +35,8 @@ def test_the_strongest_interface_and_what_slips_before_it() -> None:
     others = 2 * RATIO * 0.03143 + 2.99
     assert found["weaker_share"].value == pytest.approx(others / (20.84 + others), abs=0.02)
     assert found["weaker_share"].has_interval
+    told = [part for each in result.conclusions for part in each.parts if isinstance(part, Amount)]
+    assert {"weaker_share", "strongest_stiffness"} <= {each.estimate.name for each in told}
 
 
 def test_one_interface_alone_has_no_weaker_ones() -> None:
@@ -60,4 +62,7 @@ def test_a_ramp_whose_numbers_overflow_costs_that_ramp(monkeypatch: pytest.Monke
 
 def test_trials_of_another_kind_do_not_do() -> None:
     other = execute(trials("stabilization", bench(), {"cycles": 1}))
-    assert suitable("ramps", other) == ([], "no trial is of the kind breakaway")
+    assert suitable("ramps", other) == (
+        [],
+        "there is no trial of breakaway with drive_torque and gyro_rate",
+    )

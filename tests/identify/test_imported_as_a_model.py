@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from campaign.access.analysis import analyse_run
 from campaign.archive import open_run
 from campaign.cli.import_command import import_recordings
-from campaign.errors import ExitCode
+from campaign.errors import ExitCode, ProtocolError
 from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.shared.recorded_motion import nothing_to_plan, of_any_motion
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
+from campaign.options import Options
+from campaign.parameter import Identified
+from campaign.reason import Cause
+from campaign.result import Result
 from tests.estimation.rigs import Rig
+from tests.experiments.laboratory import execute
+from tests.experiments.laboratory import trials as planned
 from tests.identify import conftest as rig_files
 from tests.physics.benches import bench
 
@@ -61,3 +70,40 @@ def test_an_import_without_a_result_says_so(tmp_path: Path) -> None:
     (reported,) = analyse_run(open_run(path), experiments())
     assert reported.lacks_result
     assert reported.account[0].startswith("no result: ")
+
+
+def test_a_report_has_the_warnings_of_a_model() -> None:
+    left = Cause("half", "half of it is left out")()
+
+    def identify(data: TestData, options: Options) -> Result:
+        return Result(notes=("a note",), identified=Identified((), left_out=(left,)))
+
+    kind = of_any_motion("any", "", Options, lambda trials: (trials, ""), identify)
+    trials = execute(planned("move", bench(), {"angle": "5 deg"}))
+    assert kind.analyse(TestData("", "", {}, tuple(trials))).notes == (left.text, "a note")
+
+
+def test_a_model_that_two_packages_claim_is_nobodys(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {"own": "ramps", "one": "ramps", "other": "push", "third": "push"}
+    own, one, other, third = (
+        Experiment(
+            name, "", Options, nothing_to_plan, lambda data: Result(), model=Model(model, "")
+        )
+        for name, model in names.items()
+    )
+    kinds = SimpleNamespace(
+        described=lambda: [(each.name, each) for each in (one, own, other, third)],
+        plug_in=lambda name: None if name == "own" else "a package",
+    )
+    monkeypatch.setattr("campaign.identify.experiments", lambda: kinds)
+    assert experiments_by_model() == {"ramps": own}
+
+
+def test_a_term_that_there_is_none_of_is_refused_where_it_stands(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(rig_files.RIG, encoding="utf-8")
+    kind = 'kind = "inverse_dynamics"\nterms = ["inertai"]'
+    test = rig_files.TEST.format(name="monday").replace('kind = "motion"', kind)
+    (tmp_path / "mapping.toml").write_text(rig_files.MAPPING + test, encoding="utf-8")
+    (tmp_path / "monday.csv").write_text("t,x,w,f\n0,0,0,0\n", encoding="utf-8")
+    with pytest.raises(ProtocolError, match=r"mapping\.toml:\d+:.*no term 'inertai'"):
+        import_recordings([str(tmp_path / "mapping.toml")], tmp_path / "results")

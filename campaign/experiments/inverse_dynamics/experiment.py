@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from campaign.channels import DRIVE_TORQUE
-from campaign.errors import UsageError
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted_together, refused
 from campaign.estimation.inverse.terms import TERMS
@@ -27,10 +27,10 @@ from campaign.experiments.any_motion.tables import (
     instruments_table,
     structures_table,
 )
-from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.interface import TestData
 from campaign.experiments.shared.directions import with_offset
 from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.recorded_motion import analysis, nothing_to_plan
+from campaign.experiments.shared.recorded_motion import of_any_motion
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen, is_value
@@ -67,7 +67,11 @@ ADVICE = {
 }
 """By the beginning of a term's name: what tells its coefficient better."""
 
-SUMMARY = "inertia and friction of any motion, by regression of the force"
+
+def _known(name: str) -> str:
+    if name not in TERMS:
+        raise ValueError(f"there is no term {name[:60]!r}; there are {', '.join(TERMS)}")
+    return name
 
 
 class InverseDynamicsOptions(Options):
@@ -85,17 +89,11 @@ class InverseDynamicsOptions(Options):
     its fastest."""
     delay: Time | None = None
     """By how much the force acts later than recorded; absent: it is found."""
-    terms: tuple[str, ...] = ()
+    terms: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
     """Names of the model's terms; absent: they are chosen."""
 
 
 def _identify(data: TestData, options: InverseDynamicsOptions) -> Result:
-    terms = None
-    if options.terms:
-        unknown = [name for name in options.terms if name not in TERMS]
-        if unknown:
-            raise UsageError(f"there is no term {unknown[0][:60]!r}; there are {', '.join(TERMS)}")
-        terms = [TERMS[name] for name in options.terms]
     data.say("step 1 of 4, the motion")
     filtering, pieces, unseen = read(data, options.low_pass, options.decimation, options.skip)
     filtering = with_slowest(filtering, pieces, options.slowest)
@@ -104,7 +102,7 @@ def _identify(data: TestData, options: InverseDynamicsOptions) -> Result:
         unseen,
         filtering,
         delay=options.delay,
-        terms=terms,
+        terms=[TERMS[name] for name in options.terms] or None,
         linear=data.bench.is_linear,
         say=data.say,
     )
@@ -320,16 +318,10 @@ def _settings(
     return told
 
 
-EXPERIMENT = Experiment(
+EXPERIMENT = of_any_motion(
     name="inverse_dynamics",
-    summary=SUMMARY,
+    summary="inertia and friction of any motion, by regression of the force",
     options=InverseDynamicsOptions,
-    trials=nothing_to_plan,
-    analyse=analysis(InverseDynamicsOptions, usable, _identify),
-    model=Model(
-        "inverse_dynamics",
-        SUMMARY,
-        InverseDynamicsOptions,
-        usable,
-    ),
+    suits=usable,
+    identify=_identify,
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from campaign.experiments.interface import Suits, TestData
+from campaign.experiments.interface import Experiment, Model, Suits, TestData
 from campaign.experiments.shared.common import failures_note
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -24,12 +24,18 @@ def nothing_to_plan(options: Options, bench: Bench) -> Iterable[TrialRequest]:
     )
 
 
-def analysis(
-    kind: type[AnyOptions], suits: Suits, identify: Callable[[TestData, AnyOptions], Result]
-) -> Callable[[TestData], Result]:
-    """The analysis by `identify`, with the options of the model, or else of the recorded test.
+def of_any_motion(
+    name: str,
+    summary: str,
+    options: type[AnyOptions],
+    suits: Suits,
+    identify: Callable[[TestData, AnyOptions], Result],
+) -> Experiment:
+    """An experiment that identifies from any motion, and whose model has its name and options.
 
-    Where there is no result, `identify` raises ValueError; a report then gets a note.
+    Args:
+        identify: the result with the options of the model, or else of the recorded test. Raises
+            ValueError where there is none; a report then gets a note.
     """
 
     def analyse(data: TestData) -> Result:
@@ -39,12 +45,19 @@ def analysis(
         trials, why = suits(tuple(data.completed()))
         if not trials:
             return Result(notes=(*notes, f"{why}."))
-        options = kind.model_validate(trials[0].trial.options, context={"si": True})
+        own = options.model_validate(trials[0].trial.options, context={"si": True})
         try:
-            found = identify(replace(data, trials=tuple(trials)), options)
+            found = identify(replace(data, trials=tuple(trials)), own)
         except ValueError as error:
             return Result(notes=(*notes, f"{error}."))
         warnings = (each.text for each in found.identified.warnings)
         return replace(found, notes=(*notes, *warnings, *found.notes))
 
-    return analyse
+    return Experiment(
+        name,
+        summary,
+        options,
+        nothing_to_plan,
+        analyse,
+        model=Model(name, summary, options, suits),
+    )

@@ -17,9 +17,9 @@ from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
 from campaign.experiments.any_motion.motions import Moved, force_of, read, usable, with_slowest
-from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.interface import TestData
 from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.recorded_motion import analysis, nothing_to_plan
+from campaign.experiments.shared.recorded_motion import of_any_motion
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.shown import figures, models_table, values_table
@@ -63,8 +63,6 @@ ADVICE = {
     "inertia": "move with more acceleration at the same speeds",
     "spring": "move over more of the travel",
 }
-
-SUMMARY = "friction models along any motion, fitted through the engine and compared"
 
 
 class WholeModelOptions(Options):
@@ -237,16 +235,10 @@ def _conclusions(best: Fit) -> Iterator[Conclusion]:
         )
 
 
-EXPERIMENT = Experiment(
+EXPERIMENT = of_any_motion(
     name="whole_model",
-    summary=SUMMARY,
+    summary="friction models along any motion, fitted through the engine and compared",
     options=WholeModelOptions,
-    trials=nothing_to_plan,
-    analyse=analysis(WholeModelOptions, usable, _identify),
-    model=Model(
-        "whole_model",
-        SUMMARY,
-        WholeModelOptions,
-        usable,
-    ),
+    suits=usable,
+    identify=_identify,
 )
