@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,21 +13,24 @@ from campaign.access.analysis import analyse_run
 from campaign.archive import open_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError
+from campaign.estimate import Estimate
 from campaign.experiments import experiments
-from campaign.experiments.interface import Experiment, Model, TestData
+from campaign.experiments.interface import Experiment, Model, TestData, metrics, result_of
 from campaign.experiments.shared.recorded_motion import nothing_to_plan, of_any_motion
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
 from campaign.options import Options
-from campaign.parameter import Identified
+from campaign.parameter import Identified, Parameter
 from campaign.reason import Cause
 from campaign.result import Result
 from tests.estimation.rigs import Rig
-from tests.experiments.laboratory import execute
+from tests.experiments.laboratory import Done, execute
 from tests.experiments.laboratory import trials as planned
 from tests.identify import conftest as rig_files
 from tests.physics.benches import bench
+
+OF_A_TRIAL = ("trial", "ending", "recording", "channel_names")
 
 
 @pytest.mark.slow
@@ -72,6 +77,11 @@ def test_an_import_without_a_result_says_so(tmp_path: Path) -> None:
     assert reported.account[0].startswith("no result: ")
 
 
+def ramp() -> tuple[Done, ...]:
+    options = {"positions": ["0 deg"], "directions": ["positive"]}
+    return execute(planned("breakaway", bench(), options))
+
+
 def test_a_report_has_the_warnings_of_a_model() -> None:
     left = Cause("half", "half of it is left out")()
 
@@ -79,8 +89,25 @@ def test_a_report_has_the_warnings_of_a_model() -> None:
         return Result(notes=("a note",), identified=Identified((), left_out=(left,)))
 
     kind = of_any_motion("any", "", Options, lambda trials: (trials, ""), identify)
-    trials = execute(planned("move", bench(), {"angle": "5 deg"}))
-    assert kind.analyse(TestData("", "", {}, tuple(trials))).notes == (left.text, "a note")
+    assert kind.analyse(TestData("", "", {}, ramp())).notes == (left.text, "a note")
+
+
+def test_metrics_of_another_kind_are_not_those_of_the_model() -> None:
+    """Both experiments may call different numbers by one name."""
+    (done,) = ramp()
+    archived = [Estimate("torque", 1.0, "N m"), Estimate("torque", 2.0, "N m")]
+    foreign = SimpleNamespace(**{name: getattr(done, name) for name in OF_A_TRIAL})
+    foreign.estimates = archived[:1]
+
+    def analyse(data: TestData) -> Result:
+        found = metrics(data.trials[0], lambda item: archived[1:])["torque"]
+        return Result(identified=Identified((Parameter(found, ""),)))
+
+    kind = Experiment("any", "", Options, nothing_to_plan, analyse)
+    data: Any = TestData("", "", {}, (foreign,), model=Options())  # type: ignore[arg-type]
+    assert result_of(kind, data).identified.parameters[0].estimate.value == 2.0
+    own = replace(kind, name="breakaway")
+    assert result_of(own, data).identified.parameters[0].estimate.value == 1.0
 
 
 def test_a_model_that_two_packages_claim_is_nobodys(monkeypatch: pytest.MonkeyPatch) -> None:
