@@ -15,6 +15,7 @@ from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
+from campaign.experiments.breakaway.experiment import BreakawayOptions
 from campaign.experiments.interface import Experiment, Model, TestData, metrics, result_of
 from campaign.experiments.shared.recorded_motion import nothing_to_plan, of_any_motion
 from campaign.identify import experiments_by_model
@@ -88,7 +89,7 @@ def test_a_report_has_the_warnings_of_a_model() -> None:
     def identify(data: TestData, options: Options) -> Result:
         return Result(notes=("a note",), identified=Identified((), left_out=(left,)))
 
-    kind = of_any_motion("any", "", Options, lambda trials: (trials, ""), identify)
+    kind = of_any_motion("any", "", BreakawayOptions, lambda trials: (trials, ""), identify)
     assert kind.analyse(TestData("", "", {}, ramp())).notes == (left.text, "a note")
 
 
