@@ -97,6 +97,22 @@ def test_trials_scatter_in_torque_only_and_depend_on_their_seed() -> None:
     )
 
 
+def test_lines_that_scatter_one_parameter_multiply() -> None:
+    lines = {
+        "oil": {"paths": ["coulomb_torque", "viscous_friction"], "relative": 0.1},
+        "wear": {"paths": ["coulomb_torque"], "relative": 0.2},
+    }
+
+    def torque(*names: str) -> float:
+        days = {name: lines[name] for name in names}
+        day = {"seed": 5, "day": 1, "day_to_day": days}
+        return ratios(of_its_day(bench(lambda tree: tree.update(variation=day))))["coulomb_torque"]
+
+    oil, wear = torque("oil"), torque("wear")
+    assert 1.0 not in (oil, wear)
+    assert torque("oil", "wear") == pytest.approx(oil * wear, rel=1e-15)
+
+
 def test_both_directions_scatter_together() -> None:
     changed = as_it_is(scattering(day=2, negative={"coulomb_torque": "28 N m"}), 1)
     load = changed.friction["load"]
