@@ -32,6 +32,7 @@ from campaign.result import Figure, Result
 from campaign.text import words
 
 CURES = {
+    "window": "it depends on how far a ramp is fitted; record the angle more finely",
     "angle": "slide over all of a turn, at several speeds in both directions",
     "band": "half the band finds otherwise, so that either the model lacks something (look at what "
     "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",

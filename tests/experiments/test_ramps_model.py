@@ -35,6 +35,7 @@ def test_the_strongest_interface_and_what_slips_before_it() -> None:
     others = 2 * RATIO * 0.03143 + 2.99
     assert found["weaker_share"].value == pytest.approx(others / (20.84 + others), abs=0.02)
     assert found["weaker_share"].has_interval
+    assert {part.source for part in found["weaker_share"].systematic} == {"ramp rate", "dwell"}
     told = [part for each in result.conclusions for part in each.parts if isinstance(part, Amount)]
     assert {"weaker_share", "strongest_stiffness"} <= {each.estimate.name for each in told}
 

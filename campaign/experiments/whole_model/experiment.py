@@ -197,7 +197,7 @@ def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[obj
 def _notes(best: Fit) -> Iterator[str]:
     for name, each in best.fit.estimates.items():
         if each.origin is not Origin.MEASURED:
-            yield f"{name.replace('_', ' ')} is not known: {each.reason}."
+            yield f"{words(name)} is not known: {each.reason}."
     for (one, two), share in best.fit.correlation.items():
         if abs(share) >= 0.9:
             yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."

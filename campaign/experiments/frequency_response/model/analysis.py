@@ -54,6 +54,7 @@ from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.text import words
 from campaign.units import Frequency, Time
 
 TORQUE_CONSTANT = "motor.torque_constant"
@@ -335,7 +336,7 @@ def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
     alike: dict[tuple[str, str], list[str]] = {}
     for each in parameters:
         why = str(each.estimate.reason), each.advice
-        alike.setdefault(why, []).append(each.estimate.name.replace("_", " "))
+        alike.setdefault(why, []).append(words(each.estimate.name))
     for (reason, advice), names in alike.items():
         told = f"Not determined: {', '.join(names)}. Reason: {reason}. To measure: {advice}."
         yield Conclusion((told,))

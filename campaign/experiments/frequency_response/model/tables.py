@@ -12,6 +12,7 @@ from campaign.estimation.frequency.orders import order_of
 from campaign.estimation.frequency.two_mass import METHOD
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
 from campaign.result import Column, Table
+from campaign.text import words
 
 NAME = Column("source", "Response", exact=True)
 SENSOR = Column("side", "Sensor", exact=True)
@@ -244,7 +245,7 @@ def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
             Column("share", "Correlation", exact=True),
         ),
         tuple(
-            {"one": one.replace("_", " "), "other": other.replace("_", " "), "share": share}
+            {"one": words(one), "other": words(other), "share": share}
             for one, other, share in pairs
         ),
         note="By scatter alone: what a wrong torque constant or friction does, moves them as well.",
