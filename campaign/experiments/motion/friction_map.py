@@ -1,9 +1,9 @@
 """Friction over rate, from wherever any recording slides steadily, in both directions.
 
 Where more than six speeds were slid at, a Stribeck curve is fitted to each direction; where there
-are fewer, a straight line; of one speed there is the friction at it. Static friction that lies below
-Coulomb friction is as welcome as any other. Where the normal load was recorded, the same is said of
-the friction coefficient; of it alone where loads differ.
+are fewer, a straight line; of one speed there is the friction at it. Static friction that lies
+below Coulomb friction is as welcome as any other. Where the normal load was recorded, the same is
+said of the friction coefficient; of it alone where loads differ.
 """
 
 from __future__ import annotations
