@@ -45,13 +45,16 @@ def recorded(*made: Channel) -> Any:
         number=1,
         kind="motion",
         point={},
+        role="measurement",
         can_use=(),
+        model_copy=lambda update: trial,
         task=task,
         bench=RIG,
         recording={"channels": []},
     )
     return SimpleNamespace(
         trial=trial,
+        ending=SimpleNamespace(outcome="completed"),
         estimates=(),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
