@@ -5,9 +5,12 @@ from __future__ import annotations
 import ast
 import difflib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from random import Random
 
+from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.provider import OperatorProvider
 
@@ -64,25 +67,38 @@ class Mutant:
 def mutants(file: str, source: str) -> list[Mutant]:
     """Every bug once, in the order of the lines; those that change nothing are left out."""
     tree = ast.parse(source)
-    seen, found = {_meaning(tree)}, []
-    for mutated in (*_theirs(source), *_ours(source, tree)):
-        try:
-            meaning = _meaning(ast.parse(mutated))
-        except SyntaxError:
-            continue
-        if meaning not in seen:
+    seen, found = {_meaning(source)}, []
+    for make in _changes(source, tree):
+        mutated = make()
+        meaning = _meaning(mutated)
+        if meaning not in seen | {None}:
             seen.add(meaning)
             found.append(_described(file, source, tree, mutated))
     return sorted(found, key=lambda mutant: mutant.line)
 
 
-def _theirs(source: str) -> Iterator[str]:
+def drawn(file: str, source: str, chosen: Random) -> Mutant | None:
+    """One bug, every change as likely as another; None where a file has none."""
+    tree, same = ast.parse(source), (_meaning(source), None)
+    changes = _changes(source, tree)
+    for make in chosen.sample(changes, len(changes)):
+        if _meaning(mutated := make()) not in same:
+            return _described(file, source, tree, mutated)
+    return None
+
+
+def _changes(source: str, tree: ast.Module) -> list[Callable[[], str]]:
+    """What makes the changed file, for each change."""
+    return [*_theirs(source), *(partial(str, mutated) for mutated in _ours(source, tree))]
+
+
+def _theirs(source: str) -> Iterator[Callable[[], str]]:
     operators = OperatorProvider()
+    nodes = list(ast_nodes(get_ast(source)))
     for name in THEIRS:
-        occurrence = 0
-        while (mutated := mutate_code(source, operators[name](), occurrence)) is not None:
-            yield mutated
-            occurrence += 1
+        operator = operators[name]()
+        for number in range(sum(len(list(operator.mutation_positions(node))) for node in nodes)):
+            yield partial(mutate_code, source, operator, number)
 
 
 def _ours(source: str, tree: ast.Module) -> Iterator[str]:
@@ -165,8 +181,12 @@ def _is_alias(statement: ast.stmt) -> bool:
     return False
 
 
-def _meaning(tree: ast.Module) -> str:
-    return ast.dump(_Bare().visit(ast.parse(ast.unparse(tree))))
+def _meaning(source: str) -> str | None:
+    """What tells two files apart; None where one cannot be parsed."""
+    try:
+        return ast.dump(_Bare().visit(ast.parse(source)))
+    except SyntaxError:
+        return None
 
 
 def _described(file: str, source: str, tree: ast.Module, mutated: str) -> Mutant:

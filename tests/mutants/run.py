@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import os
 import queue
-import random
 import resource
 import shutil
 import signal
@@ -24,10 +23,11 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tests.mutants.mutations import Mutant, mutants
+from tests.mutants.mutations import Mutant, drawn, mutants
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -140,7 +140,7 @@ def main() -> int:
 
 def _attack_drawn(count: int, elsewhere: dict[str, list[str]], workers: int) -> int:
     """Attack every room in turn, each bug in any of its files; its tests are those of the room."""
-    chosen = random.Random(SEED)
+    chosen = Random(SEED)
     rooms: dict[str, list[Path]] = {}
     for path in sorted((ROOT / "campaign").rglob("*.py")):
         if len(parts := path.relative_to(ROOT / "campaign").parts) > 1:
@@ -150,8 +150,8 @@ def _attack_drawn(count: int, elsewhere: dict[str, list[str]], workers: int) -> 
         room = sorted(rooms)[len(todo) % len(rooms)]
         path = chosen.choice(rooms[room])
         file = path.relative_to(ROOT).as_posix()
-        if some := mutants(file, path.read_text(encoding="utf-8")):
-            todo.append(chosen.choice(some))
+        if bug := drawn(file, path.read_text(encoding="utf-8"), chosen):
+            todo.append(bug)
             attacked[file] = tuple(elsewhere.get(room, [f"tests/{room}"]))
     # `make test` says that all rooms pass without a bug.
     noticed = _attack(todo, attacked, workers, dict.fromkeys(attacked.values(), PATIENCE))
