@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing.context import BaseContext
+from typing import Any
 
 from campaign.gc_threshold import raise_gc_threshold
 
@@ -40,6 +44,31 @@ def start_preloading(preload: Iterable[str]) -> None:
         if before is not None:
             os.environ["PYTHONWARNINGS"] = before
     forkserver.ensure_running()
+
+
+@contextmanager
+def process_pool(
+    count: int, preload: Iterable[str], begin: Callable[[Any], object], told: object
+) -> Iterator[ProcessPoolExecutor]:
+    """Processes that have called `begin(told)`; when the block is left early, they are ended."""
+    others = set(multiprocessing.active_children())
+    # Pickled once for all of them.
+    handed = pickle.dumps((begin, told), pickle.HIGHEST_PROTOCOL)
+    pool = ProcessPoolExecutor(count, process_context(preload), _begin, (handed,))
+    try:
+        yield pool
+    except BaseException:  # Ctrl-C: nobody waits for what nobody wants
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin(handed: bytes) -> None:
+    initialize_worker()
+    begin, told = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    begin(told)
 
 
 def initialize_worker() -> None:

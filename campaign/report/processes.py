@@ -9,9 +9,7 @@ Little is imported here: processes are at work while whoever begins them still i
 from __future__ import annotations
 
 import gc
-import multiprocessing
 import os
-import pickle
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -23,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from campaign import processes
 from campaign.archive import RunReader
-from campaign.archive.reading.global_heap_check import known_heaps, told_of_heaps
+from campaign.archive.reading.global_heap_check import Looked, known_heaps, told_of_heaps
 from campaign.trial import Tree
 
 if TYPE_CHECKING:
@@ -132,37 +130,21 @@ def workers(run: RunReader, count: int, *, measure_anew: bool = False) -> Iterat
     if count < 2:
         yield Workers(run, measure_anew=measure_anew)
         return
-    with _pool(run, count) as pool:
+    # What was read and checked here is handed over: reading it again takes ten times as long.
+    handed = run, known_heaps()
+    with processes.process_pool(count, PRELOADED, _begin, handed) as pool:
         at_work = Workers(run, pool, measure_anew)
         _ = at_work.found
         yield at_work
-
-
-@contextmanager
-def _pool(run: RunReader, count: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that have the run open; when the block is left early, they are ended."""
-    others = set(multiprocessing.active_children())
-    # What was read and checked here is handed over: reading it again takes ten times as long.
-    handed = pickle.dumps((run, known_heaps()), pickle.HIGHEST_PROTOCOL)
-    pool = ProcessPoolExecutor(count, processes.process_context(PRELOADED), _begin, (handed,))
-    try:
-        yield pool
-    except BaseException:  # Ctrl-C: nobody waits for an analysis that nobody wants
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 _run: RunReader | None = None
 """Of a process of the pool: the run that it works on."""
 
 
-def _begin(handed: bytes) -> None:
+def _begin(handed: tuple[RunReader, Mapping[Looked, bool]]) -> None:
     global _run
-    processes.initialize_worker()
-    _run, heaps = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    _run, heaps = handed
     told_of_heaps(heaps)
     gc.freeze()
 

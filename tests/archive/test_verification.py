@@ -2,17 +2,23 @@
 
 import hashlib
 import json
+import os
 import random
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
-from campaign.archive import RunWriter, open_run
+from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
+from campaign.archive.verifying import entries
 from campaign.archive.verifying.result import STRUCTURE, UNFINISHED
 from campaign.archive.verifying.verification import verify_run
-from campaign.recording import Ending, Fault, Outcome
+from campaign.archive.writing.nexus import REQUIRED
+from campaign.recording import ChannelInfo, Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of
 
 PROTOCOL = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}], "published": "x"}
@@ -65,6 +71,45 @@ def test_a_sealed_run_is_sound_and_every_dataset_was_read(good):
     assert (found.problems, found.remarks, found.trials) == ((), (), 3)
     assert found.datasets == len(datasets(good)) - 1  # all but the hash of the file itself
     assert found.root == open_run(good).root != ""
+
+
+@pytest.fixture
+def described(tmp_path, kit):
+    """A sealed run of three trials that share what describes their bench."""
+    trials = [kit.trial(number) for number in (1, 2, 3)]
+    writer = RunWriter.create(tmp_path, kit.header(**PROVENANCE), trials)
+    channels = tuple(ChannelInfo(name, "rad", name, "rad") for name in REQUIRED)
+    for trial in trials:
+        recorder = writer.begin(trial)
+        recorder.start(channels)
+        recorder.append(np.arange(9.0), np.ones((len(channels), 9)))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    return writer.seal(RunStatus.COMPLETE, "", ended=kit.ENDED)
+
+
+@pytest.mark.parametrize("place", ["", "trial_00001/instrument/name", "trial_00003/data/time"])
+@pytest.mark.parametrize("dies", [False, True])
+def test_several_processes_find_what_one_does(described, monkeypatch, place, dies):
+    with h5py.File(described, "r+") as file:
+        assert file["trial_00001/instrument"] == file["trial_00003/instrument"]
+        if place.endswith("name"):
+            file[place][()] = b"huge"
+        elif place:
+            file[place][7] += 1.0
+    alone = verify_run(described)
+    assert set(places(described)) == ({f"/{place}"} if place else set())
+    # all but the hash of the file itself, and what is damaged
+    assert alone.datasets == len(datasets(described)) - 1 - bool(place)
+    for name in ("WORTHWHILE", "TOGETHER"):
+        monkeypatch.setattr(entries, name, 1)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    if dies:  # of whatever it is asked to do
+        dead = Future()
+        dead.set_exception(BrokenProcessPool())
+        monkeypatch.setattr(ProcessPoolExecutor, "submit", lambda *_: dead)
+    else:
+        monkeypatch.setattr(entries.EntryCheck, "trial", None)  # nothing is checked here
+    assert verify_run(described) == alone
 
 
 UNNAMED = ("run/outcome/file_sha256", "run/outcome/seal", "run/provenance/format")
