@@ -26,13 +26,14 @@ QUANTITIES = {
 
 
 def planned(path: Path) -> dict[str, list[Trial]]:
-    """Trials of each test of these kinds: of one draw of its bench, and of one realisation."""
+    """Trials of each test of these kinds: of one draw of its bench, of one multisine."""
     plan = make_plan(load_protocol(path, experiments(), shipped=path.parent))
     found: dict[str, list[Trial]] = {}
     for each in plan.trials:
-        if each.kind in MODELS and each.point.get("realisation", 1) == 1:
+        if each.kind in MODELS:
             own = found.setdefault(each.test, [])
-            if not own or each.point.get(SEED) == own[0].point.get(SEED):
+            ramps = each.kind == "breakaway"
+            if not own or (ramps and each.point.get(SEED) == own[0].point.get(SEED)):
                 own.append(each)
     return found
 
