@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, info
-from campaign.estimate import Origin
+from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
 from campaign.experiments.frequency_response.model.amplitudes import by_amplitude
@@ -350,18 +350,39 @@ def test_realisations_of_one_amplitude_are_kept_together() -> None:
     assert [[signal.number for _, signal in group] for group in groups] == [[0, 1, 2], [3, 4]]
 
 
+def noise(duration: float, size: float) -> Polyline:
+    """Up to 50 Hz."""
+    times = np.arange(0.0, duration, 1.0 / 1024.0)
+    values = np.random.default_rng(3).standard_normal(len(times))
+    band = butter(8, 50.0, fs=1024.0, output="sos")
+    return Polyline(times=tuple(times), values=tuple(size * sosfilt(band, values)))
+
+
+def phase_margin(found: Result) -> Estimate:
+    margins = next(table for table in found.tables if table.key == "margins").rows[0]
+    return margins["phase"]  # type: ignore[return-value]
+
+
+def true_phase_margin() -> float:
+    frequency = np.geomspace(0.5, 200.0, 20_000)
+    s = 2j * np.pi * frequency
+    loop = (60.0 + 100.0 / s) * DRIVE.response(frequency, "motor")
+    crossed = np.flatnonzero(np.diff(np.sign(np.log(np.abs(loop)))))
+    return float(np.min(np.pi + np.unwrap(np.angle(loop))[crossed]))
+
+
 def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(7, 0.5), "rate", 8.0), looped())
     parameters = told(found)
     for name, truth in (("motor_inertia", DRIVE.motor), ("resonance", DRIVE.resonance)):
         assert holds(parameters[name].estimate, truth), name
-    margins = next(table for table in found.tables if table.key == "margins").rows[0]
-    frequency = np.geomspace(0.5, 200.0, 20_000)
-    s = 2j * np.pi * frequency
-    loop = (60.0 + 100.0 / s) * DRIVE.response(frequency, "motor")
-    crossed = np.flatnonzero(np.diff(np.sign(np.log(np.abs(loop)))))
-    margin = np.min(np.pi + np.unwrap(np.angle(loop))[crossed])
-    assert margins["phase"].value == pytest.approx(margin, abs=0.05)
+    assert phase_margin(found).value == pytest.approx(true_phase_margin(), abs=0.05)
+
+
+def test_margins_of_a_loop_follow_from_noise_as_well(tmp_path: Path) -> None:
+    made = trials(tmp_path, [noise(100.0, 10.0)], "rate", 100.0)
+    found = identified(tmp_path, made, looped(), resolution="0.25 Hz")
+    assert phase_margin(found).value == pytest.approx(true_phase_margin(), abs=0.05)
 
 
 def test_a_loop_without_its_reference_is_refused(tmp_path: Path) -> None:
@@ -371,12 +392,7 @@ def test_a_loop_without_its_reference_is_refused(tmp_path: Path) -> None:
 
 
 def test_recorded_elsewhere_it_must_be_said_what_is_excited(tmp_path: Path) -> None:
-    random = np.random.default_rng(3)
-    times = np.arange(0.0, 100.0, 1.0 / 1024.0)
-    band = butter(8, 50.0, fs=1024.0, output="sos")
-    values = 20.0 * sosfilt(band, random.standard_normal(len(times)))
-    noise = Polyline(times=tuple(times), values=tuple(values))
-    made = trials(tmp_path, [noise], "recorded", 100.0)
+    made = trials(tmp_path, [noise(100.0, 20.0)], "recorded", 100.0)
     with pytest.raises(ValueError, match="does not say what was excited"):
         identified(tmp_path, made, driven(), without=(COMMAND,))
     (tmp_path / "again").mkdir()

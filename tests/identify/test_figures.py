@@ -95,11 +95,9 @@ def test_a_model_of_a_response_is_drawn_where_it_was_fitted() -> None:
     function = SimpleNamespace(misfit=False, lowest=1.0, highest=20.0, value=lambda f: 1 / (1j * f))
     drive = SimpleNamespace(misfit=False, rigid=False, value=lambda f, place: 1.1 / (1j * f))
     source = SimpleNamespace(
-        responses={"load": measured}, loop=None, best={}, name="a source", trials=(1,)
+        responses={"load": measured}, closed=None, best={}, name="a source", trials=(1,)
     )
-    found = SimpleNamespace(
-        source=source, fits={"load": SimpleNamespace(fit=function)}, modes={}, loop_fit=None
-    )
+    found = SimpleNamespace(source=source, fits={"load": SimpleNamespace(fit=function)}, modes={})
     masses = Masses(drive, source, places={"load": "motor"}, lowest=4.0)  # type: ignore[arg-type]
     bode = next(iter(response_figures([found], masses)))  # type: ignore[list-item]
     for panel in (0, 1):

@@ -17,25 +17,40 @@ from tests.experiments.asked import asked
 from tests.experiments.laboratory import Done, execute
 
 PROTOCOLS = sorted(protocols_folder().glob("*.toml"))
-MODELS = {"breakaway": "ramps", "presliding_multisine": "presliding"}
+MODELS = {
+    "breakaway": "ramps",
+    "frequency_response": "frequency_response",
+    "presliding_multisine": "presliding",
+}
 QUANTITIES = {
     "ramps": {"breakaway_torque": "breakaway_torque", "strongest_stiffness": "bristle_stiffness"},
     "presliding": {name: name for name in ("stiffness_at_rest", "damping_at_rest", "inertia")},
+    "rate": {name: name for name in ("bandwidth", "gain_margin", "phase_margin")},
+    "torque": {"resonance": "elastic_mode_frequency"},
 }
-"""By model: what a report calls a parameter."""
+"""By model, or by the mode of its trials: what a report calls a number."""
+SINES = 67
+"""of a sweep; a third of what protocols have."""
 
 
 def planned(path: Path) -> dict[str, list[Trial]]:
-    """Trials of each test of these kinds: of one draw of its bench, of one multisine."""
+    """Trials of each test of these kinds: of one draw of its bench, multisine or compensation."""
     plan = make_plan(load_protocol(path, experiments(), shipped=path.parent))
     found: dict[str, list[Trial]] = {}
     for each in plan.trials:
         if each.kind in MODELS:
             own = found.setdefault(each.test, [])
-            ramps = each.kind == "breakaway"
-            if not own or (ramps and each.point.get(SEED) == own[0].point.get(SEED)):
+            if not own or is_of_one_draw(each, own[0]):
                 own.append(each)
-    return found
+    return {test: own[:: -(-len(own) // SINES)] for test, own in found.items()}
+
+
+def is_of_one_draw(one: Trial, other: Trial) -> bool:
+    if one.kind == "breakaway":
+        return one.point.get(SEED) == other.point.get(SEED)
+    return one.kind == "frequency_response" and all(
+        value == other.point.get(path) for path, value in one.point.items() if path != "frequency"
+    )
 
 
 def executed(trials: list[Trial]) -> list[Done]:
@@ -54,8 +69,9 @@ def test_report_and_identification_agree(path: Path) -> None:
         # Of both directions, which stand first, or of the only one.
         means = [f for f in report.findings if kind != "breakaway" or "statistic" in f.conditions]
         found = {each.quantity: each.known for each in reversed(means)}
-        told = {each.estimate.name: each.estimate for each in identified.identified.parameters}
-        names = QUANTITIES[MODELS[kind]]
+        told = {each.quantity: each.known for each in identified.findings}
+        told |= {each.estimate.name: each.estimate for each in identified.identified.parameters}
+        names = QUANTITIES.get(MODELS[kind]) or QUANTITIES[trials[0].task.mode]
         assert names.keys() <= told.keys(), test
         for name, quantity in names.items():
             assert replace(told[name], name=quantity) == found[quantity], (test, name)

@@ -109,10 +109,3 @@ def closed_from_open(loop: MeasuredResponse) -> MeasuredResponse:
     # dT = dL / (1 + L)².
     found = loop.times(np.asarray(1.0 / rest**2))
     return replace(found, values=loop.values / rest)
-
-
-def open_from_closed(closed: MeasuredResponse) -> MeasuredResponse:
-    """L = T / (1 - T): error to output, of a closed loop T with unit feedback."""
-    rest = np.where(np.abs(1.0 - closed.values) > 0, 1.0 - closed.values, 1e-300)
-    found = closed.times(np.asarray(1.0 / rest**2))
-    return replace(found, values=closed.values / rest)

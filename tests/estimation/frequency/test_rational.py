@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Origin
-from campaign.estimation.frequency.measured import closed_from_open, open_from_closed
+from campaign.estimation.frequency.measured import closed_from_open
 from campaign.estimation.frequency.modes import chosen_modes, modes
 from campaign.estimation.frequency.orders import chosen_order, order_of
 from campaign.estimation.frequency.rational import LARGE_RESIDUALS, rational_fit
+from campaign.estimation.frequency_response import open_loop
 from campaign.estimation.intervals import MODEL_MISFIT
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive, random_drive
@@ -128,13 +129,13 @@ def test_variances_of_few_realisations_are_no_weights() -> None:
         rational_fit(measured, (2, 3))
 
 
-def test_open_and_closed_loop_are_each_other() -> None:
+def test_the_closed_loop_of_an_open_one_is_that_of_sines() -> None:
     s = 2j * np.pi * FREQUENCY
     truth = 30.0 / s / (1 + s / 200)
     measured = noisy(FREQUENCY, truth, 1e-2 * np.abs(truth), np.random.default_rng(6))
     closed = closed_from_open(measured)
-    again = open_from_closed(closed)
+    again = open_loop(closed.response)
     assert np.allclose(again.values, measured.values)
-    assert np.allclose(again.variance, measured.variance)
+    assert np.allclose(again.error, measured.response.error)
     # Of T: |1 / (1 + L)²|² times as much variance.
     assert np.allclose(closed.variance, measured.variance / np.abs(1 + measured.values) ** 4)

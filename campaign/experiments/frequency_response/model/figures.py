@@ -10,8 +10,9 @@ import numpy as np
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Level
 from campaign.estimation.frequency.measured import MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.estimation.frequency_response import Array, ComplexArray, Response, open_loop
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
+from campaign.experiments.frequency_response.model.sources import Source
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
@@ -29,8 +30,8 @@ def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
         for side, measured in each.source.responses.items():
             key = f"bode-{number}-{side}"
             yield _bode_of(key, each, side, measured, masses)
-        if each.source.loop is not None:
-            yield _loop(f"loop-{number}", each, each.source.loop)
+        if each.source.closed is not None:
+            yield _loop(f"loop-{number}", each.source, open_loop(each.source.closed))
         for side, best in each.source.best.items():
             if best.distortion is not None:
                 yield _distortion(f"distortion-{number}-{side}", each, side, best)
@@ -122,16 +123,11 @@ def _left(measured: MeasuredResponse, model: ComplexArray) -> Panel:
     )
 
 
-def _loop(key: str, each: FrequencyFit, loop: MeasuredResponse) -> Figure:
-    lines = []
-    if each.loop_fit is not None and not each.loop_fit.fit.misfit:
-        fit = each.loop_fit.fit
-        fine = np.geomspace(fit.lowest, fit.highest, FINE)
-        lines.append(("rational function", fine, fit.value(fine)))
-    gain, phase = panels(loop, lines, "Gain")
+def _loop(key: str, source: Source, loop: Response) -> Figure:
+    gain, phase = panels(MeasuredResponse.of(loop), (), "Gain")
     return Figure(
         key,
-        f"Open loop from error to rate, {each.source.name}",
+        f"Open loop from error to rate, {source.name}",
         "The phase margin is read where the gain is 0 dB, the gain margin where the phase is "
         "-180°; beyond the last frequency there is only a bound.",
         "Gain and phase of the open rate loop over frequency with intervals.",
@@ -139,7 +135,7 @@ def _loop(key: str, each: FrequencyFit, loop: MeasuredResponse) -> Figure:
             Panel(gain.x, Axis("Gain", "dB"), gain.curves, marks=(Mark("0 dB", y=0.0),)),
             Panel(phase.x, phase.y, phase.curves, marks=(Mark("-180°", y=-math.pi),)),
         ),
-        trials=each.source.trials,
+        trials=source.trials,
     )
 
 

@@ -12,13 +12,11 @@ from campaign.estimation.elastic_mode import ElasticMode, elastic_mode
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.extrema import extrema, relative_scatter
-from campaign.estimation.frequency.margins import chosen_margins, measured_margins
-from campaign.estimation.frequency.measured import MeasuredResponse
 from campaign.estimation.frequency.modes import Mode, chosen_modes
 from campaign.estimation.frequency.orders import Chosen, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.servo import ServoCharacteristics
+from campaign.estimation.servo import ServoCharacteristics, characteristics
 from campaign.experiments.frequency_response.model.axis_numbers import (
     UNKNOWN,
     Weaker,
@@ -67,8 +65,7 @@ class FrequencyFit:
         fits, modes: by side; a side is missing where nothing could be fitted. Modes of too few
             realisations are extrema of the response, with friction's part.
         local: modes on top of a response that no function fits, by side.
-        margins: of its loop, by a fit where one fits and else between the points.
-        loop_fit: of its loop.
+        margins: of its loop.
         remarks: sentences: what could not be found, and why.
     """
 
@@ -77,7 +74,6 @@ class FrequencyFit:
     modes: Mapping[Side, tuple[Mode, ...]]
     local: Mapping[Side, ElasticMode] = field(default_factory=dict)
     margins: ServoCharacteristics | None = None
-    loop_fit: Chosen | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -136,12 +132,8 @@ def found_in(source: Source, band: Band) -> FrequencyFit:
         mode = elastic_mode(part.response)
         if mode is not None:
             local[side] = mode
-    margins, loop_fit = None, None
-    if source.loop is not None and not few:
-        margins, loop_fit, why = _margins(source.loop, source.every, band)
-        if why:
-            remarks.append(f"{source.name}: {why}.")
-    return FrequencyFit(source, fits, modes, local, margins, loop_fit, tuple(remarks))
+    margins = None if source.closed is None or few else characteristics(source.closed)
+    return FrequencyFit(source, fits, modes, local, margins, tuple(remarks))
 
 
 def too_few(source: Source) -> Reason:
@@ -163,21 +155,6 @@ def _extrema(source: Source, side: Side, band: Band) -> tuple[Mode, ...]:
     # Much friction damps a mode away, and has extrema of its own.
     odd = odd_distortion(source)
     return tuple(replace(mode, frequency=by_rule(mode.frequency, odd)) for mode in told)
-
-
-def _margins(
-    loop: MeasuredResponse, every: int, band: Band
-) -> tuple[ServoCharacteristics | None, Chosen | None, str]:
-    part = loop.at(np.isfinite(loop.values)).at(slice(None, None, every))
-    part = part.between(band.lowest, band.highest)
-    try:
-        fit = chosen_order(part, band.order, stable=False)
-        if not fit.fit.misfit:
-            return chosen_margins(fit), fit, ""
-        why = f"no function fits the loop ({fit.fit.misfit}); margins are read between its points"
-        return measured_margins(part), fit, why
-    except (ValueError, np.linalg.LinAlgError) as error:
-        return None, None, f"no margins: {error}"
 
 
 def best_source(found: Sequence[FrequencyFit]) -> FrequencyFit | None:

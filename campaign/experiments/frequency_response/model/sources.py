@@ -10,12 +10,12 @@ import numpy as np
 
 from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
-from campaign.estimation.frequency.measured import MeasuredResponse, open_from_closed
+from campaign.estimation.frequency.measured import MeasuredResponse, closed_from_open
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency.welch import Estimator, Record, welch_response
 from campaign.estimation.frequency.welch import Excited as Excitation
-from campaign.estimation.frequency_response import Array, make_response
+from campaign.estimation.frequency_response import Array, Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.frequency_response.model.amplitudes import Recorded, by_amplitude, size_of
@@ -61,7 +61,7 @@ class Source:
         excitation: what a best linear approximation belongs to, in words.
         trials: their numbers.
         responses: torque to rate at the load, by side of the sensor.
-        loop: error to rate of a closed rate loop, where there is one.
+        closed: command to rate of a closed rate loop, where there is one.
         best: what repeated multisines told besides, by side.
         every: of how many points one is fitted to; the others know of their neighbours.
         remarks: sentences: what could not be told, and why.
@@ -72,7 +72,7 @@ class Source:
     excitation: str
     trials: tuple[int, ...]
     responses: Mapping[Side, MeasuredResponse]
-    loop: MeasuredResponse | None = None
+    closed: Response | None = None
     best: Mapping[Side, BestLinear] = field(default_factory=dict)
     every: int = 1
     remarks: tuple[str, ...] = ()
@@ -222,7 +222,7 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
     first = next(iter(responses.values())).frequency
     closed = None
     if len(loop) >= FEWEST_SINES and not told[0][1].is_angle("load"):
-        closed = open_from_closed(MeasuredResponse.of(make_response(loop)))
+        closed = make_response(loop)
     amplitude = max(abs(t.trial.task.command.amplitude) for t, _ in told)  # type: ignore[union-attr]
     in_rate = told[0][0].trial.task.mode == "rate"
     largest = rate_here(amplitude) if in_rate else f"{amplitude:.4g} N·m"
@@ -312,13 +312,14 @@ def _loop_of(
     rate: float,
     periods: int,
     lines: Lines,
-) -> MeasuredResponse | None:
+) -> Response | None:
     signal = kept[0][0]
     if "load" not in signal.answers or signal.is_angle("load"):
         return None
     answer = _stacked([(s.answers["load"], t) for s, t in kept])
     error = reference - answer
-    return best_linear(error, answer, rate, periods, lines, "reference", reference).response
+    loop = best_linear(error, answer, rate, periods, lines, "reference", reference).response
+    return closed_from_open(loop).response
 
 
 def _stacked(parts: Sequence[tuple[Array | None, slice]]) -> Array:
@@ -365,7 +366,8 @@ def _of_records(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     closed = None
     if told[0][0].trial.task.mode == "rate" and not told[0][1].is_angle("load"):
         records = _records(told, "load", segment or 64, "error")
-        closed = _coherent(welch_response(records, "reference", segment=segment))
+        loop = _coherent(welch_response(records, "reference", segment=segment))
+        closed = closed_from_open(loop.at(slice(None, None, HANN_APART))).response
     first = next(iter(responses.values()))
     if len(first.frequency) < FEWEST_SINES:
         raise ValueError("hardly a frequency is coherent: the recording excites nothing")

@@ -47,10 +47,7 @@ def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
     """The function chosen for each response, and the two masses beside it."""
     rows: list[dict[str, Any]] = []
     for each in found:
-        parts = [(str(side), fit) for side, fit in each.fits.items()]
-        if each.loop_fit is not None:
-            parts.append(("loop", each.loop_fit))
-        for side, chosen in parts:
+        for side, chosen in each.fits.items():
             up, down = order_of(chosen.fit)
             delay = chosen.fit.scatter[-1, -1] ** 0.5
             late = Estimate.without_interval("delay", chosen.fit.delay, "s", chosen.fit.misfit)
