@@ -359,8 +359,8 @@ def noise(duration: float, size: float) -> Polyline:
 
 
 def phase_margin(found: Result) -> Estimate:
-    margins = next(table for table in found.tables if table.key == "margins").rows[0]
-    return margins["phase"]  # type: ignore[return-value]
+    margins = next(table for table in found.tables if table.key == "servo-characteristics")
+    return margins.rows[0]["phase_margin"]  # type: ignore[return-value]
 
 
 def true_phase_margin() -> float:

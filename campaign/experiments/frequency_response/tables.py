@@ -97,15 +97,22 @@ def changes(sweeps: list[Sweep]) -> Iterator[Finding]:
 
 
 def closed_tables(sweeps: list[Sweep], paths: list[str]) -> Iterator[Table]:
-    """Tables 5.3 and 5.9, where the margins were read, and what compensation changes."""
+    """Tables 5.3 and 5.9, what compensation changes, and where the margins were read."""
     extra = [path for path in paths if path != "compensation"]
     named = (
         Column("compensation", "Compensation"),
         *(Column(path, path, exact=True) for path in extra),
     )
+    servo, *crossings = margin_tables(sweeps, named)
+    yield servo
+    yield from _effect_table(named, extra, sweeps)
+    yield from crossings
+
+
+def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterator[Table]:
+    """Bandwidth and margins, and where they were read; `named`: columns of each sweep's place."""
     read = [(sweep, sweep.found) for sweep in sweeps if sweep.found is not None]
     yield _servo_table(named, [_servo_row(sweep, found) for sweep, found in read])
-    yield from _effect_table(named, extra, sweeps)
     yield Table(
         key="crossovers",
         title="Where the margins were read",

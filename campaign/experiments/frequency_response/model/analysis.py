@@ -37,7 +37,7 @@ from campaign.experiments.frequency_response.model.sources import Reading, sourc
 from campaign.experiments.frequency_response.model.tables import (
     correlations_table,
     fits_table,
-    margins_table,
+    loop_tables,
     masses_table,
     modes_table,
     sources_table,
@@ -135,7 +135,7 @@ def _analyse(data: TestData) -> Result:
         masses_table(told),
         correlations_table(told, _told_names(parameters)),
         modes_table(found),
-        margins_table(found),
+        *loop_tables(found),
         *distortion_tables(found),
         fits_table(found, told),
         *validation_tables(validation),

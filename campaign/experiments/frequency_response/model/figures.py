@@ -10,9 +10,9 @@ import numpy as np
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Level
 from campaign.estimation.frequency.measured import MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray, Response, open_loop
+from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.experiments.frequency_response.figures import closed_loop_figures
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
-from campaign.experiments.frequency_response.model.sources import Source
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
@@ -30,11 +30,14 @@ def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
         for side, measured in each.source.responses.items():
             key = f"bode-{number}-{side}"
             yield _bode_of(key, each, side, measured, masses)
-        if each.source.closed is not None:
-            yield _loop(f"loop-{number}", each.source, open_loop(each.source.closed))
         for side, best in each.source.best.items():
             if best.distortion is not None:
                 yield _distortion(f"distortion-{number}-{side}", each, side, best)
+    loops = [(each.source.name, each.source.closed, each.margins) for each in found]
+    closed = [(name, name, loop) for name, loop, _ in loops if loop is not None]
+    if closed:
+        margins = [told for _, loop, told in loops if loop is not None]
+        yield from closed_loop_figures(closed, margins)
     told = [(each.source.name, r) for each in found for r in each.source.responses.values()]
     yield _coherence(told)
 
@@ -120,22 +123,6 @@ def _left(measured: MeasuredResponse, model: ComplexArray) -> Panel:
             Curve(x, DECIBEL * np.log(left), "left over by the function", "residual", "points"),
             Curve(x, DECIBEL * np.log(scatter), "scatter (1 sigma)", "scatter"),
         ],
-    )
-
-
-def _loop(key: str, source: Source, loop: Response) -> Figure:
-    gain, phase = panels(MeasuredResponse.of(loop), (), "Gain")
-    return Figure(
-        key,
-        f"Open loop from error to rate, {source.name}",
-        "The phase margin is read where the gain is 0 dB, the gain margin where the phase is "
-        "-180°; beyond the last frequency there is only a bound.",
-        "Gain and phase of the open rate loop over frequency with intervals.",
-        (
-            Panel(gain.x, Axis("Gain", "dB"), gain.curves, marks=(Mark("0 dB", y=0.0),)),
-            Panel(phase.x, phase.y, phase.curves, marks=(Mark("-180°", y=-math.pi),)),
-        ),
-        trials=source.trials,
     )
 
 

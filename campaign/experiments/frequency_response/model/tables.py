@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 from campaign.estimate import Estimate
@@ -11,6 +11,7 @@ from campaign.estimation.frequency.one_inertia import METHOD as RIGID_METHOD
 from campaign.estimation.frequency.orders import order_of
 from campaign.estimation.frequency.two_mass import METHOD
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
+from campaign.experiments.frequency_response.tables import Sweep, margin_tables
 from campaign.result import Column, Table
 from campaign.text import words
 
@@ -143,32 +144,15 @@ def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
     )
 
 
-def margins_table(found: Sequence[FrequencyFit]) -> Table | None:
-    """Bandwidth and margins of each loop."""
-    rows: list[dict[str, Any]] = [
-        {
-            "source": each.source.name,
-            "bandwidth": each.margins.bandwidth,
-            "phase": each.margins.phase_margin,
-            "gain": each.margins.gain_margin,
-        }
+def loop_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
+    """Bandwidth and margins of each loop, as of a sweep of sines."""
+    loops = [
+        Sweep({NAME.name: each.source.name}, "closed", each.source.name, each.source.closed, told)
         for each in found
-        if each.margins is not None
+        if each.source.closed is not None and (told := each.margins) is not None
     ]
-    if not rows:
-        return None
-    return Table(
-        "margins",
-        "Bandwidth and margins of the rate loop",
-        (
-            NAME,
-            Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column("phase", "Phase margin", "rad", "deg"),
-            Column("gain", "Gain margin", "dB", "dB"),
-        ),
-        tuple(rows),
-        note="A margin beyond the last frequency is a bound.",
-    )
+    if loops:
+        yield from margin_tables(loops, (NAME,))
 
 
 def masses_table(masses: Masses) -> Table | None:
