@@ -37,6 +37,7 @@ ORDERS = ((2, 2), (1, 1), (2, 3))
 FEWEST = 6
 """Points that the highest order needs."""
 DECIBEL = 20.0 / np.log(10.0)
+"""dB of a natural logarithm."""
 NOT_ALL_CROSS = Cause("not all fits cross", "not all fits of the upper sweep cross -180 deg")
 
 

@@ -24,6 +24,7 @@ SPAN = 2.0
 """The response is smooth, but for the mode, from the candidate over this to the candidate times
 this: a complex parabola over the logarithm of frequency."""
 FEWEST_POINTS = 12
+"""in the window of a fit."""
 EVIDENCE = 4.0
 """A mode must divide the squared residual of a smooth response by this ..."""
 SMALLEST_PEAK = 0.03

@@ -20,6 +20,7 @@ from campaign.reason import Cause
 Array = NDArray[np.float64]
 
 LEVEL = 0.95
+"""Confidence of intervals, if nothing else is said."""
 BATCHES = 10
 """into which a recording is cut: enough for a deviation, few enough that neighbours hardly know of
 each other (AR(1) with 0.8 over 400 samples: 94 % coverage; with 20 batches 91 %)."""

@@ -30,6 +30,7 @@ COUNTED = {"static_torque": 2.0, "stribeck_velocity": 2.0}
 WIDEST = 2.0
 """Factor by which vs and delta of the curves differ from what was found, at most."""
 ROUNDING = 1e-12
+"""Least share that a logarithm is taken of."""
 RIDGE = 1e-9
 """of the information, for measured speeds that leave a parameter open."""
 

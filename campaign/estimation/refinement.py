@@ -17,6 +17,7 @@ PHASE_SHARE = 0.18
 WIDTHS = 2
 """Crossings of -3 dB that are looked at, the lowest first: a resonance may make several."""
 MOST = (WIDTHS + 2) * POINTS
+"""Frequencies of a refinement: around bandwidths and both crossovers."""
 NEAREST = 1e-3
 """Relative distance at which a frequency counts as measured already."""
 

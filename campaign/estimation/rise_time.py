@@ -26,6 +26,7 @@ QUIET = 1e-4
 FEWEST = 30
 """samples of a standstill by which noise, and how long it lasts, are told."""
 DEGREE = 2
+"""of the polynomials of the local fit."""
 WIDTH = 0.25
 """Half-width of a parabola over the rise time, at most ..."""
 NOISY = 0.01

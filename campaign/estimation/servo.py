@@ -23,6 +23,7 @@ from campaign.estimation.local_fit import Quantity, Reading, read
 from campaign.reason import Cause, Reason
 
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
+"""Gain at the bandwidth."""
 LARGEST = 600.0
 """Logarithm that can still be undone; a polynomial far from its points may pass it."""
 ONE_SIDED = 1.645

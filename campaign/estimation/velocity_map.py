@@ -63,6 +63,7 @@ BENT = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_expone
 STRAIGHT = 0.2
 """Half-width of vs over it up to which intervals follow from the slopes of the curve."""
 TINY = 1e-300
+"""In place of zero, where something is divided by it."""
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
 HELD_EXPONENT = Cause("held", "held at {value:g}")

@@ -14,6 +14,7 @@ POINTS = 16
 CLIPPED = (0.75, 0.98)
 """of its peak at which a signal is clipped, in the first round and in the last."""
 ROUNDS = 400
+"""of the search, if nothing else is said."""
 
 
 def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order: int) -> MultiSine:

@@ -9,6 +9,7 @@ import numpy as np
 from campaign.estimation.inverse.motion import Array
 
 BISECTIONS = 60
+"""after which the interval is 1e-18 of the first one."""
 
 
 def first_passage(course: Array, value: Callable[[float], float]) -> float:

@@ -22,6 +22,7 @@ from campaign.reason import Cause
 LONGEST = 0.02
 """s; delays are looked for up to this, or up to `SAMPLES` samples where these are longer."""
 SAMPLES = 5.0
+"""Fewest samples up to which delays are looked for."""
 OWN = 0.05
 """Share of what a delay changes that has to be like no other term."""
 METHOD = "least residual over a shift of the force, Bartlett HAC"

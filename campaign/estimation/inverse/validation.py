@@ -15,6 +15,7 @@ from campaign.estimation.inverse.regression import effective_count
 from campaign.reason import Cause
 
 REPEATS = 2000
+"""of the resampling."""
 FEWEST_BLOCKS = 8
 """Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
 TOO_FEW_BLOCKS = Cause(

@@ -27,6 +27,7 @@ ON_EACH_SIDE = 2
 CLEARLY = math.log(3.0)
 """Ratio of integrated likelihoods from which on one of two shapes is said to fit better."""
 HELD = 0.95
+"""Probability of the models that are kept."""
 PICKED = 1e-3
 """Least share of the weight with which a place counts in the size of a jump."""
 

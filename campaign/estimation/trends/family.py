@@ -13,6 +13,7 @@ import numpy as np
 from campaign.estimation.trends.scatter import Mixture
 
 RATE = 0.05
+"""Share of false ones that is expected among what is declared."""
 POWER = 0.8
 """How often a change of the detectable size would be declared."""
 

@@ -24,6 +24,7 @@ LAGS = 200
 BEST = 4
 """Models whose residuals are drawn beside each other."""
 BINS = 40
+"""of the rate, for means of what is left over."""
 
 
 def figures(found: InverseDynamics) -> Iterator[Figure]:

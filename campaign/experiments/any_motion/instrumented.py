@@ -37,6 +37,7 @@ ROUNDS = 2
 ALONG_WANTED = "simulated along the wanted motion"
 ALONG_FORCE = "simulated along the recorded force"
 NORMAL_95 = 1.96
+"""Half of a two-sided 95 % interval over its standard deviation."""
 UNSTABLE = 100.0
 """Times the fastest measured rate: a simulated motion that is faster is none of this axis."""
 

@@ -40,6 +40,7 @@ MOST = 0.9
 FORCES = (DRIVE_TORQUE, JOINT_TORQUE)
 """What moves the axis, the better first: a sensor at the load knows nothing of motor and gear."""
 FEWEST_SAMPLES = 100
+"""of a piece without a lost sample."""
 FORCE = "force"
 RATES_ALIKE = 1.01
 """Largest over smallest sample rate up to which trials have one: times of files are rounded, and

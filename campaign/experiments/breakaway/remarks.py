@@ -19,6 +19,7 @@ SHORT_REST = 0.2
 """Standstill over the ramp's length below which the gyro's bias widens the interval of sigma0; with
 a third of the ramp's length it hardly does."""
 LONG_REST = 0.3
+"""Share of a period's length that a rest has at least, as advice."""
 WIDE = 0.05
 """Half-width over value from which a longer standstill is worth its time."""
 

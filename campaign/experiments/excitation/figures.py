@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from campaign.channels import DRIVE_TORQUE
+from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Level
 from campaign.experiments.excitation.account import (
@@ -27,7 +27,6 @@ from campaign.signals import MultiSine
 TIME = Axis("Time", "s", "s")
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
 PHASE = Axis("Phase", "rad", "deg")
-DECIBEL = 20.0 / math.log(10.0)
 SHOWN = 20.0
 """s of a course that are drawn, at most."""
 CYCLES = 40.0

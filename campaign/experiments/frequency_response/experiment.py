@@ -90,6 +90,7 @@ AT_HAND = Cause("describes the recording at hand", "it describes the recording a
 NYQUIST_SHARE = 0.4
 """of the controller's sample rate: the highest frequency that can be told."""
 MOST_FREQUENCIES = 10_000
+"""of a sweep."""
 STEADY = "steady"
 """The window of the whole cycles that are measured."""
 

@@ -21,6 +21,7 @@ SHOWN_BEYOND = 1.2
 NOTICEABLE = 0.02
 """Half-width, as a share of the response, from which on a point's interval is drawn: 0.2 dB, 1°."""
 TWO_SIDED = 1.96
+"""Half of a two-sided 95 % interval over its standard deviation."""
 BARE = "none"
 """The series of a response without compensation."""
 

@@ -21,6 +21,7 @@ LABELLED = 4
 SIDE_BY_SIDE = 8
 """Most sweeps that have room beside each other."""
 TURN = 2.0 * np.pi
+"""rad"""
 PLOTTED = -3.0
 """dB: the level of the bandwidth."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.elastic_mode import elastic_mode
 from campaign.estimation.frequency_response import Response
 from campaign.estimation.servo import Crossing, ServoCharacteristics, change
@@ -266,7 +267,7 @@ def _slow_note(sweep: Sweep) -> Iterator[str]:
     response = sweep.response
     lowest, level = float(response.frequency[0]), float(response.level[0])
     phase, unsure = float(response.phase[0]), float(response.relative_error[0])
-    gain_off = abs(level) > FOLLOWS + SURELY * 20.0 / math.log(10.0) * unsure
+    gain_off = abs(level) > FOLLOWS + SURELY * DECIBEL * unsure
     turned = abs(phase) > 0.5 * math.pi + SURELY * unsure
     if not gain_off and not turned:
         return

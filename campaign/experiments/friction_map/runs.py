@@ -39,6 +39,7 @@ DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 WHOLE = "settled {}"
 """Name of the window of all that a run has behind its settling, by direction."""
 GOLDEN = 0.5 * (1.0 + math.sqrt(5.0))
+"""Ratio whose multiples spread starts most evenly."""
 MEMORIES = 7.0
 """lengths of friction's memory, Ts / sigma0, after which a reversal is over: 2 exp(-7) is 0.2 %."""
 

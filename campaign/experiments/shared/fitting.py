@@ -22,7 +22,9 @@ from campaign.physics.complete import control_rate, inertia_of, limits_of
 from campaign.physics.limits import worst_friction
 
 DEG = math.pi / 180.0
+"""rad"""
 MILLIMETRE = 1e-3
+"""m"""
 NO_ROOM = "there is no room to move: the position is at the limit of angle, or beyond it"
 SWEPT = 40
 """frequencies, evenly in their logarithm."""

@@ -23,6 +23,7 @@ from campaign.physics.loop import at_load
 from campaign.signals import MultiSine
 
 MOST_LINES = 1000
+"""of a multisine."""
 PER_PERIOD = 16
 """Points per period of the highest line, at which the peak is looked for."""
 SHARES = (0.05, 0.1, 0.2)

@@ -24,6 +24,7 @@ BARE = frozenset({"frequency", "acceleration", "motion"})
 SEVERAL = 3
 """Values of a swept number from which on it has an axis; two stand side by side."""
 MOST_PANELS = 6
+"""of one figure."""
 WIDE = 20.0
 """Ratio of the largest to the smallest error from which on their axis is logarithmic."""
 DECADE = 10.0

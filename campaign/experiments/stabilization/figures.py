@@ -229,6 +229,7 @@ def _reversals(item: TrialData, window: Window) -> Array:
 
 
 MOST_REVERSALS = 8
+"""that are marked."""
 CHATTER = 3.0
 """times as far as its own mean a torque runs up and down that chatters."""
 SMOOTHED = 0.02

@@ -20,6 +20,7 @@ from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
 
 FINE = 200
+"""Rates of one direction at which friction is drawn."""
 PLAIN = "plain regression"
 
 

@@ -43,6 +43,7 @@ BAND = 0.4
 RESOLVED = 3.0
 """Time constants of the low-pass that something must take to be seen as more than a jump."""
 NORMAL_95 = 1.96
+"""Half of a two-sided 95 % interval over its standard deviation."""
 DELAY_UNKNOWN = Cause(
     "delay unknown", "a delay of {milliseconds:.2g} ms more or less leaves it open"
 )

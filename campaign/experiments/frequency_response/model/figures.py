@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Level
 from campaign.estimation.frequency.measured import MeasuredResponse
@@ -18,7 +18,6 @@ from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
 PHASE = Axis("Phase", "rad", "deg")
-DECIBEL = 20.0 / math.log(10.0)
 FINE = 800
 """Frequencies at which a fitted function is drawn."""
 TORQUE = "Gain, dB of 1 rad/s per N·m"

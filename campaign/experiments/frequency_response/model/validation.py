@@ -34,6 +34,7 @@ from campaign.signals import MultiSine
 
 FUNCTION = "rational function"
 FEWEST_LINES = 3
+"""at which a prediction is held against a response."""
 OTHER_SIZE = 1.2
 """Ratio of two excitations' rms from which on a response with friction is not the same."""
 

@@ -22,10 +22,12 @@ from campaign.reason import Cause
 from campaign.result import Amount, Axis, Column, Conclusion, Curve, Figure, Mark, Panel, Table
 
 FINE = 800
+"""Frequencies at which a model is drawn."""
 TIME = Axis("Time", "s", "s")
 SELDOM = math.sqrt(-math.log(0.05))
 """Size of a complex error over its root of the mean square that chance passes once in twenty."""
 LAGS = 30
+"""of an autocorrelation, at most."""
 MODEL = Column("model", "Model", exact=True)
 OF_LINES = Cause(
     "over these lines", "over these lines: what it would be of others, their deviations say"
