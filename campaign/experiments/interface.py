@@ -307,7 +307,8 @@ def _measurable(
     for item in data.trials:
         estimates = item.estimates
         try:
-            if experiment.measure and not estimates and item.trial.number in completed:
+            own = item.trial.kind == experiment.name and item.trial.number in completed
+            if experiment.measure and own and not estimates:
                 estimates = tuple(experiment.measure(item))
         except ArchiveError:
             raise

@@ -13,8 +13,8 @@ from campaign.estimate import Origin
 from campaign.estimation import gate
 from campaign.estimation.inverse.motion import Filtering
 from campaign.experiments.any_motion.motions import moved
-from campaign.experiments.motion import friction_map
-from campaign.experiments.motion.sliding import points_of, slower
+from campaign.experiments.friction_map import model as friction_map
+from campaign.experiments.friction_map.stretches import points_of, slower
 from campaign.parameter import Identified
 from campaign.physics.bench import Bench
 from campaign.trial import Channel, Recording

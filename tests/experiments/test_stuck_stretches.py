@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.experiments.motion import friction_map
-from campaign.experiments.motion.sliding import Point, Stretch
-from tests.experiments.asked import asked
+from campaign.experiments.friction_map import model as friction_map
+from campaign.experiments.friction_map.stretches import Point, Stretch
+from tests.experiments.asked import data_of
 from tests.physics.benches import bench
 
 STEP = 1e-3
@@ -22,8 +22,13 @@ class OneTrial:
     """What the parameters of a map ask a trial for."""
 
     trial = SimpleNamespace(
-        recording={"made": "elsewhere"}, bench=bench().model_dump(mode="json"), number=1
+        recording={"made": "elsewhere"},
+        bench=bench().model_dump(mode="json"),
+        number=1,
+        role="measurement",
+        windows=(),
     )
+    ending = SimpleNamespace(outcome="completed")
 
     @staticmethod
     def channel_names() -> frozenset[str]:
@@ -45,7 +50,8 @@ def stretch(speed: float, *, slips: bool) -> Point:
 
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
     monkeypatch.setattr(friction_map, "points_of", lambda *_: (points, None))
-    return asked("friction_map", [OneTrial()], slowest="1 mrad/s")
+    options = friction_map.FrictionMapOptions.model_validate({"slowest": "1 mrad/s"})
+    return friction_map.identified(data_of([OneTrial()], model=options))
 
 
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:

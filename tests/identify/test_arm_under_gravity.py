@@ -19,7 +19,7 @@ from campaign.errors import ExitCode
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.over_a_turn import over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
-from campaign.experiments.motion.sliding import Point
+from campaign.experiments.friction_map.stretches import Point
 from campaign.identify.agreement import disagreements
 from tests.identify.unseen import curve, identified, notes, told
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
 from campaign.estimation.both_directions import fitted_nominal
 from campaign.estimation.ripple import Ripple, ripple_of_points, window_noise
@@ -22,6 +23,8 @@ from campaign.estimation.velocity_map import (
 )
 from campaign.experiments.friction_map.points import MapPoint
 from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.interface import TrialData
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
 from campaign.result import Array
@@ -48,6 +51,7 @@ class MapFits:
     fits: Mapping[str, DirectionFit]
     shift: Mapping[str, Array]
     bench: Bench
+    first: TrialData | None = None
     _told: dict[Model, dict[str, dict[str, Estimate]]] = field(default_factory=dict, repr=False)
 
     def estimates(self, model: Model) -> dict[str, dict[str, Estimate]]:
@@ -86,11 +90,15 @@ class MapFits:
             return told
         if told.name in TORQUES:
             told = with_systematic(told, self.bench, TORQUE_CONSTANT, told.value)
+            if self.first is not None:
+                told = with_scale(told, self.first, DRIVE_TORQUE)
         return with_systematic(told, self.bench, INERTIA, effects.get(told.name, 0.0))
 
 
-def fit_map(points: Iterable[MapPoint], bench: Bench) -> MapFits:
+def fit_map(points: Iterable[MapPoint], bench: Bench, first: TrialData | None = None) -> MapFits:
     """Both directions of a map, its ripple taken out first.
+
+    `first`: one of its trials, which says how well an imported torque is known.
 
     Raises ValueError for a direction with too few speeds.
     """
@@ -114,7 +122,7 @@ def fit_map(points: Iterable[MapPoint], bench: Bench) -> MapFits:
         moved = [sign * by_speed[speed].acceleration for speed in sorted(by_speed, key=abs)]
         # Without an inertia the part is unknown, whatever stands here: `with_systematic`.
         shift[name] = (bench.axis.inertia or 0.0) * np.array(moved)
-    return MapFits(tuple(sorted(kept, key=lambda p: p.speed)), ripples, fits, shift, bench)
+    return MapFits(tuple(sorted(kept, key=lambda p: p.speed)), ripples, fits, shift, bench, first)
 
 
 def dry_torques(points: Sequence[MapPoint]) -> Array:

@@ -28,7 +28,6 @@ from campaign.experiments.interface import Experiment, TestData, TrialData, benc
 from campaign.experiments.motion.account import account_of
 from campaign.experiments.motion.conclusions import motion_conclusions
 from campaign.experiments.motion.figures import friction_figure, motion_figure
-from campaign.experiments.motion.friction_map import MODEL as FRICTION_MAP
 from campaign.experiments.motion.tables import (
     friction_table,
     line_findings,
@@ -203,5 +202,4 @@ EXPERIMENT = Experiment(
     can_use=CAN_USE,
     recorded=_found,
     most_samples=MOST_SAMPLES,
-    model=FRICTION_MAP,
 )

@@ -11,10 +11,11 @@ from campaign.estimate import Estimate
 from campaign.estimation.friction_line import friction_line, mean_of_stretches
 from campaign.estimation.intervals import shifted_by
 from campaign.estimation.velocity_map import DirectionFit, direction_estimates, fit_direction
-from campaign.experiments.motion.sliding import DIRECTIONS, Point, places
+from campaign.experiments.friction_map.stretches import DIRECTIONS, Point, places
 from campaign.units import rate_here
 
 FEWEST_SPEEDS = 6
+"""of a direction, up to which no Stribeck curve is fitted."""
 MEANINGS = {
     "coulomb_torque": ("N m", "Dry friction of fast sliding"),
     "static_torque": ("N m", "Friction at the onset of sliding"),

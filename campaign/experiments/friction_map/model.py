@@ -1,16 +1,17 @@
-"""Friction over rate, from wherever any recording slides steadily, in both directions.
+"""Friction over rate as parameters: of the runs of a map, or of wherever a recording is steady.
 
-Where more than six speeds were slid at, a Stribeck curve is fitted to each direction; where there
-are fewer, a straight line; of one speed there is the friction at it. Static friction that lies
-below Coulomb friction is as welcome as any other. Where the normal load was recorded, the same is
-said of the friction coefficient; of it alone where loads differ.
+Runs of a map are analysed as in their report. In other recordings steady stretches are found. Of
+more than six speeds, a Stribeck curve is fitted to each direction; of fewer, a straight line; of
+one there is the friction at it. Static friction that lies below Coulomb friction is as welcome as
+any other. Where the normal load was recorded, the same is said of the friction coefficient; of it
+alone where loads differ.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -21,8 +22,19 @@ from campaign.estimation.gate import admitted_together, mattering
 from campaign.estimation.over_a_turn import OverATurn
 from campaign.estimation.steady_stretches import SHORTEST_TIME
 from campaign.estimation.stribeck import stribeck
-from campaign.experiments.interface import Model, TestData, TrialData
-from campaign.experiments.motion.sliding import (
+from campaign.experiments.friction_map.conclusions import map_conclusions
+from campaign.experiments.friction_map.map_result import one_map
+from campaign.experiments.friction_map.over_rate import (
+    COEFFICIENT,
+    FRICTION,
+    MEANINGS,
+    Mapped,
+    Quantity,
+    mapped_over_rate,
+    with_doubts,
+)
+from campaign.experiments.friction_map.runs import REQUIRED
+from campaign.experiments.friction_map.stretches import (
     DIRECTIONS,
     Point,
     force_of,
@@ -32,16 +44,8 @@ from campaign.experiments.motion.sliding import (
     points_of,
     slower,
 )
-from campaign.experiments.motion.sliding_map import (
-    COEFFICIENT,
-    FRICTION,
-    MEANINGS,
-    Mapped,
-    Quantity,
-    mapped_over_rate,
-    with_doubts,
-)
-from campaign.experiments.shared.conclusion_parts import count
+from campaign.experiments.interface import EMPTY, Model, TestData, TrialData
+from campaign.experiments.shared.conclusion_parts import Settings, count
 from campaign.experiments.shared.directions import with_offset
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
@@ -64,6 +68,7 @@ from campaign.result import (
 from campaign.units import AngularRate, Time
 
 FINE = 100
+"""Rates at which a fitted curve is drawn."""
 SHOWN = 8
 """Numbers of trials that a reason lists."""
 NO_STRETCH = Cause(
@@ -99,8 +104,9 @@ class FrictionMapOptions(Options):
 
 
 def _suits(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    found = []
-    for each in trials:
+    """The runs of maps; without any, all trials with a rate and a torque."""
+    found = [each for each in trials if is_run(each)]
+    for each in () if found else trials:
         names = each.channel_names()
         if RELATIVE_RATE in names and names & {DRIVE_TORQUE, JOINT_TORQUE}:
             found.append(each)
@@ -108,7 +114,30 @@ def _suits(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
     return found, "" if found else why
 
 
-def _analyse(data: TestData) -> Result:
+def is_run(data: TrialData) -> bool:
+    """Whether a trial is a run of a map, with its speed and the windows of its directions."""
+    trial = data.trial
+    windows = DIRECTIONS.keys() & {window.name for window in trial.windows}
+    return bool(windows) and "speed" in trial.point and REQUIRED.keys() <= data.channel_names()
+
+
+def identified(data: TestData) -> Result:
+    """Friction over rate, by direction. Raises ValueError where there is none."""
+    runs = tuple(each for each in data.completed() if is_run(each))
+    result, fits = one_map(runs) if runs else (EMPTY, None)
+    if fits is None:
+        return _of_stretches(data)
+    found = {way: fits.estimates(fit.preferred)[way] for way, fit in fits.fits.items()}
+    parameters = tuple(_Named.of(FRICTION, found).parameters())
+    speeds = [point.speed for point in fits.points]
+    return replace(
+        result,
+        conclusions=map_conclusions(result.findings, speeds, Settings({})),
+        identified=Identified(parameters, settings=_settings(found, parameters)),
+    )
+
+
+def _of_stretches(data: TestData) -> Result:
     options: FrictionMapOptions = data.model
     found, held = points_of(data.trials, data.bench, options.shortest, options.slowest)
     points = [point for point in found if not point.own.unsteady]
@@ -180,40 +209,68 @@ def _over_a_turn(held: OverATurn) -> str:
     )
 
 
+@dataclass(frozen=True)
+class _Named:
+    """Parameters of both directions by name, e.g. `coulomb_torque_positive`.
+
+    `places`: the name that each has in a direction, and which direction it is.
+    """
+
+    quantity: Quantity
+    found: Mapping[str, Estimate]
+    places: Mapping[str, tuple[str, str]]
+
+    @classmethod
+    def of(cls, quantity: Quantity, found: Mapping[str, Mapping[str, Estimate]]) -> _Named:
+        named, places = {}, {}
+        for way, estimates in found.items():
+            for name, one in estimates.items():
+                key = f"{quantity.called(name)}_{way}"
+                if name == "friction" and quantity is COEFFICIENT:
+                    key = f"friction_coefficient_{way}"
+                places[key] = name, way
+                named[key] = replace(one, name=key, unit=quantity.meanings[name][0])
+        return cls(quantity, named, places)
+
+    def parameters(self) -> Iterator[Parameter]:
+        """With their places in a bench file."""
+        told = dict(self.found)
+        for name in ("coulomb_torque", "static_torque"):
+            told = with_offset(told, self.quantity.called(name))
+        dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
+        both = all(one is not None and is_value(one) for one in dry)
+        for key, (name, way) in self.places.items():
+            prefix = "negative." if way == "negative" else ""
+            goes = self.quantity is FRICTION and name in KEYS and both
+            place = f"friction.load.{prefix}{name}" if goes else ""
+            meaning = f"{self.quantity.meanings[name][1]}, {way} direction."
+            yield Parameter(told[key], meaning, "", place, ADVICE[name])
+
+
 def _parameters(
     mapped: Mapped, first: Mapped, points: Sequence[Point], data: TestData
 ) -> Iterator[Parameter]:
     quantity = mapped.quantity
-    names = {}
-    found = {}
-    for direction, estimates in mapped.found.items():
-        for name, estimate in estimates.items():
-            if mapped is not first and name.startswith("stribeck"):
-                continue  # the same rate, from the same stretches
-            named = f"{quantity.called(name)}_{direction}"
-            if name == "friction" and quantity is COEFFICIENT:
-                named = f"friction_coefficient_{direction}"
-            names[named] = name, direction
-            one = replace(estimate, name=named, unit=quantity.meanings[name][0])
-            found[named] = _scaled(one, quantity, data)
+    named = _Named.of(
+        quantity,
+        {
+            way: {
+                name: one
+                for name, one in estimates.items()
+                if mapped is first or not name.startswith("stribeck")  # of the same stretches
+            }
+            for way, estimates in mapped.found.items()
+        },
+    )
+    scaled = {key: _scaled(one, quantity, data) for key, one in named.found.items()}
     largest = max(abs(quantity.read(point).value) for point in points)
     fastest = max(point.speed for point in points)
     matters = {
-        named: mattering(name, largest, fastest)
-        for named, (name, _) in names.items()
+        key: mattering(name, largest, fastest)
+        for key, (name, _) in named.places.items()
         if not name.startswith("stribeck")
     }
-    told = admitted_together(found, matters)
-    for name in ("coulomb_torque", "static_torque"):
-        told = with_offset(told, quantity.called(name))
-    dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
-    both = all(one is not None and is_value(one) for one in dry)
-    for named, (name, direction) in names.items():
-        prefix = "negative." if direction == "negative" else ""
-        goes = quantity is FRICTION and name in KEYS and both
-        key = f"friction.load.{prefix}{name}" if goes else ""
-        meaning = f"{quantity.meanings[name][1]}, {direction} direction."
-        yield Parameter(told[named], meaning, "", key, ADVICE[name])
+    return replace(named, found=admitted_together(scaled, matters)).parameters()
 
 
 def _scaled(one: Estimate, quantity: Quantity, data: TestData) -> Estimate:
@@ -327,5 +384,4 @@ MODEL = Model(
     summary="friction over rate, from steady stretches of any recording",
     options=FrictionMapOptions,
     suits=_suits,
-    analyse=_analyse,
 )

@@ -1,6 +1,7 @@
-"""Numeric constants at module level: how many there are by room, and which say nothing of themselves.
+"""Numeric constants at module level: how many there are, and which say nothing of themselves.
 
-A constant says where it comes from in the text below it or in a comment on its line.
+`python benchmarks/constants.py ROOM ...` names those of rooms. A constant says where it comes from in
+the text below it, or in a comment on its line.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ def constants(source: str) -> Iterator[tuple[str, bool]]:
     lines, body = source.splitlines(), ast.parse(source).body
     for node, following in zip(body, [*body[1:], None], strict=True):
         match node:
-            case ast.Assign(targets=[ast.Name(id=name)], value=value) | ast.AnnAssign(
-                target=ast.Name(id=name), value=ast.expr() as value
+            case (
+                ast.Assign(targets=[ast.Name(id=name)], value=value)
+                | ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value)
             ) if is_numeric(value):
                 text = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
                 yield name, text or "#" in lines[node.end_lineno - 1]
