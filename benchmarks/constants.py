@@ -1,7 +1,7 @@
 """Numeric constants at module level: how many there are, and which say nothing of themselves.
 
-`python benchmarks/constants.py ROOM ...` names those of rooms. A constant says where it comes from in
-the text below it, or in a comment on its line.
+`python benchmarks/constants.py ROOM ...` names those of rooms. A constant says where it comes from
+in the text below it, or in a comment on its line.
 """
 
 from __future__ import annotations
