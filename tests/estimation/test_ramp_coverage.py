@@ -233,9 +233,16 @@ def test_no_number_leaves_out_an_interface_that_noise_hides_often() -> None:
     assert not rejected(of_hidden(400, 14), "less")
 
 
+TOO_WIDE = 0.985
+"""Coverage above which a torque claims too little. Its scatter alone holds 95.2 to 96.5 %; one of
+fifteen has the polynomial's own error beside it."""
+
+
 @pytest.mark.statistics
 def test_breakaway_torque_often() -> None:
-    assert not rejected(of_torque(4000, 12))
+    held = of_torque(4000, 12)
+    assert not rejected(held, "less")
+    assert not rejected(held, "greater", TOO_WIDE)
 
 
 @pytest.mark.statistics

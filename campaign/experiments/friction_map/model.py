@@ -381,7 +381,7 @@ def _conclusions(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
 
 MODEL = Model(
     name="friction_map",
-    summary="friction over rate, from steady stretches of any recording",
+    summary="friction over rate, of a map or of steady stretches of any recording",
     options=FrictionMapOptions,
     suits=_suits,
 )
