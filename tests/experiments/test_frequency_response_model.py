@@ -22,7 +22,7 @@ from campaign.experiments.frequency_response.model.signals import base_frequency
 from campaign.experiments.frequency_response.model.sources import _lines
 from campaign.identify.material import choose
 from campaign.result import Result
-from campaign.signals import MultiSine, Polyline, Signal, Sine
+from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
 from campaign.trial import Recording, Task, Trial
 from tests.archives import archived, plan_of
 from tests.estimation.coverage import holds
@@ -386,9 +386,18 @@ def test_margins_of_a_loop_follow_from_noise_as_well(tmp_path: Path) -> None:
 
 
 def test_a_loop_without_its_reference_is_refused(tmp_path: Path) -> None:
-    made = trials(tmp_path, [Polyline(times=(0.0,), values=(1.0,))], "rate", 8.0)
+    made = trials(tmp_path, multisines(1, 0.5), "recorded", 8.0)
     with pytest.raises(ValueError, match="mixture of the drive and its controller"):
-        identified(tmp_path, made, looped(), without=(COMMAND,))
+        identified(tmp_path, made, looped(), without=(COMMAND,), excited="reference")
+
+
+@pytest.mark.parametrize("mode", ["rate", "torque"])
+def test_ramps_and_steps_give_no_response(tmp_path: Path, mode: str) -> None:
+    """What friction does to them is no noise: in a friction map it looked like a mode at 21 Hz."""
+    ramp = Polyline(times=(0.0, 4.0, 8.0), values=(0.0, 20.0, 0.0))
+    made = trials(tmp_path, [ramp, Zero()], mode, 8.0)
+    with pytest.raises(ValueError, match="no trial is recorded elsewhere, or commanded by sines"):
+        identified(tmp_path, made, looped() if mode == "rate" else driven())
 
 
 def test_recorded_elsewhere_it_must_be_said_what_is_excited(tmp_path: Path) -> None:
@@ -431,7 +440,7 @@ def test_single_sines(tmp_path: Path) -> None:
 
 def test_without_a_torque_nothing_suits(tmp_path: Path) -> None:
     made = trials(tmp_path, multisines(1), "torque", 8.0)
-    with pytest.raises(ValueError, match="no trial has a drive torque"):
+    with pytest.raises(ValueError, match="no trial is recorded elsewhere"):
         identified(tmp_path, made, driven(), without=(DRIVE_TORQUE,))
 
 

@@ -21,7 +21,8 @@ from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
-from campaign.trial import Recording
+from campaign.signals import MultiSine, Polyline, Sine
+from campaign.trial import Recording, Task
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
     "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
@@ -64,18 +65,36 @@ class Signals:
         return self.channels[side] in ANGLES
 
 
+CORNERS = 100
+"""Fewest of a command that excites many frequencies. Ramps and steps have fewer: what friction does
+to their motion is no noise, and looked like modes."""
+
+
 def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
-    """Trials with a torque and a rate or angle that answers it."""
+    """Trials that excite, with a torque and a rate or angle that answers it."""
     moving = [
         each
         for each in trials
-        if each.trial.task.mode in ("rate", "torque", "recorded")
+        if _excites(each.trial.task)
         and DRIVE_TORQUE in each.channel_names()
         and any(set(names) & each.channel_names() for names in SENSORS.values())
     ]
     if moving:
         return moving, ""
-    return (), "no trial has a drive torque and a rate or angle that answers it"
+    return (), (
+        "no trial is recorded elsewhere, or commanded by sines, multisines or noise, with a drive "
+        "torque and a rate or angle that answers it"
+    )
+
+
+def _excites(task: Task) -> bool:
+    """Whether many frequencies are in a command, as far as anybody has said what it was."""
+    if task.mode not in ("rate", "torque"):
+        return task.mode == "recorded"
+    command = task.command
+    if isinstance(command, Polyline):
+        return len(command.times) >= CORNERS
+    return isinstance(command, Sine | MultiSine)
 
 
 def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
@@ -88,9 +107,7 @@ def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
         command = task.command.sample(recording.time)
     if command is not None and np.nanstd(command) > 0:
         reference = command
-    if reference is None and (
-        excited == "reference" or (excited == "auto" and task.mode == "rate")
-    ):
+    if reference is None and excited == "reference":
         raise ValueError(
             "its loop is closed and nothing that comes into it is recorded: output over input "
             "would be a mixture of the drive and its controller"
