@@ -5,6 +5,7 @@ Recordings are made here from a rigid axis with known friction, and reach the an
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from campaign.errors import ExitCode
 from campaign.experiments.interface import TestData, measured, result_of
 from campaign.experiments.motion.experiment import EXPERIMENT
 from campaign.result import Result
+from tests.experiments.asked import asked
 from tests.experiments.test_every_number import lacking
 
 RATE = 200.0
@@ -136,13 +138,14 @@ def test_drift_that_goes_with_speed_is_told(tmp_path: Path):
     assert "changes with time" in notes(recorded(tmp_path, rate, friction(rate)))
 
 
-def test_many_stretches_are_looked_at_over_all_of_the_recording(tmp_path: Path):
+def test_all_stretches_of_a_long_recording_are_in_its_friction(tmp_path: Path):
     """Friction doubles half way: the mean of 500 strokes is that of all of them."""
     rate = strokes([0.3, -0.3] * 250, cruise=0.5, rest=0.1)
     torque = np.where(np.arange(len(rate)) < len(rate) / 2, 1.0, 2.0) * friction(rate, viscous=0.0)
     run = recorded(tmp_path, rate, torque)
     assert found(run, "friction_torque", "positive").value == pytest.approx(3.0, abs=0.05)
-    assert "of 500 steady stretches" in notes(run)
+    table = next(t for t in result(run).tables if t.key.startswith("steady"))
+    assert len(table.rows) == 500
 
 
 def test_strokes_that_are_alike_have_wider_intervals(tmp_path: Path):
@@ -166,6 +169,69 @@ def test_windows_that_are_named_are_used(tmp_path: Path):
     run = recorded(tmp_path, rate, friction(rate), entry=entry)
     table = next(t for t in result(run).tables if t.key.startswith("steady"))
     assert [round(row["first"], 2) for row in table.rows] == [0.6, 2.8]
+
+
+def shifting(rate: np.ndarray) -> np.ndarray:
+    """Friction with a torque of 3 N m once a turn, as of gravity."""
+    return friction(rate) + 3.0 * np.sin(np.cumsum(rate) / RATE)
+
+
+WIDE = [s * v for v in (0.5, 2.0, 1.0, 1.5, 0.7) for s in (1.0, -1.0)]
+
+
+def test_gravity_is_not_taken_for_friction(tmp_path: Path):
+    """Strokes of up to half a turn, by which a line through torques would be off by a tenth."""
+    rate = strokes(WIDE * 2)
+    run = recorded(tmp_path, rate, shifting(rate))
+    for direction in ("positive", "negative"):
+        for quantity, true in (("coulomb_torque", 2.0), ("viscous_friction", 0.5)):
+            assert found(run, quantity, direction).value == pytest.approx(true, abs=0.04)
+    assert "as gravity does" in notes(run)
+    # A torque that was taken off too much, or too little, is a constant one.
+    assert "angle" in str(found(run, "constant_torque").systematic)
+
+
+def test_of_many_speeds_there_is_a_stribeck_curve(tmp_path: Path):
+    rate = strokes([s * v for v in np.geomspace(0.02, 1.0, 12) for s in (1.0, -1.0)])
+    bend = 0.8 * np.sign(rate) * np.exp(-((rate / 0.06) ** 2))
+    run = recorded(tmp_path, rate, friction(rate) + bend)
+    for quantity, true in (("coulomb_torque", 2.0), ("static_torque", 2.8)):
+        row = found(run, quantity, "negative")
+        assert row.low <= true <= row.high
+        assert row.high - row.low < 0.1
+
+
+MEANS = {"friction": "friction_torque"}
+"""What a report calls a parameter."""
+LOADS = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("case", ["line", "mean", "curve", "gravity", "windows", "loads"])
+def test_a_report_and_an_identification_agree(tmp_path: Path, case: str):
+    speeds = {"mean": [0.3, -0.3] * 6, "gravity": WIDE * 2}.get(case, EVERY * 2)
+    if case == "curve":
+        speeds = [s * v for v in np.geomspace(0.02, 1.0, 12) for s in (1.0, -1.0)]
+    rate, more = strokes(speeds), {}
+    torque = shifting(rate) if case == "gravity" else friction(rate)
+    if case == "windows":
+        ends = {"one": 0.6, "two": 2.8, "three": 5.0, "four": 7.2, "five": 9.4, "six": 11.6}
+        own = ", ".join(f'{name} = ["{at:g} s", "{at + 1:g} s"]' for name, at in ends.items())
+        more = {"entry": f"windows = {{ {own} }}"}
+    if case == "loads":
+        load = 10.0 + 0.05 * LOADS.normal(size=len(rate))
+        more = {"kind": "linear", "columns": LOADED, "extra": {"n": load}}
+    run = recorded(tmp_path, rate, torque, **more)
+    told = {
+        f"{each.quantity}_{each.conditions['direction']}": each.known
+        for each in result(run).findings
+        if "direction" in each.conditions
+    }
+    identified = asked("friction_map", run.archive.trials).identified.parameters
+    assert len(identified) == len(told)
+    for each in identified:
+        name, _, way = each.estimate.name.rpartition("_")
+        reported = told[f"{MEANS.get(name, name)}_{way}"]
+        assert replace(each.estimate, name=reported.name) == reported
 
 
 def test_lost_samples_cost_no_stretch(tmp_path: Path):

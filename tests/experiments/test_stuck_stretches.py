@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.experiments.friction_map import model as friction_map
-from campaign.experiments.friction_map.stretches import Point, Stretch
+from campaign.experiments.friction_map import model, sliding
+from campaign.experiments.friction_map.stretches import Point, Stretch, StretchOptions
 from tests.experiments.asked import data_of
 from tests.physics.benches import bench
 
@@ -45,13 +45,13 @@ def stretch(speed: float, *, slips: bool) -> Point:
     noise = 0.01 * np.random.default_rng(round(1e4 * speed)).normal(size=len(TIME))
     torque = 5.0 + 2.0 * speed + noise - (1.0 if slips else 0.0)
     wrapped = np.angle(np.exp(1j * (angle + 3.0)))
-    return Stretch(1, TIME, counted, torque, wrapped, np.nan, 0.0).point(None)
+    return Stretch(1, TIME, counted, torque, wrapped, np.nan, np.nan, 0.0).point(None)
 
 
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
-    monkeypatch.setattr(friction_map, "points_of", lambda *_: (points, None))
-    options = friction_map.FrictionMapOptions.model_validate({"slowest": "1 mrad/s"})
-    return friction_map.identified(data_of([OneTrial()], model=options))
+    monkeypatch.setattr(sliding, "points_of", lambda *_: (points, None))
+    options = StretchOptions.model_validate({"slowest": "1 mrad/s"})
+    return model.identified(data_of([OneTrial()], model=options))
 
 
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,7 +60,7 @@ def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(point.own.unsteady in STICK_SLIP for point in stuck)
     identification = identified(monkeypatch, [*stuck, *steady])
     (left,) = identification.identified.left_out
-    assert left in friction_map.UNSTEADY
+    assert left in sliding.UNSTEADY
     assert dict(left.values) == {"count": 2, "total": 6, "why": STICK_SLIP.code}
     found = identification
     (told,) = (f for f in found.findings if f.quantity == "coulomb_torque_positive")

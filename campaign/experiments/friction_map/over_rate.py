@@ -8,12 +8,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.estimation.friction_line import friction_line, mean_of_stretches
+from campaign.estimation.friction_line import (
+    FrictionLine,
+    friction_line,
+    in_order_of_time,
+    mean_of_stretches,
+)
 from campaign.estimation.intervals import shifted_by
-from campaign.estimation.velocity_map import DirectionFit, direction_estimates, fit_direction
+from campaign.estimation.stribeck import stribeck
+from campaign.estimation.velocity_map import DirectionFit, band, direction_estimates, fit_direction
 from campaign.experiments.friction_map.stretches import DIRECTIONS, Point, places
+from campaign.result import Array
 from campaign.units import rate_here
 
+ANGLE = "angle"
+"""Part of an uncertainty: what was taken off the torque by the angle."""
 FEWEST_SPEEDS = 6
 """of a direction, up to which no Stribeck curve is fitted."""
 MEANINGS = {
@@ -51,7 +60,9 @@ class Quantity:
         )
 
 
-FRICTION = Quantity("torque", lambda point: point.own.torque, MEANINGS, ("Torque", "N m", "N m"))
+FRICTION = Quantity(
+    "torque", lambda point: point.own.torque, MEANINGS, ("Friction torque", "N m", "N m")
+)
 COEFFICIENT = Quantity(
     "coefficient",
     lambda point: point.coefficient,
@@ -76,14 +87,17 @@ class Mapped:
 
     quantity: Quantity
     fits: dict[str, DirectionFit] = field(default_factory=dict)
-    lines: dict[str, dict[str, Estimate]] = field(default_factory=dict)
+    lines: dict[str, FrictionLine] = field(default_factory=dict)
+    means: dict[str, Estimate] = field(default_factory=dict)
     doubts: dict[tuple[str, str], float] = field(default_factory=dict)
 
     @property
     def plain(self) -> dict[str, dict[str, Estimate]]:
         """Parameters by direction, with what scatters."""
         told = {name: direction_estimates(fit, fit.preferred) for name, fit in self.fits.items()}
-        return {name: (told | self.lines)[name] for name in DIRECTIONS if name in told | self.lines}
+        told |= {way: {e.name: e for e in (r.coulomb, r.viscous)} for way, r in self.lines.items()}
+        told |= {way: {mean.name: mean} for way, mean in self.means.items()}
+        return {way: told[way] for way in DIRECTIONS if way in told}
 
     @property
     def found(self) -> dict[str, dict[str, Estimate]]:
@@ -93,9 +107,24 @@ class Mapped:
             for way, estimates in self.plain.items()
         }
 
+    def curve(self, way: str, speed: Array) -> tuple[Array, Array, Array] | None:
+        """Fitted friction at `speed`, shape (n,), and both ends of its 95 % band; None of a mean.
+
+        All positive where friction acts against the motion.
+        """
+        if way in self.fits:
+            fit = self.fits[way]
+            middle = np.asarray(stribeck(speed, fit.fits[fit.preferred].values))
+            half = band(fit, fit.preferred, speed)
+            return middle, middle - half, middle + half
+        if way in self.lines:
+            line = self.lines[way]
+            return line.coulomb.value + line.viscous.value * speed, *line.band(speed)
+        return None
+
     def _doubted(self, way: str, name: str, one: Estimate) -> Estimate:
         doubt = self.doubts.get((way, name), 0.0)
-        return shifted_by(one, "angle", doubt) if doubt > 0 and one.has_interval else one
+        return shifted_by(one, ANGLE, doubt) if doubt > 0 and one.has_interval else one
 
 
 def with_doubts(mapped: Mapped, points: Sequence[Point]) -> Mapped:
@@ -134,18 +163,23 @@ def mapped_over_rate(quantity: Quantity, points: Sequence[Point], notes: list[st
             line = friction_line(speed, values)
         except ValueError as problem:
             mean = mean_of_stretches("friction", values, quantity.meanings["friction"][0])
-            mapped.lines[name] = {"friction": mean}
+            mapped.means[name] = mean
             at = f"{rate_here(float(speed.min()))} to {rate_here(float(speed.max()))}"
             notes.append(
                 f"In the {name} direction {problem}: friction is that from {at}, and what of it is "
                 "dry or viscous is not known."
             )
             continue
-        mapped.lines[name] = {each.name: each for each in (line.coulomb, line.viscous)}
+        mapped.lines[name] = line
         notes.append(
             f"In the {name} direction {count} speeds show a straight line and no "
             f"Stribeck curve; more than {FEWEST_SPEEDS} are needed."
         )
+        if in_order_of_time(speed):
+            notes.append(
+                f"In the {name} direction speeds go one way as time goes on: friction that changes "
+                "with time, as it warms up, looks like viscous friction."
+            )
     return mapped
 
 

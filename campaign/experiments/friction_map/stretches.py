@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydantic import Field
 
 from campaign.channels import (
     DRIVE_TORQUE,
@@ -21,18 +22,32 @@ from campaign.channels import (
 from campaign.estimate import Estimate
 from campaign.estimation.over_a_turn import OverATurn, over_a_turn
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
-from campaign.estimation.steady_stretches import steady_stretches
+from campaign.estimation.steady_stretches import SHORTEST_TIME, steady_stretches
 from campaign.experiments.interface import TrialData
+from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Array
+from campaign.units import AngularRate, Time
 
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
+ANY_NAME = "motion"
+"""Kind of trials whose windows are stretches whatever their names."""
 FEWEST = 20
 """samples of a stretch that are not lost."""
 LOADS_ALIKE = 1.05
 """Largest over smallest normal load up to which all stretches had one."""
 ONE_SPEED = 0.02
 """Share by which speeds of one place may differ, but for what a loop makes of them."""
+
+
+class StretchOptions(Options):
+    """How steady stretches are found."""
+
+    shortest: Time = Field(default=SHORTEST_TIME, gt=0)
+    """Shortest steady stretch that is read, where a trial names no windows."""
+    slowest: AngularRate | None = Field(default=None, ge=0)
+    """Rate up to which the axis counts as standing still; absent: 3 % of the fastest of its trial.
+    A sweep over decades of speed in one trial needs less."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,8 @@ class Point:
     Attributes:
         load: normal load times its arm (N m; N of a linear axis); NaN where nobody recorded it, or
             a rotary axis has no radius.
+        normal_load: as recorded (N).
+        first, last: times between which it lies (s).
         doubts: what was taken off may be off by (N m, 1 sigma), one part after the other, each
             shared by all points.
     """
@@ -50,6 +67,9 @@ class Point:
     own: SteadySliding
     load: float = math.nan
     doubts: tuple[float, ...] = ()
+    normal_load: float = math.nan
+    first: float = math.nan
+    last: float = math.nan
 
     def off_by(self, part: int) -> Point:
         """As it would be if one of `doubts` were so."""
@@ -98,7 +118,8 @@ class Stretch:
     rate: Array
     torque: Array
     angle: Array | None
-    load: float
+    normal_load: float
+    arm: float
     inertia: float | None
 
     def point(self, held: OverATurn | None) -> Point:
@@ -110,7 +131,10 @@ class Stretch:
             angle = np.unwrap(angle)
         # A rate relative to the hull may be made of an encoder's counts.
         own = steady_sliding(self.time, self.rate, torque, angle, self.inertia, own_sensor=False)
-        return Point(self.trial, own, self.load, doubts)
+        pressed = abs(self.normal_load) * self.arm
+        load = pressed if pressed > 0 else math.nan
+        first, last = float(self.time[0]), float(self.time[-1])
+        return Point(self.trial, own, load, doubts, self.normal_load, first, last)
 
 
 def points_of(
@@ -174,11 +198,12 @@ def _stretches(
     load = recording[NORMAL_LOAD] if NORMAL_LOAD in recording.channels else None
     angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
     radius = trial.trial.options.get("radius")
-    arm = 1.0 if bench.is_linear else radius if isinstance(radius, float | int) else None
+    arm = 1.0 if bench.is_linear else radius if isinstance(radius, float | int) else math.nan
     # A sensor in the joint is not told what accelerates the load.
     inertia = 0.0 if force == JOINT_TORQUE else bench.axis.inertia
     per_second = trial.trial.task.sample_rate
-    named = [w for w in trial.trial.windows if w.name in DIRECTIONS]
+    any_name = trial.trial.kind == ANY_NAME
+    named = [w for w in trial.trial.windows if any_name or w.name in DIRECTIONS]
     stretches = [(round(w.start * per_second), round(w.stop * per_second)) for w in named]
     if not stretches:
         left = torque if held is None or angle is None else torque - held.at(angle)
@@ -191,16 +216,14 @@ def _stretches(
         there = np.flatnonzero(good) + first
         if len(there) < FEWEST:
             continue
-        pressed = math.nan
-        if load is not None and arm is not None:
-            pressed = abs(float(np.nanmean(load[there]))) * arm
         yield Stretch(
             trial.trial.number,
             recording.time[there],
             rate[there],
             torque[there],
             None if angle is None else angle[there],
-            pressed if pressed > 0 else math.nan,
+            math.nan if load is None else float(np.nanmean(load[there])),
+            arm,
             inertia,
         )
 

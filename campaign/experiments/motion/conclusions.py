@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.estimate import Estimate
+from campaign.experiments.friction_map.sliding_shown import sliding_conclusions
+from campaign.experiments.friction_map.stretches import DIRECTIONS
 from campaign.experiments.motion.account import Motion
 from campaign.experiments.shared.conclusion_parts import (
     Part,
@@ -19,7 +21,7 @@ from campaign.result import Amount, Conclusion, Factor
 
 def is_surely_something(estimate: Estimate) -> bool:
     """Whether an interval lies on one side of zero."""
-    low, high = estimate.low, estimate.high
+    low, high = estimate.combined
     return low is not None and high is not None and (low > 0 or high < 0)
 
 
@@ -47,33 +49,21 @@ def _named(motion: Motion) -> str:
 
 def _of_one(motion: Motion, several: bool) -> Iterator[Conclusion]:
     who = f"{_named(motion)}: " if several else ""
-    for direction, line in motion.lines.items():
-        yield conclusion(
-            f"{who}in the {direction} direction Coulomb friction is ",
-            Amount(line.reported["coulomb_torque"], "N m"),
-            " and viscous friction ",
-            Amount(line.reported["viscous_friction"], "N m s/rad"),
-            f", from {count(line.stretches, 'steady stretch', 'steady stretches')}",
-        )
-    if motion.levels:
-        told: list[tuple[Part, ...]] = [
-            (Amount(level, "N m"), f" in the {direction} direction")
-            for direction, level in motion.levels.items()
-        ]
-        yield conclusion(f"{who}friction at the speeds there are is ", listed(told))
+    yield from sliding_conclusions(motion.sliding.found, who)
     if motion.coefficient is not None:
         yield conclusion(
             f"{who}friction over normal load is ",
             Amount(motion.coefficient),
-            f", over {count(len(motion.stretches), 'steady stretch', 'steady stretches')}",
+            f", over {count(len(motion.sliding.points), 'steady stretch', 'steady stretches')}",
         )
-    if len(motion.lines) == 2:
-        positive, negative = (motion.lines[name] for name in ("positive", "negative"))
+    if len(motion.coulomb) == 2:
+        positive, negative = (motion.sliding.found[way] for way in DIRECTIONS)
         compared: list[tuple[Part, ...]] = []
-        for name, one, other in (
-            ("Coulomb friction ", negative.coulomb, positive.coulomb),
-            ("viscous friction ", negative.viscous, positive.viscous),
+        for name, quantity in (
+            ("Coulomb friction ", "coulomb_torque"),
+            ("viscous friction ", "viscous_friction"),
         ):
+            one, other = negative[quantity], positive[quantity]
             if determined(one) and determined(other) and min(one.value, other.value) > 0:
                 compared.append((name, Factor(ratio_of(one, other, of_same_trials=True))))
         constant = motion.constant
@@ -97,11 +87,11 @@ def _of_one(motion: Motion, several: bool) -> Iterator[Conclusion]:
             Amount(peak, "mrad"),
             " at most",
         )
-    if not motion.lines and not motion.levels:
+    if not motion.sliding.parameters:
         top = motion.found["top_rate"]
         yield conclusion(
             f"{who}the axis moves at up to ",
             Amount(top, "deg/s"),
             "; friction over rate does not follow from ",
-            count(len(motion.stretches), "steady stretch", "steady stretches"),
+            count(len(motion.sliding.points), "steady stretch", "steady stretches"),
         )

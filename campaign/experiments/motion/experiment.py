@@ -8,7 +8,6 @@ claimed of the rest of the motion but what it was.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -22,29 +21,21 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.estimate import Estimate
-from campaign.estimation.steady_sliding import steady_sliding
-from campaign.estimation.steady_stretches import FEWEST, SHORTEST_TIME, steady_stretches
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.friction_map.sliding_shown import stretch_table
+from campaign.experiments.friction_map.stretches import StretchOptions, force_of
+from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.motion.account import account_of
 from campaign.experiments.motion.conclusions import motion_conclusions
 from campaign.experiments.motion.figures import friction_figure, motion_figure
-from campaign.experiments.motion.tables import (
-    friction_table,
-    line_findings,
-    line_table,
-    summary_table,
-)
+from campaign.experiments.motion.tables import line_table, motion_findings, summary_table
 from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
 from campaign.experiments.shared.recorded_motion import nothing_to_plan
-from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
-from campaign.result import Result
-from campaign.trial import Offered, Task, Trial, TrialRequest
-from campaign.units import Length, Time
+from campaign.result import Array, Result
+from campaign.trial import Offered, Task, TrialRequest
+from campaign.units import Length
 
-MOST_STRETCHES = 400
-"""of one recording that are looked at; of more, as many evenly over all of it."""
 CAN_USE = {
     RELATIVE_ANGLE: "position over time",
     REFERENCE: "tracking error",
@@ -56,11 +47,9 @@ MOST_SAMPLES = 10_000_000
 """of a recording that is looked at in one: at 1 kHz some three hours."""
 
 
-class MotionOptions(Options):
+class MotionOptions(StretchOptions):
     """Options of a recorded motion."""
 
-    shortest: Time = Field(default=SHORTEST_TIME, gt=0)
-    """Shortest steady stretch that friction is read from, where no windows are named."""
     radius: Length | None = Field(default=None, gt=0)
     """At which a normal load rubs, of an axis that turns: for friction over normal load."""
 
@@ -81,64 +70,19 @@ def _found(options: MotionOptions, bench: Bench, offered: Offered) -> Iterator[T
     )
 
 
-def force_of(recording: Recording) -> str:
-    """The channel that friction is read from: the joint's own, or else the drive's."""
-    return JOINT_TORQUE if JOINT_TORQUE in recording.channels else DRIVE_TORQUE
-
-
 def _measure(data: TrialData) -> Sequence[Estimate]:
-    """Extremes of the motion, and rate and friction torque of each steady stretch of it."""
-    options = MotionOptions.model_validate(data.trial.options, context={"si": True})
+    """Extremes of the motion."""
     recording = data.recording()
-    force = force_of(recording)
-    # A sensor in the joint is not told what accelerates the load.
-    inertia = 0.0 if force == JOINT_TORQUE else bench_of(data.trial).axis.inertia
-    channels = [RELATIVE_RATE, force]
-    channels += [NORMAL_LOAD] if NORMAL_LOAD in recording.channels else []
-    samples = np.array([recording[name] for name in channels])
-    lost = ~np.isfinite(samples).all(axis=0)
-    every = _stretches_of(data.trial, recording, options)
-    chosen = np.unique(np.linspace(0, len(every) - 1, MOST_STRETCHES).astype(int))
-    found = [
-        *_extremes(recording),
+    channels = [RELATIVE_RATE, force_of(data)]
+    lost = ~np.isfinite([recording[name] for name in channels]).all(axis=0)
+    return [
+        *_extremes(recording, recording[force_of(data)]),
         Estimate("lost", float(lost.sum()), "", kind="count", reason=COUNTED()),
-        Estimate("stretches_found", float(len(every)), "", kind="count", reason=COUNTED()),
     ]
-    number = 0
-    for first, stop in (every[place] for place in chosen if every):
-        there = np.flatnonzero(~lost[first:stop]) + first
-        if len(there) < FEWEST:
-            continue
-        number += 1
-        rate, torque, *load = samples[:, there]
-        own = steady_sliding(recording.time[there], rate, torque, None, inertia)
-        found += [
-            replace(own.rate, name=f"rate_{number}"),
-            replace(own.torque, name=f"friction_torque_{number}"),
-            _plain(f"first_{number}", float(recording.time[there[0]]), "s"),
-            _plain(f"last_{number}", float(recording.time[there[-1]]), "s"),
-        ]
-        found += [_plain(f"normal_load_{number}", float(np.mean(each)), "N") for each in load]
-    found.append(Estimate("stretches", float(number), "", kind="count", reason=COUNTED()))
-    return found
 
 
-def _stretches_of(
-    trial: Trial, recording: Recording, options: MotionOptions
-) -> list[tuple[int, int]]:
-    """Samples [first, stop) of the windows that somebody has named, or of what is steady."""
-    rate = trial.task.sample_rate
-    if trial.windows:
-        return [(round(each.start * rate), round(each.stop * rate)) for each in trial.windows]
-    torque = recording[force_of(recording)]
-    steady = steady_stretches(
-        recording[RELATIVE_RATE], rate, torque, options.shortest, driven=False
-    )
-    return [(each.first, each.stop) for each in steady]
-
-
-def _extremes(recording: Recording) -> Iterator[Estimate]:
-    rate, torque = recording[RELATIVE_RATE], recording[force_of(recording)]
+def _extremes(recording: Recording, torque: Array) -> Iterator[Estimate]:
+    rate = recording[RELATIVE_RATE]
     yield _plain("duration", float(recording.time[-1]), "s")
     yield _plain("top_rate", float(np.nanmax(np.abs(rate))), "rad/s")
     yield _plain("peak_torque", float(np.nanmax(np.abs(torque))), "N m")
@@ -158,12 +102,14 @@ def _plain(name: str, value: float, unit: str) -> Estimate:
 
 def _analyse(data: TestData) -> Result:
     notes = list(failures_note(data))
-    radius = MotionOptions.model_validate(
-        {k: v for k, v in data.options.items() if k in MotionOptions.model_fields},
-        context={"si": True},
-    ).radius
     motions = [
-        account_of(item, metrics(item, _measure), radius, notes) for item in data.completed()
+        account_of(
+            item,
+            metrics(item, _measure),
+            MotionOptions.model_validate(item.trial.options, context={"si": True}),
+            notes,
+        )
+        for item in data.completed()
     ]
     if not motions:
         return Result(notes=tuple(notes))
@@ -173,15 +119,16 @@ def _analyse(data: TestData) -> Result:
     for number, motion in enumerate(motions, start=1):
         suffix = f"-{number}" if several else ""
         figures.append(motion_figure(motion, suffix))
-        if motion.stretches:
+        if motion.sliding.maps:
             figures.append(friction_figure(motion, suffix))
-            tables.append(friction_table(motion, suffix))
-    if any(motion.lines for motion in motions):
+        if motion.sliding.points or motion.sliding.left:
+            tables.append(stretch_table(motion.sliding, suffix, motion.data.trial.label))
+    if any(motion.coulomb for motion in motions):
         tables.insert(1, line_table(motions))
     return Result(
         tuple(tables),
         tuple(figures),
-        tuple(finding for motion in motions for finding in line_findings(motion)),
+        tuple(finding for motion in motions for finding in motion_findings(motion)),
         tuple(dict.fromkeys(notes)),
         motion_conclusions(motions),
         telling=next((each.key for each in figures if each.key.startswith("friction")), ""),

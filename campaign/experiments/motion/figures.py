@@ -12,14 +12,17 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
+from campaign.experiments.friction_map.sliding_shown import (
+    coefficient_of,
+    rate_caption,
+    rate_panels,
+)
 from campaign.experiments.motion.account import Motion
 from campaign.experiments.shared.captions import amount, sentence
 from campaign.experiments.shared.conclusion_parts import count
-from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, ends_of
+from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 TIME = Axis("Time", "s", "s")
-FINE = 60
-"""Points of a line with its band."""
 
 
 def motion_figure(motion: Motion, suffix: str) -> Figure:
@@ -27,7 +30,7 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     recording = motion.data.recording()
     time = recording.time
     panels = []
-    marks = [Mark("", x=each.first, until=each.last) for each in motion.stretches]
+    marks = [Mark("", x=each.first, until=each.last) for each in motion.sliding.points]
     if RELATIVE_ANGLE in recording.channels:
         angle = [Curve(time, recording[RELATIVE_ANGLE], "measured", "measured")]
         if REFERENCE in recording.channels:
@@ -52,7 +55,8 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     if NORMAL_LOAD in recording.channels:
         load = Curve(time, recording[NORMAL_LOAD], "", "measured")
         panels.append(Panel(TIME, Axis("Normal load", "N", "N"), [load], "Normal load"))
-    steady = f"shaded: {_stretches(motion)}" if motion.stretches else "nowhere is it steady"
+    shown = count(len(marks), "steady stretch", "steady stretches")
+    steady = f"shaded: {shown}" if marks else "nowhere is it steady"
     top = amount(motion.found["top_rate"].value, "rad/s", "deg/s")
     return Figure(
         key=f"motion{suffix}",
@@ -66,49 +70,13 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
 
 
 def friction_figure(motion: Motion, suffix: str) -> Figure:
-    """Friction of the steady stretches over their rate, both directions, with lines."""
-    curves: list[Curve] = []
-    against: list[Curve] = []
-    for direction, sign in (("positive", 1.0), ("negative", -1.0)):
-        own = [each for each in motion.stretches if each.direction == direction]
-        if not own:
-            continue
-        rate = np.array([each.rate.value for each in own])
-        label = f"{direction} direction"
-        curves.append(Curve.of(rate, [each.torque for each in own], label, direction))
-        ends = np.array([sorted(sign * e for e in ends_of(each.torque)) for each in own])
-        torque = sign * np.array([each.torque.value for each in own])
-        against.append(
-            Curve(sign * rate, torque, label, direction, "points", low=ends[:, 0], high=ends[:, 1])
-        )
-        line = motion.lines.get(direction)
-        if line is not None:
-            speed = np.linspace(float(np.abs(rate).min()), float(np.abs(rate).max()), FINE)
-            low, high = line.band(speed)
-            middle = line.coulomb.value + line.viscous.value * speed
-            edges = (low, high) if sign > 0 else (-high, -low)
-            curves.append(
-                Curve(sign * speed, sign * middle, "", direction, low=edges[0], high=edges[1])
-            )
-            against.append(Curve(speed, middle, "", direction, low=low, high=high))
-    panels = [
-        Panel(
-            Axis("Rate", "rad/s", "deg/s"),
-            Axis("Friction torque", "N m", "N m"),
-            curves,
-            "Friction of steady stretches",
-        ),
-        Panel(
-            Axis("Speed", "rad/s", "deg/s"),
-            Axis("Friction, in its direction", "N m", "N m"),
-            against,
-            "Both directions",
-        ),
-    ]
-    distances = zip(_distances(motion), motion.stretches, strict=True)
-    loaded = [(at, each.coefficient) for at, each in distances if each.coefficient is not None]
+    """Friction of the steady stretches over their rate, both directions, with what was fitted."""
+    sliding = motion.sliding
+    panels = [panel for each in sliding.maps for panel in rate_panels(sliding, each)]
+    distances = zip(_distances(motion), sliding.points, strict=True)
+    loaded = [(at, point) for at, point in distances if np.isfinite(point.load)]
     if loaded:
-        found = [ratio for _, ratio in loaded]
+        found = [coefficient_of(sliding, point) for _, point in loaded]
         at = np.array([distance for distance, _ in loaded])
         panels.append(
             Panel(
@@ -118,24 +86,16 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
                 "Friction over normal load",
             )
         )
-    lines = "Lines: Coulomb and viscous friction of each direction, with their 95 % band; " * bool(
-        motion.lines
-    )
     return Figure(
         key=f"friction{suffix}",
         title=f"Friction over rate of {motion.data.trial.label}",
-        caption=f"Mean torque of {_stretches(motion)} over the mean rate. {lines}bars: "
-        "95 % of each stretch alone, without what differs between them.",
-        alt="Friction torque over rate: a dot for each steady stretch, in both directions, and a "
-        "straight line through those of each.",
+        caption=rate_caption(sliding, sliding.maps[0]),
+        alt="Friction torque over rate: a dot for each steady stretch, in both directions, and "
+        "what was fitted to those of each.",
         panels=tuple(panels),
         across=2,
         trials=(motion.data.trial.number,),
     )
-
-
-def _stretches(motion: Motion) -> str:
-    return count(len(motion.stretches), "steady stretch", "steady stretches")
 
 
 def _distances(motion: Motion) -> list[float]:
@@ -145,5 +105,5 @@ def _distances(motion: Motion) -> list[float]:
     slid = np.concatenate(
         [[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(recording.time))]
     )
-    middles = [0.5 * (each.first + each.last) for each in motion.stretches]
+    middles = [0.5 * (each.first + each.last) for each in motion.sliding.points]
     return [float(np.interp(at, recording.time, slid)) for at in middles]

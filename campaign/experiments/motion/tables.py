@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
+from campaign.experiments.friction_map.over_rate import FEWEST_SPEEDS
 from campaign.experiments.motion.account import Motion
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table
 
 OF_ONE_RECORDING = Cause("describes one recording", "it describes one recording")
-MEAN_OF_STRETCH = Cause("mean of a stretch", "mean of the stretch")
 
 _SUMMARY = (
     Column("duration", "Duration", "s", "s", reason=OF_ONE_RECORDING()),
@@ -19,7 +20,6 @@ _SUMMARY = (
     Column("peak_torque", "Largest torque", "N m", "N m", reason=OF_ONE_RECORDING()),
     Column("rms_error", "Tracking error (RMS)", "rad", "mrad", reason=OF_ONE_RECORDING()),
     Column("peak_error", "Largest tracking error", "rad", "mrad", reason=OF_ONE_RECORDING()),
-    Column("stretches", "Steady stretches", exact=True),
 )
 
 
@@ -29,10 +29,8 @@ def summary_table(motions: Sequence[Motion]) -> Table:
     rows: list[dict[str, Cell]] = []
     for motion in motions:
         row: dict[str, Cell] = {"recording": motion.data.trial.number, **motion.place}
-        for column in columns:
-            known = motion.found.get(column.name)
-            exact = column.name == "stretches" and known is not None
-            row[column.name] = int(known.value) if exact and known is not None else known
+        row |= {column.name: motion.found.get(column.name) for column in columns}
+        row["stretches"] = len(motion.sliding.points)
         row["coefficient"] = motion.coefficient
         rows.append(row)
     loaded = any(motion.coefficient is not None for motion in motions)
@@ -43,6 +41,7 @@ def summary_table(motions: Sequence[Motion]) -> Table:
             Column("recording", "Trial", exact=True),
             *_places(motions),
             *columns,
+            Column("stretches", "Steady stretches", exact=True),
             *((Column("coefficient", "Friction coefficient"),) if loaded else ()),
         ),
         tuple(rows),
@@ -56,12 +55,12 @@ def line_table(motions: Sequence[Motion]) -> Table:
             "recording": motion.data.trial.number,
             **motion.place,
             "direction": direction,
-            "coulomb": line.reported["coulomb_torque"],
-            "viscous": line.reported["viscous_friction"],
-            "stretches": line.stretches,
+            "coulomb": coulomb,
+            "viscous": motion.sliding.found[direction]["viscous_friction"],
+            "stretches": motion.stretches(direction),
         }
         for motion in motions
-        for direction, line in motion.lines.items()
+        for direction, coulomb in motion.coulomb.items()
     ]
     return Table(
         "friction-lines",
@@ -75,56 +74,22 @@ def line_table(motions: Sequence[Motion]) -> Table:
             Column("stretches", "Stretches", exact=True),
         ),
         tuple(rows),
-        note="A straight line through the steady stretches of a direction; intervals are of their "
-        "scatter. Between and beyond the speeds there are, friction may be another.",
+        note="Of a straight line through the steady stretches of a direction, or of a Stribeck "
+        f"curve where there are more than {FEWEST_SPEEDS} speeds; intervals are of their scatter. "
+        "Between and beyond the speeds there are, friction may be another.",
     )
 
 
-def friction_table(motion: Motion, suffix: str) -> Table:
-    """Each steady stretch."""
-    loaded = any(each.load is not None for each in motion.stretches)
-    rows: list[dict[str, Cell]] = []
-    for number, each in enumerate(motion.stretches, start=1):
-        row: dict[str, Cell] = {
-            "stretch": number,
-            "first": each.first,
-            "last": each.last,
-            "rate": each.rate,
-            "torque": each.torque,
-        }
-        if each.load is not None:
-            row |= {"load": each.load, "coefficient": each.coefficient}
-        rows.append(row)
-    more = (
-        Column("load", "Normal load", "N", "N", reason=MEAN_OF_STRETCH()),
-        Column("coefficient", "Friction coefficient"),
-    )
-    return Table(
-        f"steady-stretches{suffix}",
-        f"Steady stretches of {motion.data.trial.label}",
-        (
-            Column("stretch", "Stretch", exact=True),
-            Column("first", "From", "s", "s", exact=True),
-            Column("last", "To", "s", "s", exact=True),
-            Column("rate", "Rate", "rad/s", "deg/s"),
-            Column("torque", "Friction torque", "N m", "N m"),
-            *(more if loaded else ()),
-        ),
-        tuple(rows),
-    )
-
-
-def line_findings(motion: Motion) -> Iterator[Finding]:
-    """Coulomb and viscous friction of each direction, under the recording's conditions."""
-    for direction, line in motion.lines.items():
-        told = {**motion.place, "direction": direction, "recording": motion.data.trial.number}
-        yield from (Finding.of(each, told) for each in line.reported.values())
-    told = {**motion.place, "recording": motion.data.trial.number}
-    for direction, level in motion.levels.items():
-        yield Finding.of(level, {**told, "direction": direction})
+def motion_findings(motion: Motion) -> Iterator[Finding]:
+    """Friction of each direction, under the recording's conditions."""
+    place = {**motion.place, "recording": motion.data.trial.number}
+    for direction, found in motion.sliding.found.items():
+        for name, one in found.items():
+            known = replace(one, name="friction_torque") if name == "friction" else one
+            yield Finding.of(known, {**place, "direction": direction})
     for estimate in (motion.constant, motion.coefficient):
         if estimate is not None:
-            yield Finding.of(estimate, told)
+            yield Finding.of(estimate, place)
 
 
 def _places(motions: Sequence[Motion]) -> Iterator[Column]:
