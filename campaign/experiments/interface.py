@@ -307,8 +307,8 @@ def _measurable(
     for item in data.trials:
         estimates = item.estimates
         try:
-            own = item.trial.kind == experiment.name and item.trial.number in completed
-            if experiment.measure and own and not estimates:
+            own = data.model is None or item.trial.kind == experiment.name
+            if experiment.measure and own and not estimates and item.trial.number in completed:
                 estimates = tuple(experiment.measure(item))
         except ArchiveError:
             raise
