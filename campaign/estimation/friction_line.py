@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.estimation.autocorrelated import errors_of
-from campaign.estimation.gate import admitted_together, mattering
 from campaign.estimation.intervals import SINGLE_VALUE, with_error
 
 Array = NDArray[np.float64]
@@ -37,26 +36,13 @@ class FrictionLine:
         coulomb: extrapolated to standstill (N m), as fitted.
         viscous: slope (N m s/rad), as fitted.
         covariance: of the two, shape (2, 2).
-        stretches: how many it is of.
         freedom: of their scatter: less, where neighbours are alike.
-        largest, fastest: torque (N m) and speed (rad/s) of the stretches.
     """
 
     coulomb: Estimate
     viscous: Estimate
     covariance: Array
-    stretches: int
     freedom: float
-    largest: float
-    fastest: float
-
-    @property
-    def reported(self) -> dict[str, Estimate]:
-        """Both numbers by name, as they may be reported."""
-        found = {each.name: each for each in (self.coulomb, self.viscous)}
-        return admitted_together(
-            found, {name: mattering(name, self.largest, self.fastest) for name in found}
-        )
 
     def band(self, speed: Array) -> tuple[Array, Array]:
         """Low and high of the line's 95 % band at speeds, each shape (n,)."""
@@ -92,8 +78,7 @@ def friction_line(speed: Array, torque: Array) -> FrictionLine:
             ("coulomb_torque", "viscous_friction"), ("N m", "N m s/rad"), found, errors, strict=True
         )
     )
-    largest, fastest = float(np.abs(torque).max()), float(speed.max())
-    return FrictionLine(coulomb, viscous, covariance, len(speed), freedom, largest, fastest)
+    return FrictionLine(coulomb, viscous, covariance, freedom)
 
 
 def mean_of_stretches(name: str, values: Array, unit: str) -> Estimate:

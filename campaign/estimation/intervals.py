@@ -179,6 +179,25 @@ def ratio(name: str, one: Estimate, other: Estimate, unit: str = "", **more: Any
     return exponential(told, unit)
 
 
+def multiplied(estimate: Estimate, factor: float) -> Estimate:
+    """A number times a factor that is known exactly, with its interval; name and unit stay."""
+
+    def times(value: float | None, by: float = abs(factor)) -> float | None:
+        return None if value is None else value * by
+
+    ends = times(estimate.low, factor), times(estimate.high, factor)
+    low, high = ends if factor > 0 else ends[::-1]
+    parts = tuple(
+        replace(each, standard_uncertainty=times(each.standard_uncertainty))
+        for each in estimate.systematic
+    )
+    error = times(estimate.standard_error)
+    value = estimate.value * factor
+    return replace(
+        estimate, value=value, low=low, high=high, standard_error=error, systematic=parts
+    )
+
+
 def welch(*parts: tuple[float, float | None]) -> float:
     """Degrees of freedom of a sum of independent errors, each (standard error, freedom).
 

@@ -1,4 +1,4 @@
-"""Intervals that were found in the logarithm."""
+"""Intervals that were found in the logarithm, or that a factor multiplies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ import math
 import pytest
 
 from campaign.estimate import Origin
-from campaign.estimation.intervals import SPANS_DECADES, WIDEST, exponential, with_error
+from campaign.estimation.intervals import (
+    SPANS_DECADES,
+    WIDEST,
+    exponential,
+    multiplied,
+    shifted_by,
+    with_error,
+)
 
 NORMAL = 1.959964  # 97.5 % of the normal distribution: any table
 
@@ -32,3 +39,14 @@ def test_an_interval_of_decades_is_none() -> None:
     assert below.high / below.low == pytest.approx(1e3, rel=0.02)
     assert not above.has_interval
     assert above.value == pytest.approx(math.exp(2.0))
+
+
+@pytest.mark.parametrize("factor", [0.5, -2.0])
+def test_the_interval_and_all_parts_go_with_it(factor: float) -> None:
+    one = shifted_by(with_error("torque", 3.0, "N m", 0.1, 10.0, ""), "constant", 0.06)
+    own = multiplied(shifted_by(one, "inertia", None), factor)
+    assert own.value == 3.0 * factor
+    assert own.standard_error == 0.1 * abs(factor)
+    assert sorted((own.low, own.high)) == [own.low, own.high]
+    assert {own.low, own.high} == {one.low * factor, one.high * factor}
+    assert [each.standard_uncertainty for each in own.systematic] == [0.06 * abs(factor), None]

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.estimate import Origin
 from campaign.estimation.friction_line import friction_line, mean_of_stretches
-from campaign.estimation.gate import TOO_WIDE
 from campaign.estimation.steady_stretches import steady_stretches
 
 
@@ -126,16 +124,3 @@ def test_the_mean_of_stretches_that_are_alike_holds_the_truth_nearly_as_often(
         found = mean_of_stretches("friction", 5.0 + values, "")
         held += found.low <= 5.0 <= found.high
     assert held / runs >= least
-
-
-def test_a_line_is_reported_by_the_gate_and_drawn_as_it_was_fitted():
-    """A slope of one stretch too many: known neither against itself nor against the torque."""
-    speed = np.array([0.1, 0.3, 0.6, 1.0])
-    line = friction_line(speed, np.array([20.0, 24.0, 15.0, 21.0]))
-    assert line.viscous.origin is Origin.MEASURED
-    assert line.reported["viscous_friction"].reason in TOO_WIDE
-    many = np.tile(speed, 6)
-    scatter = 0.1 * np.random.default_rng(1).standard_normal(24)
-    steady = friction_line(many, 20.0 + 0.02 * many + scatter)
-    assert steady.reported["viscous_friction"].kind == "at most"
-    assert steady.viscous.kind == "number"

@@ -15,6 +15,7 @@ import pytest
 import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
+from campaign.estimation.gate import TOO_WIDE
 from campaign.experiments.interface import TestData, measured, result_of
 from campaign.experiments.motion.experiment import EXPERIMENT
 from campaign.result import Result
@@ -199,6 +200,22 @@ def test_of_many_speeds_there_is_a_stribeck_curve(tmp_path: Path):
         row = found(run, quantity, "negative")
         assert row.low <= true <= row.high
         assert row.high - row.low < 0.1
+
+
+def test_a_slope_of_one_stretch_too_many_is_not_determined(tmp_path: Path):
+    """Known neither against itself nor against the torque; it is drawn all the same."""
+    levels = {0.1: 20.0, 0.3: 24.0, 0.6: 15.0, 1.0: 21.0}
+    each = [strokes([speed]) for speed in levels]
+    rate = np.concatenate(each)
+    level = np.concatenate(
+        [np.full(len(own), levels[v]) for own, v in zip(each, levels, strict=True)]
+    )
+    noise = 0.02 * np.random.default_rng(8).normal(size=len(rate))
+    run = recorded(tmp_path, rate, level * np.sign(rate) + noise)
+    (told,) = (f.known for f in result(run).findings if f.quantity == "viscous_friction")
+    assert told.reason in TOO_WIDE
+    (figure,) = (f for f in result(run).figures if f.key == "friction")
+    assert len(figure.panels[0].curves) == 2
 
 
 MEANS = {"friction": "friction_torque"}

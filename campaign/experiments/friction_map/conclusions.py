@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.estimate import Estimate
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.conclusion_parts import (
     Parts,
     Settings,
@@ -25,7 +26,6 @@ NAMES = {
     quantity: quantity_words(quantity)
     for quantity in (COULOMB, STATIC, "stribeck_velocity", "viscous_friction")
 }
-DIRECTIONS = ("positive", "negative")
 OF_FIT = ("direction", "exponent")
 
 

@@ -13,14 +13,14 @@ from campaign.estimate import Estimate
 from campaign.experiments.friction_map.conclusions import map_conclusions
 from campaign.experiments.friction_map.map_result import one_map
 from campaign.experiments.friction_map.over_rate import FRICTION, MEANINGS
-from campaign.experiments.friction_map.runs import REQUIRED
+from campaign.experiments.friction_map.runs import DIRECTIONS, REQUIRED
 from campaign.experiments.friction_map.sliding import KEYS, Named, sliding_of
 from campaign.experiments.friction_map.sliding_shown import (
     sliding_conclusions,
     sliding_figure,
     stretch_table,
 )
-from campaign.experiments.friction_map.stretches import DIRECTIONS, StretchOptions
+from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.interface import EMPTY, Model, TestData, TrialData
 from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.parameter import Identified, Parameter
@@ -68,7 +68,6 @@ def _of_stretches(data: TestData) -> Result:
         raise ValueError("; ".join(["nowhere does the axis slide steadily", *lost]))
     if not sliding.parameters:
         raise ValueError("; ".join(note.rstrip(".") for note in sliding.notes))
-    first = sliding.maps[0]
     return Result(
         tables=(stretch_table(sliding),),
         figures=tuple(sliding_figure(sliding, each) for each in sliding.maps),
@@ -77,9 +76,7 @@ def _of_stretches(data: TestData) -> Result:
         conclusions=tuple(sliding_conclusions(sliding.found)),
         identified=Identified(
             sliding.parameters,
-            settings=_settings(first.found, sliding.parameters)
-            if first.quantity is FRICTION
-            else {},
+            settings=_settings(sliding.maps[0].found, sliding.parameters),
             left_out=sliding.left_out,
         ),
     )

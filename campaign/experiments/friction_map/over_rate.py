@@ -17,7 +17,8 @@ from campaign.estimation.friction_line import (
 from campaign.estimation.intervals import shifted_by
 from campaign.estimation.stribeck import stribeck
 from campaign.estimation.velocity_map import DirectionFit, band, direction_estimates, fit_direction
-from campaign.experiments.friction_map.stretches import DIRECTIONS, Point, places
+from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.friction_map.stretches import Point, places
 from campaign.result import Array
 from campaign.units import rate_here
 

@@ -25,8 +25,8 @@ from campaign.experiments.friction_map.over_rate import (
     mapped_over_rate,
     with_doubts,
 )
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.stretches import (
-    DIRECTIONS,
     Point,
     StretchOptions,
     force_of,

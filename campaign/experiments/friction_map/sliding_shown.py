@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import multiplied
 from campaign.experiments.friction_map.over_rate import COEFFICIENT, FRICTION, Mapped
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.sliding import Sliding, scaled
-from campaign.experiments.friction_map.stretches import DIRECTIONS, Point
+from campaign.experiments.friction_map.stretches import Point
 from campaign.experiments.shared.conclusion_parts import count
 from campaign.reason import Cause
 from campaign.result import (
@@ -35,11 +36,7 @@ SPEED = Axis("Speed", "rad/s", "deg/s")
 
 def coefficient_of(sliding: Sliding, point: Point) -> Estimate:
     """Friction over normal load, positive against the motion, with what no stretch shows."""
-    one = point.coefficient
-    if point.sign < 0:
-        low, high = (None if end is None else -end for end in (one.high, one.low))
-        one = replace(one, value=-one.value, low=low, high=high)
-    return scaled(one, COEFFICIENT, sliding.first)
+    return scaled(multiplied(point.coefficient, point.sign), COEFFICIENT, sliding.first)
 
 
 def stretch_table(sliding: Sliding, suffix: str = "", of: str = "") -> Table:

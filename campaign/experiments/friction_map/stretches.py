@@ -20,16 +20,17 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.estimate import Estimate
+from campaign.estimation.intervals import multiplied
 from campaign.estimation.over_a_turn import OverATurn, over_a_turn
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
 from campaign.estimation.steady_stretches import SHORTEST_TIME, steady_stretches
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.interface import TrialData
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Array
 from campaign.units import AngularRate, Time
 
-DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 ANY_NAME = "motion"
 """Kind of trials whose windows are stretches whatever their names."""
 FEWEST = 20
@@ -91,17 +92,7 @@ class Point:
     @property
     def coefficient(self) -> Estimate:
         """Friction over normal load, with the sign of the friction; the stretch's own scatter."""
-        torque, scale = self.own.torque, 1.0 / self.load
-        error = torque.standard_error
-        return replace(
-            torque,
-            name="coefficient",
-            unit="",
-            value=torque.value * scale,
-            low=None if torque.low is None else torque.low * scale,
-            high=None if torque.high is None else torque.high * scale,
-            standard_error=None if error is None else error * scale,
-        )
+        return replace(multiplied(self.own.torque, 1.0 / self.load), name="coefficient", unit="")
 
 
 def force_of(trial: TrialData) -> str:

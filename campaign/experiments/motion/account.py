@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.estimation.friction_line import mean_of_stretches
 from campaign.estimation.gate import admitted
-from campaign.estimation.intervals import difference, shifted_by
+from campaign.estimation.intervals import difference, multiplied, shifted_by
 from campaign.experiments.friction_map.over_rate import ANGLE, COEFFICIENT, FRICTION
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.sliding import Sliding, scaled, sliding_of
-from campaign.experiments.friction_map.stretches import DIRECTIONS, StretchOptions
+from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import conditions
 from campaign.result import Value
@@ -41,10 +42,6 @@ class Motion:
     constant: Estimate | None
     coefficient: Estimate | None
 
-    def stretches(self, way: str) -> int:
-        """How many there are of a direction."""
-        return sum(point.sign == DIRECTIONS[way] for point in self.sliding.points)
-
     @property
     def coulomb(self) -> dict[str, Estimate]:
         """Coulomb friction by direction, where it is known apart from viscous friction."""
@@ -62,7 +59,9 @@ def account_of(
     notes += (f"{label}: {reason}." for reason in sliding.left_out if sliding.points)
     notes += _doubts(label, found, sliding)
     constant = _constant(sliding)
-    if constant is not None and _is_large(constant, sliding):
+    dry = [each.value for each in _coulomb_fitted(sliding).values()]
+    large = constant is not None and abs(constant.value) > OFFSET * abs(float(np.mean(dry)))
+    if constant is not None and large and is_surely_something(constant):
         notes.append(
             f"{label}: Coulomb friction of the two directions differs so much that something else "
             "acts on the axis as well, such as gravity or an offset of the sensor: it is in both "
@@ -91,18 +90,7 @@ def _constant(sliding: Sliding) -> Estimate | None:
     found = _coulomb_fitted(sliding)
     if len(found) < 2:
         return None
-    apart = difference(WHAT_HOLDS, found["positive"], found["negative"], "N m")
-
-    def half(value: float | None) -> float | None:
-        return None if value is None else 0.5 * value
-
-    told = replace(
-        apart,
-        value=0.5 * apart.value,
-        low=half(apart.low),
-        high=half(apart.high),
-        standard_error=half(apart.standard_error),
-    )
+    told = multiplied(difference(WHAT_HOLDS, found["positive"], found["negative"], "N m"), 0.5)
     # What was taken off by the angle has the same sign in both directions, as a constant has.
     doubt = 0.5 * sum(
         sliding.maps[0].doubts.get((way, "coulomb_torque"), 0.0) for way in DIRECTIONS
@@ -110,11 +98,10 @@ def _constant(sliding: Sliding) -> Estimate | None:
     return shifted_by(told, ANGLE, doubt) if doubt else told
 
 
-def _is_large(constant: Estimate, sliding: Sliding) -> bool:
-    mean = float(np.mean([each.value for each in _coulomb_fitted(sliding).values()]))
-    low, high = constant.combined
-    surely = low is not None and high is not None and (low > 0 or high < 0)
-    return surely and abs(constant.value) > OFFSET * abs(mean)
+def is_surely_something(estimate: Estimate) -> bool:
+    """Whether an interval lies on one side of zero."""
+    low, high = estimate.combined
+    return low is not None and high is not None and (low > 0 or high < 0)
 
 
 def _doubts(label: str, found: Mapping[str, Estimate], sliding: Sliding) -> Iterator[str]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.estimate import Estimate
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.sliding_shown import sliding_conclusions
-from campaign.experiments.friction_map.stretches import DIRECTIONS
-from campaign.experiments.motion.account import Motion
+from campaign.experiments.motion.account import Motion, is_surely_something
 from campaign.experiments.shared.conclusion_parts import (
     Part,
     conclusion,
@@ -17,13 +16,6 @@ from campaign.experiments.shared.conclusion_parts import (
     ratio_of,
 )
 from campaign.result import Amount, Conclusion, Factor
-
-
-def is_surely_something(estimate: Estimate) -> bool:
-    """Whether an interval lies on one side of zero."""
-    low, high = estimate.combined
-    return low is not None and high is not None and (low > 0 or high < 0)
-
 
 TOLD = 4
 """recordings that are told one by one."""

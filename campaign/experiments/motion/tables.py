@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from campaign.experiments.friction_map.over_rate import FEWEST_SPEEDS
+from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.motion.account import Motion
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table
@@ -57,7 +58,9 @@ def line_table(motions: Sequence[Motion]) -> Table:
             "direction": direction,
             "coulomb": coulomb,
             "viscous": motion.sliding.found[direction]["viscous_friction"],
-            "stretches": motion.stretches(direction),
+            "stretches": sum(
+                point.sign == DIRECTIONS[direction] for point in motion.sliding.points
+            ),
         }
         for motion in motions
         for direction, coulomb in motion.coulomb.items()
