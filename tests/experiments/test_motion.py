@@ -272,6 +272,9 @@ def test_friction_over_normal_load_of_a_linear_axis(tmp_path: Path):
     run = recorded(tmp_path, rate, torque, kind="linear", columns=columns, extra={"n": load})
     row = found(run, "friction_coefficient")
     assert row.value == pytest.approx(0.12, rel=0.01)
+    # Of both directions it is positive where friction acts against the motion.
+    table = next(t for t in result(run).tables if t.key.startswith("steady"))
+    assert all(row["coefficient"].value == pytest.approx(0.12, rel=0.02) for row in table.rows)
     # A load that is known to 10 % makes a coefficient that is no better known.
     assert row.high - row.low > 2 * 0.15 * 0.12
 
