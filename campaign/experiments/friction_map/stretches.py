@@ -154,8 +154,9 @@ def slower(
     count = 0
     for trial in trials:
         own = [each.speed for each in found if each.trial == trial.trial.number]
-        every = (each.point(None) for each in _stretches(trial, bench, shortest, 0.0, None))
-        count += sum(0.0 < each.speed < 0.5 * min(own, default=0.0) for each in every)
+        every = _stretches(trial, bench, shortest, 0.0, None)
+        speeds = (abs(float(np.mean(each.rate))) for each in every)
+        count += sum(0.0 < speed < 0.5 * min(own, default=0.0) for speed in speeds)
     return count
 
 
