@@ -46,6 +46,19 @@ def start_preloading(preload: Iterable[str]) -> None:
     forkserver.ensure_running()
 
 
+def new_pool(
+    count: int, context: BaseContext, initializer: Callable[..., object], arguments: tuple[Any, ...]
+) -> ProcessPoolExecutor:
+    """A pool whose processes all start with the first call.
+
+    One that starts while another dies upsets the pool: CPython 3.11 raises `OSError: handle is
+    closed`, or a thread of the pool ends, and its futures are never told.
+    """
+    pool = ProcessPoolExecutor(count, context, initializer, arguments)
+    pool._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]  # noqa: SLF001
+    return pool
+
+
 @contextmanager
 def process_pool(
     count: int, preload: Iterable[str], begin: Callable[[Any], object], told: object
@@ -54,7 +67,7 @@ def process_pool(
     others = set(multiprocessing.active_children())
     # Pickled once for all of them.
     handed = pickle.dumps((begin, told), pickle.HIGHEST_PROTOCOL)
-    pool = ProcessPoolExecutor(count, process_context(preload), _begin, (handed,))
+    pool = new_pool(count, process_context(preload), _begin, (handed,))
     try:
         yield pool
     except BaseException:  # Ctrl-C: nobody waits for what nobody wants

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
+import multiprocessing.process
 import pickle
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -35,6 +37,8 @@ from campaign.experiments import experiments
 from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
 from campaign.trial import Trial
 
+FORGOTTEN = 5.0
+"""s after the death of a worker process, in which its pool says so of each of its batches."""
 FEWEST_FOR_PROCESSES = 300
 """Trials from which on processes save more time than they take to start."""
 PRELOADED = (
@@ -63,6 +67,9 @@ class BatchExecutor(Protocol):
 
     def stop(self) -> None:
         """End the trials that are being executed, as soon as possible."""
+
+    def look(self) -> None:
+        """Called while nothing is heard of any batch."""
 
 
 class WorkerLostError(Exception):
@@ -99,6 +106,9 @@ class ThreadExecutor:
 
         self._tasks.put(task)
         return future
+
+    def look(self) -> None:
+        """See `BatchExecutor`; a thread does not die."""
 
     def stop(self) -> None:
         """Nothing to do: threads ask whether the run is to end."""
@@ -181,6 +191,9 @@ class ProcessExecutor:
         # No Event: a worker that dies while it asks would keep the lock of one for ever.
         self._stopped = self._context.RawValue(ctypes.c_bool, False)
         self._pool: ProcessPoolExecutor | None = None
+        self._pending: dict[Future[None], ProcessPoolExecutor] = {}
+        self._workers: set[multiprocessing.process.BaseProcess] = set()  # of the pool
+        self._died: float | None = None
         self._lock = threading.Lock()
         self._lost = 0  # pools
         self._others = set(multiprocessing.active_children())
@@ -190,13 +203,31 @@ class ProcessExecutor:
         future: Future[None] = Future()
         attempts = {trial.number: self._writer.attempt(trial) for trial in batch}
         pool = self._pool = self._pool or self._new_pool()
+        self._pending[future] = pool
         try:
             result = pool.submit(_execute_batch, batch, attempts)
-        except BrokenProcessPool:
+        except (BrokenProcessPool, OSError):  # the latter of a pool that breaks meanwhile
             self._on_loss(pool, future)
         else:
             result.add_done_callback(partial(self._on_result, pool, batch, on_end, future))
+        self._workers |= set(multiprocessing.active_children()) - self._before
         return future
+
+    def look(self) -> None:
+        """See `BatchExecutor`. A pool that breaks while it is given work may forget that work."""
+        alive = set(multiprocessing.active_children())
+        broken = not self._workers <= alive
+        lost = {f: pool for f, pool in self._pending.items() if broken or pool is not self._pool}
+        if not lost:
+            self._died = None
+            return
+        self._died = self._died or time.monotonic()
+        if time.monotonic() - self._died < FORGOTTEN:
+            return
+        for process in self._workers & alive if broken else ():
+            process.kill()
+        for future, pool in lost.items():
+            self._on_loss(pool, future)
 
     def stop(self) -> None:
         """See `BatchExecutor`."""
@@ -212,8 +243,10 @@ class ProcessExecutor:
         self._pool.shutdown(cancel_futures=at_once)
 
     def _new_pool(self) -> ProcessPoolExecutor:
+        self._before = set(multiprocessing.active_children())
+        self._workers, self._died = set(), None
         arguments = self._setup, self._stopped
-        return ProcessPoolExecutor(self._count, self._context, _initialize, arguments)
+        return processes.new_pool(self._count, self._context, _initialize, arguments)
 
     def _on_result(
         self,
@@ -230,7 +263,10 @@ class ProcessExecutor:
             self._on_loss(pool, future)
             return
         except BaseException as error:  # noqa: BLE001 - a bug, raised by the future
-            future.set_exception(error)
+            if self._pending.pop(future, None) is not None:
+                future.set_exception(error)
+            return
+        if self._pending.pop(future, None) is None:  # it was taken for lost
             return
         trials = {trial.number: trial for trial in batch}
         for number, executed, entries in found.ended:
@@ -248,6 +284,8 @@ class ProcessExecutor:
                 self._pool = None
                 self._lost += 1
             error = WorkerLostError(self._lost)
+            if self._pending.pop(future, None) is None:  # it was lost before
+                return
         future.set_exception(error)
 
 

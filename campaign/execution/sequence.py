@@ -88,7 +88,7 @@ class TrialSequence:
                     future.add_done_callback(self._news.put)
                 if not self._running:
                     break
-                self._hear()
+                self._hear(executor)
                 if self.halted():
                     executor.stop()
         except BaseException as error:
@@ -97,12 +97,13 @@ class TrialSequence:
                 wait(self._running, timeout=ENDING)
             raise
 
-    def _hear(self) -> None:
+    def _hear(self, executor: BatchExecutor) -> None:
         """Wait for news, and act on all there is."""
         try:
             news = [self._news.get(timeout=LOOK)]
         except Empty:
             self._ledger.look()
+            executor.look()
             return
         while not self._news.empty():
             news.append(self._news.get())

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from campaign.archive import ArchivedTrial, RunHeader, RunReader, RunStatus, Run
 from campaign.archive.layout.journal import JOURNAL, Decision
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.errors import ArchiveError
+from campaign.execution import executors
 from campaign.execution.attempt import Conditions
 from campaign.execution.executors import ProcessExecutor, process_executor
 from campaign.execution.measuring import Measuring
@@ -181,6 +183,32 @@ def test_workers_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> None
     outcome = run(plan, tmp_path, display=lambda progress: kill_workers())
     assert outcome.status is RunStatus.FAULT
     assert "the memory may be too small" in outcome.reason
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+@pytest.mark.parametrize("all_forgotten", [False, True])
+def test_a_batch_that_a_broken_pool_forgets_is_repeated(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, all_forgotten: bool
+) -> None:
+    """As of CPython 3.11, where a process dies as its pool is given work."""
+    real = ProcessPoolExecutor.submit
+    forgotten: list[Future[object]] = []
+
+    def submit(self: ProcessPoolExecutor, *call: object) -> Future[object]:
+        begun = real(self, *call)  # type: ignore[arg-type]
+        if len(forgotten) >= (3 if all_forgotten else 1):
+            return begun
+        forgotten.append(Future())
+        kill_workers()
+        return forgotten[-1]
+
+    monkeypatch.setattr(executors, "FORGOTTEN", 0.5)
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    outcome = run(plan, tmp_path)
+    assert outcome.status is RunStatus.COMPLETE
+    assert len(forgotten) == (3 if all_forgotten else 1)
+    decisions = open_run(outcome.archive).story.all(Decision)
+    assert "worker lost" in {each.decision for each in decisions}
 
 
 def test_a_folder_that_is_taken_away_ends_the_run(plan: Plan, tmp_path: Path) -> None:

@@ -224,6 +224,19 @@ def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
     assert any("behind the spring" in note for note in found.notes)
 
 
+def test_periods_before_the_window_settle(tmp_path: Path) -> None:
+    """They are none of those that tell noise from distortion."""
+    made = trials(tmp_path, multisines(7), "torque", 3 * PERIOD)
+    windows = {"window": (PERIOD, 3 * PERIOD)}
+    late = [each.model_copy(update={"task": each.task.model_copy(update=windows)}) for each in made]
+    for planned, periods in ((made, 3), (late, 2)):
+        folder = tmp_path / str(periods)
+        folder.mkdir()
+        found = identified(folder, planned, driven())
+        (row,) = next(table for table in found.tables if table.key == "responses").rows
+        assert f"7 realisations of {periods} periods" in str(row["excitation"])
+
+
 def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(4), "torque", 8.0), driven())
     # Between lines a mode stands out; inertias, stiffness and damping need a fit.

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from itertools import groupby
+from contextlib import suppress
+from itertools import groupby, zip_longest
 from operator import itemgetter
 from pathlib import Path
 
@@ -239,13 +241,15 @@ def _checked(path: Path, parts: Sequence[Entries], many: bool) -> Iterator[Entry
         yield from (_check(path, part) for part in parts)
         return
     with processes.process_pool(count, PRELOADED, told_of_heaps, known_heaps()) as pool:
-        begun = [pool.submit(_check, path, part) for part in parts]
-        for part, future in zip(parts, begun, strict=True):
-            try:
-                found = future.result()
-            except BrokenProcessPool:
-                found = _check(path, part)
-            yield found
+        begun: list[Future[EntryCheck]] = []
+        with suppress(BrokenProcessPool):  # keeps those before
+            begun.extend(pool.submit(_check, path, part) for part in parts)
+        for part, future in zip_longest(parts, begun):
+            found = None
+            if future is not None:
+                with suppress(BrokenProcessPool):
+                    found = future.result()
+            yield found or _check(path, part)
 
 
 def _check(path: Path, part: Entries) -> EntryCheck:

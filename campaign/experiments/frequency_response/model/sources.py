@@ -254,13 +254,14 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
     if abs(samples - period * rate) > 1e-3:
         raise ValueError(f"its period of {period:.6g} s is no whole number of samples")
     kept, numbers = [], []
-    periods = min(len(signal.time) // samples for _, signal in told)
-    for trial, signal in told:
+    windows = [_steady(trial, signal.time) for trial, signal in told]
+    periods = min((window.stop - window.start) // samples for window in windows)
+    for (trial, signal), window in zip(told, windows, strict=True):
         parts = [signal.torque, *signal.answers.values()]
         if signal.reference is not None:
             parts.append(signal.reference)
         # The last whole periods: a transient has most time to pass.
-        tail = slice(len(signal.time) - periods * samples, len(signal.time))
+        tail = slice(window.stop - periods * samples, window.stop)
         if periods < 1 or not all(np.all(np.isfinite(part[tail])) for part in parts):
             remarks.append(f"{trial.trial.label}: a period has lost samples; it is left out.")
             continue
