@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign import processes as worker
 from campaign.archive.layout.results import results_path
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
@@ -217,7 +218,7 @@ def test_a_process_seldom_looks_for_garbage() -> None:
     before = gc.get_threshold()
     signals = signal.getsignal(signal.SIGINT)
     try:
-        processes._begin(pickle.dumps((None, {})))
+        worker._begin(pickle.dumps((processes._begin, (None, {}))))
         assert gc.get_threshold() == GC_THRESHOLD
     finally:
         gc.set_threshold(*before)
