@@ -64,6 +64,7 @@ def process_pool(
     count: int, preload: Iterable[str], begin: Callable[[Any], object], told: object
 ) -> Iterator[ProcessPoolExecutor]:
     """Processes that have called `begin(told)`; when the block is left early, they are ended."""
+    start_preloading(preload)
     others = set(multiprocessing.active_children())
     # Pickled once for all of them.
     handed = pickle.dumps((begin, told), pickle.HIGHEST_PROTOCOL)
