@@ -217,7 +217,8 @@ class ProcessExecutor:
         """See `BatchExecutor`. A pool that breaks while it is given work may forget that work."""
         alive = set(multiprocessing.active_children())
         broken = not self._workers <= alive
-        lost = {f: pool for f, pool in self._pending.items() if broken or pool is not self._pool}
+        pending = list(self._pending.items())  # a thread of the pool takes from it
+        lost = [(f, pool) for f, pool in pending if broken or pool is not self._pool]
         if not lost:
             self._died = None
             return
@@ -226,7 +227,7 @@ class ProcessExecutor:
             return
         for process in self._workers & alive if broken else ():
             process.kill()
-        for future, pool in lost.items():
+        for future, pool in lost:
             self._on_loss(pool, future)
 
     def stop(self) -> None:
