@@ -96,14 +96,22 @@ def _fitted(means: Sequence[tuple[Array, ...]], harmonics: int) -> OverATurn:
     torque = np.concatenate([each for _, each in parts])
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-8)
     values = inverse @ (columns.T @ torque)
-    scores = np.stack([basis.T @ (each - basis @ values) for basis, each in parts])
+    scores = np.stack([_score(*part, inverse, values) for part in parts])
     count, own = len(parts), 2 * harmonics
-    covariance = inverse @ (scores.T @ scores) @ inverse * (count / (count - 1))
+    covariance = inverse @ (scores.T @ scores) @ inverse * ((count - 1) / count)
     left = float(np.sum((torque - columns @ values) ** 2))
     drift = columns[:, own:]
     without = torque - drift @ np.linalg.lstsq(drift, torque, rcond=None)[0]
     share = 1.0 - left / max(float(without @ without), 1e-300)
     return OverATurn(values[:own], covariance[:own, :own], share)
+
+
+def _score(basis: Array, torque: Array, inverse: Array, values: Array) -> Array:
+    """Of one stretch, by what it leaves of the fit to all others (jackknife; Bell and McCaffrey,
+    Survey Methodology 28 (2002) 169): a few long strokes decide, and the fit follows them.
+    """
+    kept = np.eye(len(torque)) - basis @ inverse @ basis.T
+    return np.asarray(basis.T @ np.linalg.lstsq(kept, torque - basis @ values, rcond=1e-9)[0])
 
 
 def _drift(time: Array, angle: Array) -> Array:
