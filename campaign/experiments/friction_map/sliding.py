@@ -58,7 +58,7 @@ UNSTEADY = Cause("unsteady stretches", "{count} of {total} stretches are left ou
 TOO_SLOW = Cause(
     "slow stretches",
     "{count} steady stretches below 3 % of the fastest rate of their trial count as standstill, "
-    "and are not in the map (`--set friction_map.slowest=RATE`: slower than that is standstill)",
+    "and are not in the map (the option `slowest` says which rate is standstill)",
 )
 ADVICE = {
     "coulomb_torque": "slide at more speeds",
