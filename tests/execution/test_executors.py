@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -209,6 +210,26 @@ def test_a_batch_that_a_broken_pool_forgets_is_repeated(
     assert len(forgotten) == (3 if all_forgotten else 1)
     decisions = open_run(outcome.archive).story.all(Decision)
     assert "worker lost" in {each.decision for each in decisions}
+
+
+@pytest.mark.parametrize("error", [BrokenProcessPool("broken"), OSError("handle is closed")])
+def test_a_batch_that_a_broken_pool_refuses_is_repeated(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    real = ProcessPoolExecutor.submit
+    refused: list[Exception] = []
+
+    def submit(self: ProcessPoolExecutor, *call: object) -> Future[object]:
+        if not refused:
+            refused.append(error)
+            raise error
+        return real(self, *call)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    outcome = run(plan, tmp_path)
+    assert outcome.status is RunStatus.COMPLETE
+    decisions = open_run(outcome.archive).story.all(Decision)
+    assert [each.decision for each in decisions] == ["worker lost"]
 
 
 def test_a_folder_that_is_taken_away_ends_the_run(plan: Plan, tmp_path: Path) -> None:

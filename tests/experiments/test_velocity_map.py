@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,20 @@ def test_the_fit_returns_the_benchs_combined_friction(
     for name, true in COMBINED.items():
         found = finding(full_map, name, direction=direction, exponent=exponent)
         assert found.value == pytest.approx(true, rel=0.01), name
+
+
+def test_an_imported_torque_is_as_uncertain_as_its_columns_constant() -> None:
+    column = {"channels": [{"name": "drive_torque", "relative_uncertainty": 0.02}]}
+    planned = trials("velocity_map", bench(), {"points": 8})
+    imported = [
+        replace(each, trial=each.trial.model_copy(update={"recording": column}))
+        for each in execute(planned)
+    ]
+    found = finding(
+        analyse("velocity_map", imported), "coulomb_torque", direction="positive", exponent="2"
+    )
+    parts = {each.source: each.standard_uncertainty for each in found.known.systematic}
+    assert parts["constant of the drive_torque column"] == pytest.approx(0.02 * found.value)
 
 
 def test_every_point_lies_on_the_curve(full_map: Result) -> None:
