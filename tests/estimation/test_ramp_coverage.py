@@ -163,6 +163,8 @@ def of_torque(draws: int, seed: int) -> dict[str, list[bool]]:
                 if found.has_interval:
                     case = f"{noise}, {slope} N m/s"
                     held.setdefault(case, []).append(holds(found, truth))
+                    alone = replace(found, systematic=())
+                    held.setdefault(f"{case}, {SCATTER}", []).append(holds(alone, truth))
     assert all(len(each) > 0.9 * draws for each in held.values())
     return held
 
