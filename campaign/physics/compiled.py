@@ -38,6 +38,8 @@ _PHYSICS = Path(__file__).parent
 _CHOSEN_BY_USER: str = _CONFIG.CACHE_DIR  # NUMBA_CACHE_DIR
 _DECORATING = threading.RLock()
 _IMPORTED_AT = time.time()
+CLOCK_TICK = 0.02
+"""s, by which the time of a file may lie before that of its writing: Linux counts in ticks."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -138,7 +140,7 @@ def digest_of_sources(folder: Path) -> str:
 
 def _is_newer(sources: Mapping[str, Path]) -> bool:
     """Whether a source was written after this process may have imported what it was before."""
-    return any(path.stat().st_mtime >= _IMPORTED_AT for path in sources.values())
+    return any(path.stat().st_mtime > _IMPORTED_AT - CLOCK_TICK for path in sources.values())
 
 
 def _libraries() -> list[str]:
