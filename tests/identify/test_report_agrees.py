@@ -60,10 +60,8 @@ def is_of_one_draw(one: Trial, other: Trial) -> bool:
 
 
 def executed(trials: list[Trial]) -> list[Done]:
-    """As a run does, which measures each trial when it ends; but for fits that take seconds."""
+    """As a run does, which measures each trial when it ends."""
     kind = experiments()[trials[0].kind]
-    if kind.name == "presliding_multisine":
-        return execute(trials)
     return [replace(done, estimates=tuple(measured(kind, done))) for done in execute(trials)]
 
 
