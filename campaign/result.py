@@ -28,6 +28,20 @@ Cell = Value | Estimate
 """What stands in a cell of a table: an estimate where it is a number that was found."""
 Style = Literal["line", "points", "line+points", "band", "thin", "loop"]
 
+TOLERANCE = 1e-3
+"""How far two numbers of a condition may lie apart, as a share of the larger."""
+NOTHING = 1e-9
+"""What of a condition (SI) counts as 0: a position of 1e-17 rad is the position 0."""
+
+
+def same_value(one: Value, other: Value) -> bool:
+    """Whether two values of a condition are the same: numbers within `TOLERANCE`, words exactly."""
+    if isinstance(one, bool) or isinstance(other, bool):
+        return one is other
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=NOTHING)
+    return str(one) == str(other)
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -212,6 +212,14 @@ def factor(unit: str, to: str) -> float:
     return float(one.factor / other.factor)
 
 
+def same_dimension(one: str, other: str) -> bool:
+    """Whether numbers in both units measure the same; also of units that nobody here knows."""
+    try:
+        return one == other or factor(one, other) > 0
+    except (LookupError, ValueError):
+        return False
+
+
 def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
     """`5 mm/s`: a number (SI) with the unit that a reader is shown, of the axis that is meant.
 

@@ -71,6 +71,15 @@ def report(
         bool,
         typer.Option("--interactive", help="Lines of the page can be zoomed into and read off."),
     ] = False,
+    references: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--reference",
+            metavar="CSV",
+            help="Reference values to compare with (quantity, value, unit, low, high, test, "
+            "conditions); may be given again.",
+        ),
+    ] = None,
 ) -> None:
     """Write report.html, its tables and its figures, from an archive alone."""
     from campaign.cli.report import draw_figure, report_run
@@ -82,6 +91,7 @@ def report(
             "--format": formats,
             "--trials": trials,
             "--interactive": zoom,
+            "--reference": references,
         }
         useless = [option for option, value in of_the_page.items() if value]
         file, code = draw_figure(
@@ -99,6 +109,7 @@ def report(
         formats=formats or (),
         trials=trials,
         zoom=zoom,
+        references=references or (),
     )
     print_line(str(page))
     raise typer.Exit(code)

@@ -12,7 +12,7 @@ from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table
 from campaign.comparing.comparison import Against, Comparison, compare_runs
-from campaign.comparing.judging import Pair, Verdict
+from campaign.comparing.judging import Pair
 from campaign.comparing.page import write_comparison
 from campaign.comparing.tables import (
     bare_differing,
@@ -26,6 +26,7 @@ from campaign.comparing.tables import (
 from campaign.errors import ExitCode, worst_exit_code
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
+from campaign.references.judged import Verdict
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit
 

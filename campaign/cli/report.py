@@ -26,6 +26,7 @@ from campaign.report.processes import (
 if TYPE_CHECKING:
     from campaign.archive.writing.results_file import PreparedResults
     from campaign.report.content.document import Document
+    from campaign.report.content.references import Files
 
 LISTED = 4
 """Most files of a folder that are named one by one."""
@@ -43,13 +44,19 @@ def report_run(
     formats: Sequence[str] = (),
     trials: str = "",
     zoom: bool = False,
+    references: Sequence[Path] = (),
 ) -> tuple[Path, ExitCode]:
     """Build the report of the run that `name` means; its page, and the exit code."""
+    from campaign.references.values import read_values
+
     path = find_run(results, name)
+    files = {each: read_values(each) for each in references}
     begin_early(path)
     run = open_run(path)
     with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
-        return _page(run, output, templates, at_work, formats, trials, zoom=zoom, open_it=open_it)
+        return _page(
+            run, output, templates, at_work, formats, trials, files, zoom=zoom, open_it=open_it
+        )
 
 
 def _page(
@@ -59,6 +66,7 @@ def _page(
     at_work: Workers,
     formats: Sequence[str],
     trials: str,
+    references: Files,
     *,
     zoom: bool,
     open_it: bool,
@@ -91,8 +99,9 @@ def _page(
             formats=chosen_formats(formats),
             trials=_wanted_trials(run, trials),
             zoom=zoom,
-            command=_command(path, measure_anew=measure_anew),
+            command=_command(path, references, measure_anew=measure_anew),
             when_found=write_results,
+            references=references,
         )
         kept = [_published(each) for each in written]
     finally:
@@ -121,7 +130,7 @@ def _published(results: PreparedResults) -> str:
         return ""
 
 
-def _command(path: Path, *, measure_anew: bool) -> str:
+def _command(path: Path, references: Iterable[Path], *, measure_anew: bool) -> str:
     """What to type for the same numbers again, from where this command was typed.
 
     A page goes to others, whom no folder of this machine concerns: of an absolute path only the
@@ -134,6 +143,7 @@ def _command(path: Path, *, measure_anew: bool) -> str:
     words += [
         *(["--results FOLDER"] if elsewhere else []),
         *(["--measure-anew"] if measure_anew else []),
+        *(f"--reference {quote(each.name)}" for each in references),
     ]
     return " ".join(words)
 

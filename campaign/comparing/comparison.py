@@ -11,12 +11,13 @@ from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import BOTH_ROTARY, speaking_of, words_here
 from campaign.comparing.circumstances import Change, changes
-from campaign.comparing.judging import Pair, Verdict, pairs_of, with_verdicts
+from campaign.comparing.judging import Pair, pairs_of
 from campaign.comparing.pairing import Pairing, pair_tests
 from campaign.comparing.shared import shared_sources, source_called
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.experiments.shared.systematic import SOURCES
+from campaign.references.judged import Verdict, with_verdicts
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 

@@ -3,21 +3,16 @@
 Some numbers follow from others of the same test: one change of an error is a change of each of its
 ratios, too, and would be declared as often as there are ratios.
 
-Besides, two intervals do not hold what a comparison of benches asks of them. That of a single
-trial has no scatter between trials in it. And that of a model which the data contradict is the
-interval of the closest curve of its kind, whose residuals are no noise: on the `platform` bench,
-whose Stribeck exponent is about 0.9, viscous friction fitted with the exponent held at 2 scatters
-between runs by 1.5 times its standard error.
+Besides, the interval of a single trial does not hold what a comparison of benches asks of it: there
+is no scatter between trials in it.
 """
 
 from __future__ import annotations
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.pairing import same_value
-from campaign.estimate import Origin
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Outcome
-from campaign.result import Finding
+from campaign.result import Finding, same_value
 from campaign.trial import Role
 
 DERIVED = frozenset({"error_reduction", "error_decrease", "error_growth", "load_share"})
@@ -29,7 +24,6 @@ FOLLOWS = Cause(
 REPEAT = "how trials scatter is not in the interval; `repeat = 3` would show it"
 ONE_TRIAL_EACH = Cause("one trial each", f"one trial each: {REPEAT}")
 ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT}")
-WRONG_MODEL = Cause("contradicted model", "{side} is of a model that the data contradict: {why}")
 
 
 def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> Reason:
@@ -44,9 +38,6 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
     alone = [name for name, test, finding in own if trials_behind(test, finding) == 1]
     if alone:
         return ONE_TRIAL_EACH() if len(alone) == 2 else ONE_OF_ONE_TRIAL(side=alone[0])
-    for name, _, finding in own:
-        if finding.known.origin is Origin.CONTRADICTED:
-            return WRONG_MODEL(side=name, why=finding.known.reason)
     return NONE
 
 

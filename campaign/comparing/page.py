@@ -11,7 +11,7 @@ from typing import TypeVar
 from campaign.access.analysis import one_line
 from campaign.axis_kind import speaking_of, words_here
 from campaign.comparing.comparison import Against, Comparison
-from campaign.comparing.judging import RATE, Pair, Verdict
+from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters, overlays
 from campaign.comparing.pairing import PairedTest
 from campaign.comparing.pictures import draw_changes, draw_side_by_side
@@ -27,7 +27,9 @@ from campaign.comparing.tables import (
     shorter,
 )
 from campaign.errors import UsageError
+from campaign.estimation.family import RATE
 from campaign.plain_text import on_a_page
+from campaign.references.judged import Verdict
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw

@@ -6,18 +6,12 @@ those that have most findings in common. Whatever has no partner is kept and tol
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.access.analysis import AnalysedTest
-from campaign.result import Finding, Value
-from campaign.units import factor
-
-TOLERANCE = 1e-3
-"""How far two numbers of a condition may lie apart, as a share of the larger."""
-NOTHING = 1e-9
-"""What of a condition (SI) counts as 0: a position of 1e-17 rad is the position 0."""
+from campaign.result import Finding, Value, same_value
+from campaign.units import same_dimension
 
 
 @dataclass(frozen=True)
@@ -84,21 +78,12 @@ def pair_findings(
 
 def same_finding(one: Finding, other: Finding) -> bool:
     """Whether both are one quantity under one set of conditions, in units that go together."""
-    if one.quantity != other.quantity or not _same_dimension(one.unit, other.unit):
+    if one.quantity != other.quantity or not same_dimension(one.unit, other.unit):
         return False
     stated = [_stated(one.conditions), _stated(other.conditions)]
     return stated[0].keys() == stated[1].keys() and all(
         same_value(value, stated[1][name]) for name, value in stated[0].items()
     )
-
-
-def same_value(one: Value, other: Value) -> bool:
-    """Whether two values of a condition are the same: numbers within `TOLERANCE`, words exactly."""
-    if isinstance(one, bool) or isinstance(other, bool):
-        return one is other
-    if isinstance(one, int | float) and isinstance(other, int | float):
-        return math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=NOTHING)
-    return str(one) == str(other)
 
 
 def _candidates(
@@ -133,10 +118,3 @@ def _words(finding: Finding) -> Hashable:
 
 def _stated(conditions: Mapping[str, Value]) -> dict[str, Value]:
     return {name: value for name, value in conditions.items() if value is not None}
-
-
-def _same_dimension(one: str, other: str) -> bool:
-    try:
-        return one == other or factor(one, other) > 0
-    except (LookupError, ValueError):
-        return False

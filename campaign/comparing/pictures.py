@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from campaign.comparing.judging import Pair, Verdict
+from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters
 from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
+from campaign.references.judged import Verdict
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER, Look
 from campaign.text import pretty_unit

@@ -11,10 +11,11 @@ from campaign.access.analysis import AnalysedTest
 from campaign.comparing.circumstances import Change
 from campaign.comparing.comparison import Against, size_of
 from campaign.comparing.draws import common_draws
-from campaign.comparing.judging import Pair, Verdict
+from campaign.comparing.judging import Pair
 from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
 from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.references.judged import Verdict
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import interval, pretty_unit
 

@@ -11,7 +11,6 @@ from campaign.axis_kind import speaking_of
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.difference import Difference, difference_of
 from campaign.experiments.interface import (
     Experiment,
     Model,
@@ -28,25 +27,12 @@ from campaign.physics.bench import Bench
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
+from campaign.references.judged import Judged, with_verdicts
 from campaign.result import Result
 
 FRICTION = "friction."
 WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
 """Tables that a bench has with all of these keys, or not at all."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """A parameter of two runs.
-
-    Attributes:
-        adjusted: p value by Benjamini and Hochberg over all that were tested; None untested.
-    """
-
-    before: Estimate
-    after: Estimate
-    difference: Difference
-    adjusted: float | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +50,7 @@ class Section:
     trials: tuple[int, ...] = ()
     result: Result | None = None
     problem: str = ""
-    changes: tuple[Change, ...] = ()
+    changes: tuple[Judged, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -136,7 +122,7 @@ def identify(
             section = _compared(section, bench, compared, say_of)
         sections.append(section)
     sections.sort(key=lambda each: each.result is None)
-    return Identification(chosen, validation, compared, bench, tuple(_adjusted(sections)))
+    return Identification(chosen, validation, compared, bench, tuple(_judged(sections)))
 
 
 def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
@@ -313,13 +299,18 @@ def _compared(
     if other.result is None:
         return replace(section, problem=f"{compared.name}: {other.problem}")
     after = {each.estimate.name: each.estimate for each in other.identified.parameters}
-    pairs = [
-        (each.estimate, after[each.estimate.name])
+    changes = (
+        Judged.of(
+            each.estimate,
+            after[each.estimate.name],
+            shared=_shared(each.estimate),
+            quantity=each.estimate.name,
+            conditions={},
+        )
         for each in section.identified.parameters
         if each.estimate.name in after
-    ]
-    changes = tuple(Change(one, two, difference_of(one, two, _shared(one))) for one, two in pairs)
-    return replace(section, changes=changes)
+    )
+    return replace(section, changes=tuple(changes))
 
 
 def _shared(estimate: Estimate) -> list[str]:
@@ -327,18 +318,11 @@ def _shared(estimate: Estimate) -> list[str]:
     return [part.source for part in estimate.systematic if part.of_rig]
 
 
-def _adjusted(sections: Sequence[Section]) -> Iterator[Section]:
-    """With p values of all changes as one family."""
-    from scipy.stats import false_discovery_control
-
-    tested = [c.difference.p for s in sections for c in s.changes if c.difference.p is not None]
-    adjusted = iter(false_discovery_control(tested, method="bh")) if tested else iter(())
-    for section in sections:
-        changes = tuple(
-            each if each.difference.p is None else replace(each, adjusted=float(next(adjusted)))
-            for each in section.changes
-        )
-        yield replace(section, changes=changes)
+def _judged(sections: Sequence[Section]) -> Iterator[Section]:
+    """With verdicts on all changes as one family."""
+    verdicts = iter(with_verdicts([change for each in sections for change in each.changes]))
+    for each in sections:
+        yield replace(each, changes=tuple(next(verdicts) for _ in each.changes))
 
 
 def widest(parameters: Sequence[Parameter]) -> Parameter | None:

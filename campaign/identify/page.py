@@ -251,8 +251,8 @@ def _method_tree(section: Section) -> dict[str, Any]:
             for each in section.identified.warnings
         ],
         "changes": [
-            {"before": row_of(each.before), "after": row_of(each.after),
-             "difference": row_of(each.difference.difference), "p": each.difference.p,
+            {"before": row_of(each.reference), "after": row_of(each.other),
+             "difference": row_of(each.found.difference), "p": each.found.p,
              "adjusted": each.adjusted}
             for each in section.changes
         ],

@@ -7,14 +7,14 @@ from typing import Any
 
 from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
-from campaign.identify.identification import Change, Section
+from campaign.estimation.family import RATE
+from campaign.identify.identification import Section
+from campaign.references.judged import Judged
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit, words
 from campaign.units import convert
 
 BOUNDS = {"at least": "≥", "at most": "≤"}
-CHANGED = 0.05
-"""Share of what is declared changed that may be false."""
 
 
 def parameters_table(sections: Sequence[Section]) -> Table:
@@ -66,7 +66,7 @@ def changes_table(before: str, after: str, section: Section) -> Table:
     )
     note = (
         "The same terms fitted to both. p values are adjusted over all parameters of this page "
-        f"(Benjamini and Hochberg): of what is declared changed {CHANGED:.0%} may be false."
+        f"(Benjamini and Hochberg): of what is declared different {RATE:.0%} may be false."
     )
     return Table(
         f"changes-{section.model.name.replace('_', '-')}", "What has changed", columns, rows,
@@ -74,19 +74,16 @@ def changes_table(before: str, after: str, section: Section) -> Table:
     )  # fmt: skip
 
 
-def _change_row(change: Change) -> Mapping[str, Cell]:
+def _change_row(change: Judged) -> Mapping[str, Cell]:
     p = change.adjusted
-    verdict = str(change.difference.reason) or "no change shown"
-    if p is not None:
-        verdict = "changed" if p <= CHANGED else "no change shown"
     return {
-        "parameter": words(change.before.name),
-        "unit": pretty_unit(change.before.unit),
-        "before": told(change.before),
-        "after": told(change.after),
-        "change": told(change.difference.difference),
+        "parameter": words(change.quantity),
+        "unit": pretty_unit(change.reference.unit),
+        "before": told(change.reference),
+        "after": told(change.other),
+        "change": told(change.found.difference),
         "p": "" if p is None else f"{p:.2g}",
-        "verdict": verdict,
+        "verdict": change.outcome,
     }
 
 

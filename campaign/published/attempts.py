@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from campaign.published.evidence import same
 from campaign.published.provenance import SweepPoint
-from campaign.result import Value
+from campaign.result import Value, same_value
 
 COMPENSATION = "compensation"
 
@@ -40,7 +39,7 @@ def in_vain(places: Sequence[SweepPoint], conditions: Mapping[str, Value]) -> bo
 def _other_number(place: SweepPoint, conditions: Mapping[str, Value]) -> bool:
     numbers = {k: v for k, v in {**place.numbers, **place.point}.items() if _is_number(v)}
     return any(
-        _is_number(conditions[name]) and not same(numbers[name], conditions[name])
+        _is_number(conditions[name]) and not same_value(numbers[name], conditions[name])
         for name in numbers.keys() & conditions.keys()
     )
 

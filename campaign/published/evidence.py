@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -10,10 +9,7 @@ from campaign.physics.bench import Bench
 from campaign.published.patterns import covers
 from campaign.published.provenance import NOTHING_ALTERED, Provenance
 from campaign.published.values import THESIS, Cell, Published, thesis
-from campaign.result import Finding, Value
-
-TOLERANCE = 1e-3
-"""How far a finding's condition may be from a published one, as a share of it."""
+from campaign.result import Finding, Value, same_value
 
 
 @dataclass(frozen=True)
@@ -105,14 +101,6 @@ def speaks_to(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
     """Whether a finding is of the cell's quantity and states each of the cell's conditions."""
     stated = {**known, **finding.conditions}
     return finding.quantity == cell.quantity and all(
-        name in stated and same(stated[name], value) for name, value in cell.conditions.items()
+        name in stated and same_value(stated[name], value)
+        for name, value in cell.conditions.items()
     )
-
-
-def same(found: Value, published: Value) -> bool:
-    """Whether a condition is the published one: numbers within `TOLERANCE`, words exactly."""
-    if isinstance(found, bool) or isinstance(published, bool):
-        return found is published
-    if isinstance(found, int | float) and isinstance(published, int | float):
-        return math.isclose(found, published, rel_tol=TOLERANCE)
-    return str(found) == str(published)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from campaign.estimate import Estimate, Origin
 from campaign.published.attempts import in_vain
 from campaign.published.draws import SEED, place_in, together, without_seed
-from campaign.published.evidence import Evidence, same, speaks_to, with_cells
+from campaign.published.evidence import Evidence, speaks_to, with_cells
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.status import Status, status_of
 from campaign.published.values import Cell, Published
@@ -23,7 +23,7 @@ from campaign.published.verdicts import (
     judge,
     reproduced,
 )
-from campaign.result import Finding
+from campaign.result import Finding, same_value
 from campaign.trial import canonical_json
 
 COLUMNS = (
@@ -193,7 +193,7 @@ def _without(cell: Cell, tests: Sequence[Evidence]) -> Line:
 def _why_not(cell: Cell, test: Evidence) -> str:
     """Why a test found nothing for a cell that it tried; "" where it did not try."""
     ours = {name: test.known[name] for name in test.known.keys() & cell.conditions.keys()}
-    if not all(same(value, cell.conditions[name]) for name, value in ours.items()):
+    if not all(same_value(value, cell.conditions[name]) for name, value in ours.items()):
         return ""  # a bench with a sampled controller, and a column of simulations
     if any(speaks_to(finding, cell, test.known) for finding in test.findings):
         return f"{test.test}: the analysis found no number"

@@ -16,7 +16,8 @@ from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
-from campaign.report.content.document import Document, document_of
+from campaign.report.content.document import NO_FILES, Document, document_of
+from campaign.report.content.references import Files
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
 from campaign.report.formats.as_json import report_json
@@ -82,6 +83,7 @@ def build_report(
     zoom: bool = False,
     command: str = "",
     when_found: Callable[[Document], None] = _nothing,
+    references: Files = NO_FILES,
 ) -> Report:
     """Write `report.html`, `report.json`, `tables/` and `figures/` of `run` into `output`.
 
@@ -92,7 +94,8 @@ def build_report(
     `zoom`: the page's lines can be zoomed into by who has scripts; nothing else is different.
     `command`: what the page says to type for the report; made from the run's name when empty.
     Formats and trials' pages that an earlier report of the run left in `output` are made anew.
-    `when_found` is told what was found while the drawings of it are made.
+    `when_found` is told what was found while the drawings of it are made. `references`: files of
+    reference values, with what is in them.
 
     Raises UsageError when `output` is no report of ours or cannot be written, when a template is
     wrong, or when one of the formats cannot be made; an older report is then left as it was.
@@ -113,6 +116,7 @@ def build_report(
             zoom=zoom,
             command=command,
             when_found=when_found,
+            references=references,
         )
     own_pages = trial_pages(report.layout, trials, Templates(packaged_templates, templates))
     pages = {"report.html": html, "report.json": report_json(report.layout), **folder.files}
@@ -167,6 +171,7 @@ def render(
     zoom: bool = False,
     command: str = "",
     when_found: Callable[[Document], None] = _nothing,
+    references: Files = NO_FILES,
 ) -> tuple[str, Folder, Report]:
     """The page's text, the other files, and what there is to say of them; nothing is written.
 
@@ -175,7 +180,12 @@ def render(
     filled = Templates(packaged_templates, templates)
     at_work = at_work or Workers(run, measure_anew=measure_anew)
     document = document_of(
-        run, experiments, measure_anew=measure_anew, found=at_work.found, shown=trials
+        run,
+        experiments,
+        measure_anew=measure_anew,
+        found=at_work.found,
+        shown=trials,
+        files=references,
     )
 
     def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:

@@ -15,7 +15,8 @@ from campaign.access.plain_json import json_text
 from campaign.axis_kind import speaking_of, words_here
 from campaign.errors import UsageError
 from campaign.estimation.difference import in_unit
-from campaign.estimation.trends.family import POWER, RATE
+from campaign.estimation.family import RATE
+from campaign.estimation.trends.family import POWER
 from campaign.plain_text import on_a_page
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn

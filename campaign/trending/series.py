@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.doubts import DERIVED, FOLLOWS, WRONG_MODEL
+from campaign.comparing.doubts import DERIVED, FOLLOWS
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.words import condition_words, display_unit, name_here
 from campaign.estimate import Estimate, Origin
@@ -26,6 +26,7 @@ from campaign.estimation.difference import BOUNDS, in_unit
 from campaign.estimation.intervals import LEVEL, student
 from campaign.estimation.trends.own_errors import moderated
 from campaign.reason import NONE, Cause, Reason
+from campaign.references.judged import WRONG_MODEL
 from campaign.result import Finding, Value
 from campaign.trending.members import LEAST, Member
 

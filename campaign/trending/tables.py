@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
+from campaign.estimation.family import RATE
 from campaign.estimation.trends.changes import LEAST_FOR_A_JUMP, Jump
-from campaign.estimation.trends.family import RATE
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit

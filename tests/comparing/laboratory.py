@@ -10,13 +10,14 @@ from typing import Any
 
 from campaign.access.analysis import AnalysedTest
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.comparing.judging import Pair, pairs_of, with_verdicts
+from campaign.comparing.judging import Pair, pairs_of
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.shared import shared_sources
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, bench_of, result_of
 from campaign.protocol import load_protocol, make_plan
 from campaign.recording import MemoryRecorder
+from campaign.references.judged import with_verdicts
 from campaign.resources import protocols_folder
 from campaign.trial import Trial
 from tests.experiments.laboratory import Done

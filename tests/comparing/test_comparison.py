@@ -11,10 +11,10 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.comparing.comparison import Comparison, compare_runs
-from campaign.comparing.judging import Verdict
 from campaign.comparing.tables import alone_table, change_of, headline, sentences
 from campaign.errors import UsageError
 from campaign.experiments import experiments
+from campaign.references.judged import Verdict
 
 Compare = Callable[..., Comparison]
 

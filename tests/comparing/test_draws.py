@@ -10,10 +10,11 @@ from typing import Any
 from campaign.access.analysis import AnalysedTest
 from campaign.cli import compare as command
 from campaign.comparing.draws import common_draws
-from campaign.comparing.judging import Pair, pairs_of, with_verdicts
+from campaign.comparing.judging import Pair, pairs_of
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.tables import bare_differing, change_of
 from campaign.physics.bench import Bench
+from campaign.references.judged import with_verdicts
 from campaign.result import Finding
 from tests.comparing.test_judging import made_up
 

@@ -9,15 +9,17 @@ import pytest
 from scipy import stats
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.judging import RATE, Verdict, pairs_of, with_verdicts
+from campaign.comparing.judging import pairs_of
 from campaign.comparing.pairing import pair_tests
 from campaign.comparing.tables import change_of
 from campaign.comparing.words import condition_words
 from campaign.estimate import Estimate
+from campaign.estimation.family import RATE
 from campaign.estimation.intervals import with_error
 from campaign.experiments.interface import TestData
 from campaign.physics.bench import Bench
 from campaign.recording import Ending, Outcome
+from campaign.references.judged import Verdict, with_verdicts
 from campaign.result import Finding, Result
 from campaign.trial import Task, Trial
 from tests.comparing.laboratory import analysed

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from scipy import stats
 
-from campaign.comparing.judging import RATE, Verdict
+from campaign.estimation.family import RATE
+from campaign.references.judged import Verdict
 from tests.comparing.laboratory import PLATFORM, Run, compared, simulated
 
 TOGETHER = 5

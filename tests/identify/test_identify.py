@@ -89,11 +89,11 @@ def test_what_changed_is_declared_and_what_did_not_is_not(
     found: Identification, results: Path, run: str, rig: Rig
 ) -> None:
     (section,) = found.sections
-    changes = {each.before.name: each for each in section.changes}
+    changes = {each.quantity: each for each in section.changes}
     worn = changes["coulomb_positive"]
     assert worn.adjusted is not None
     assert worn.adjusted < 0.05
-    assert holds(worn.difference.difference, 0.1 * rig.truth["coulomb_positive"])
+    assert holds(worn.found.difference, 0.1 * rig.truth["coulomb_positive"])
     same = identify(
         choose(results, f"{run}:monday"),
         experiments_by_model(),
@@ -101,7 +101,7 @@ def test_what_changed_is_declared_and_what_did_not_is_not(
         compared=choose(results, f"{run}:tuesday"),
     ).sections[0]
     declared = [c for c in same.changes if c.adjusted is not None and c.adjusted <= 0.05]
-    assert [each.before.name for each in declared] == []
+    assert [each.quantity for each in declared] == []
 
 
 def test_the_command_writes_a_page_its_data_and_a_bench(

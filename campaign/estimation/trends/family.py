@@ -1,8 +1,4 @@
-"""Many quantities of one report: which changes are declared, and which would have been seen.
-
-Benjamini and Hochberg (Journal of the Royal Statistical Society B 57, 1995): of what is declared,
-at most a share of `RATE` is expected to be false.
-"""
+"""Many quantities of one report: which changes would have been declared."""
 
 from __future__ import annotations
 
@@ -10,21 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from campaign.estimation.family import RATE, adjusted
 from campaign.estimation.trends.scatter import Mixture
 
-RATE = 0.05
-"""Share of false ones that is expected among what is declared."""
 POWER = 0.8
 """How often a change of the detectable size would be declared."""
-
-
-def adjusted(p: Sequence[float]) -> list[float]:
-    """The p values as Benjamini and Hochberg adjust them, in the same order; none for none."""
-    if not p:
-        return []  # before what takes a third of a second to import
-    from scipy.stats import false_discovery_control
-
-    return [float(each) for each in false_discovery_control(list(p), method="bh")]
 
 
 def level_of(p: Sequence[float], rate: float = RATE) -> float:

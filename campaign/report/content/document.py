@@ -26,11 +26,12 @@ from campaign.recording import Outcome
 from campaign.report.content.held_values import held_tables
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.opening import Opening, opening_of
-from campaign.report.content.predicted import Predicted, predicted
+from campaign.report.content.references import Files, References, compared_with
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables
 from campaign.result import Table
 
+NO_FILES: Files = {}
 ANEW = "the program that made this page, whatever is archived"
 
 
@@ -43,7 +44,7 @@ class Document:
         published: the values that the run's protocol compares with, by table.
         truths: by test, what is true beside what it found, or what its compensations hold, where
             that is known.
-        predictions: by test, what its bench file states of what it found, where that is tested.
+        references: what bench files, and files of reference values, state of what was found.
         damaged: what of the run is damaged, as far as the report looked at it.
         measured_by: whose code found what each recording says by itself.
     """
@@ -53,7 +54,7 @@ class Document:
     published: Published
     scoreboard: Scoreboard
     truths: Mapping[str, Table]
-    predictions: Mapping[str, Predicted]
+    references: References
     incidents: Incidents
     opening: Opening
     damaged: tuple[Damage, ...]
@@ -115,11 +116,12 @@ def document_of(
     measure_anew: bool = False,
     found: Mapping[str, TestAnalysis] | None = None,
     shown: Collection[int] = (),
+    files: Files = NO_FILES,
 ) -> Document:
     """Analyse a run and say what there is to say of it.
 
     `measure_anew`, `found`: as for `analyse_run`. `shown`: trials that have pages of their own,
-    with all of their samples.
+    with all of their samples. `files`: of reference values.
     """
     happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
@@ -129,16 +131,16 @@ def document_of(
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
-    predictions = predicted(run, tests)
+    references = compared_with(run, tests, files)
     return Document(
         run,
         tests,
         published,
         scoreboard,
         truths,
-        predictions,
+        references,
         happened,
-        opening_of(run, tests, scoreboard, truths, predictions, damaged),
+        opening_of(run, tests, scoreboard, truths, references, damaged),
         damaged,
         ANEW if measure_anew else _measured_by(run.trials),
     )

@@ -12,7 +12,7 @@ from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import speaking_of
 from campaign.published.headline import NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
-from campaign.report.content.predicted import Predicted
+from campaign.report.content.references import References
 from campaign.report.content.run_problems import wrong_with
 from campaign.report.content.truth import biases, held
 from campaign.result import Factor, Figure, Result, Table
@@ -41,6 +41,7 @@ class Answer:
         truth: how many intervals hold what is true of the bench that was simulated, and what is
             off alike in all of them; "" unknown.
         prediction: which numbers are not what its bench file states any more; "" untested.
+        references: the same of each file of reference values.
         problem: why there is nothing to say, or not all of it.
         kind: of experiment, as people read it: `velocity map`.
     """
@@ -55,6 +56,7 @@ class Answer:
     problem: str = ""
     kind: str = ""
     first_remarks: tuple[str, ...] = ()
+    references: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,13 +112,13 @@ def opening_of(
     tests: Sequence[AnalysedTest],
     scoreboard: Scoreboard,
     truths: Mapping[str, Table],
-    predictions: Mapping[str, Predicted],
+    references: References,
     damaged: Sequence[Damage] = (),
 ) -> Opening:
     """The opening of a run's report; `damaged` is all damage that the report met."""
     main = _main(tests)
     return Opening(
-        tuple(_answer(test, truths.get(test.name), predictions.get(test.name)) for test in tests),
+        tuple(_answer(test, truths.get(test.name), references) for test in tests),
         _telling([test for test in tests if test.name in main]) or _telling(tests),
         tuple(wrong_with(run, tests, damaged)),
         _asked(run, tests),
@@ -180,10 +182,11 @@ def _in_short(chosen: Sequence[Answer]) -> Group:
     return Group("", tuple(answers), tuple(told))
 
 
-def _answer(test: AnalysedTest, truth: Table | None, prediction: Predicted | None) -> Answer:
+def _answer(test: AnalysedTest, truth: Table | None, references: References) -> Answer:
     result = test.result
     said = tuple(sentence(each) for each in result.conclusions)
     figure = _figure(result)
+    stated, files = references.stated.get(test.name), references.files.get(test.name, ())
     with speaking_of(test.sides):
         every, first = (
             tuple(remarks(each)) for each in (result.conclusions, result.conclusions[:1])
@@ -196,10 +199,11 @@ def _answer(test: AnalysedTest, truth: Table | None, prediction: Predicted | Non
         "" if figure is None else figure.key,
         every,
         true,
-        "" if prediction is None else prediction.told,
+        "" if stated is None else stated.told,
         test.problem or ("" if said else _nothing(test)),
         test.kind.replace("_", " "),
         first,
+        tuple(each.told for each in files if each.told),
     )
 
 

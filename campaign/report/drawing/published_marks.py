@@ -14,9 +14,8 @@ from itertools import groupby, product
 
 import numpy as np
 
-from campaign.published.evidence import same
 from campaign.published.values import Cell, Published, PublishedTable
-from campaign.result import Array, Curve, Figure, Panel, Value
+from campaign.result import Array, Curve, Figure, Panel, Value, same_value
 from campaign.units import convert
 
 DRAWN = ("equal", "near")
@@ -126,7 +125,7 @@ class PublishedBeside:
         """Whether the curve states each condition of a cell but the one along x."""
         stated = {**self.known, **curve.conditions}
         return cell.relation in relations and all(
-            name in stated and same(stated[name], value)
+            name in stated and same_value(stated[name], value)
             for name, value in cell.conditions.items()
             if name != curve.along
         )

@@ -148,6 +148,7 @@ def _test(section: Section) -> data.Test:
             tables=tuple(map(_table, section.tables)),
             truth=None if section.truth is None else _table(section.truth),
             prediction=None if section.prediction is None else _table(section.prediction),
+            references=tuple(map(_table, section.references)),
         )
 
 

@@ -115,8 +115,7 @@ def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
         yield f"No result: {answer.problem}."
     if with_truth and answer.truth:
         yield f"{answer.truth}."
-    if answer.prediction:
-        yield f"{answer.prediction}."
+    yield from (f"{each}." for each in (answer.prediction, *answer.references) if each)
     yield from answer.remarks
 
 
@@ -133,6 +132,7 @@ def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
         yield _grid(section.truth)
     if section.prediction is not None:
         yield _grid(section.prediction)
+    yield from map(_grid, section.references)
     for figure in section.figures:
         if figure is telling:
             told = f"Figure {figure.number}, {figure.title}, stands on top of the report."

@@ -227,8 +227,11 @@ class Test(_Part):
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
     truth: Table | None
-    prediction: Table | None
     """What it found beside what is true, where that is known."""
+    prediction: Table | None
+    """What it found beside what its bench file states, where that is tested."""
+    references: tuple[Table, ...]
+    """What it found beside each file of reference values."""
 
 
 class Line(_Part):

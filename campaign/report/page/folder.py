@@ -101,6 +101,7 @@ class Section:
     Attributes:
         truth: what it found beside what is true, where that is known.
         prediction: what it found beside what its bench file states, where that is tested.
+        references: what it found beside files of reference values.
         summary: its conditions in a line.
     """
 
@@ -114,13 +115,14 @@ class Section:
     left_out: tuple[str, ...] = ()
     truth: ShownTable | None = None
     prediction: ShownTable | None = None
+    references: tuple[ShownTable, ...] = ()
     summary: str = ""
 
     @property
     def items(self) -> tuple[ShownFigure | ShownTable | Comparison, ...]:
         """Its figures and tables in the order of the page."""
         held = [each for each in (self.truth, self.prediction) if each]
-        return (*self.comparisons, *held, *self.figures, *self.tables)
+        return (*self.comparisons, *held, *self.references, *self.figures, *self.tables)
 
 
 @dataclass

@@ -149,6 +149,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
     problems = (
         *(f"{s.test.name}: {p}" for s in sections for p in _problems(s)),
         *scoreboard.problems,
+        *document.references.problems,
         *happened.problems,
     )
     places = {table.table: table.anchor for s in sections for table in s.comparisons}
@@ -200,8 +201,13 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
         mine = [n for n in published if n in test.reproduces and n not in spoken]
         spoken.update(mine)
         tables_ = [published[n] for n in mine]
-        stated = document.predictions.get(test.name)
-        expected = (document.truths.get(test.name), stated.table if stated else None)
+        stated = document.references.stated.get(test.name)
+        files = document.references.files.get(test.name, ())
+        expected = (
+            document.truths.get(test.name),
+            stated.table if stated else None,
+            *(each.table for each in files),
+        )
         sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
     return tuple(sections)
 
@@ -260,7 +266,7 @@ def _section(
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    expected: tuple[Table | None, Table | None],
+    expected: Sequence[Table | None],
 ) -> Section:
     with speaking_of(maker.test.sides):
         return _section_of_axis(place, maker, scoreboard, published, expected)
@@ -271,13 +277,15 @@ def _section_of_axis(
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    expected: tuple[Table | None, Table | None],
+    expected: Sequence[Table | None],
 ) -> Section:
     test, folder = maker.test, maker.folder
     left_out = tuple(_left_out(test))
     problems = [test.problem] if test.problem else []
     comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
-    truth, prediction = (None if each is None else maker.table(each) for each in expected)
+    truth, prediction, *references = (
+        None if each is None else maker.table(each) for each in expected
+    )
     figures = [
         shown
         for figure in test.result.figures
@@ -299,6 +307,7 @@ def _section_of_axis(
         left_out=left_out,
         truth=truth,
         prediction=prediction,
+        references=tuple(filter(None, references)),
         summary=summary_of(test),
     )
 

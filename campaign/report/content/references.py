@@ -1,0 +1,288 @@
+"""Reference values and found ones: each test's findings beside what is stated of them.
+
+A bench file says how well its numbers are known, `campaign identify` writes that: then a later run
+shows whether the rig, its friction above all, still is what it was. Only where samples do not come
+from that very bench: of hardware, of recordings, and of a simulated truth. What is stated holds for
+the bench that it was said of; where a test changes that bench, nothing is compared. A file of
+reference values is held against every run. All pairs of a report are one family of decisions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from campaign.access.analysis import AnalysedTest
+from campaign.archive import RunReader
+from campaign.axis_kind import speaking_of
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.family import RATE
+from campaign.experiments.interface import bench_of
+from campaign.physics.bench import Bench
+from campaign.physics.bench_fingerprint import why_altered
+from campaign.physics.stated_values import stated_value
+from campaign.physics.true_values import QUANTITIES
+from campaign.reason import Cause
+from campaign.references.judged import Judged, Verdict, with_verdicts
+from campaign.references.values import ReferenceValue
+from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
+from campaign.report.content.written_units import TestUnits, units_of
+from campaign.result import Cell, Column, Finding, Table
+from campaign.text import number, quantity_words
+from campaign.trial import Trial
+
+NAMED = 3
+"""Most changes that one sentence names."""
+AGAIN = Cause("said by others", "{others}")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where reference values come from, in the words of a table.
+
+    Attributes:
+        column: head of their column.
+        differ: what a number does that differs: `differ from what the bench file states`.
+        before: what it differs from.
+        said: a sentence on who states them.
+    """
+
+    key: str
+    title: str
+    column: str
+    differ: str
+    before: str
+    said: str
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What a source states beside what a test found, and what that comes to in a sentence.
+
+    Attributes:
+        told: without its full stop; "" where nothing could be tested.
+    """
+
+    table: Table
+    told: str
+
+
+@dataclass(frozen=True)
+class References:
+    """All comparisons of a report's tests with reference values.
+
+    Attributes:
+        stated: by test, with its bench file.
+        files: by test, with each file of values.
+        problems: rows of files that no finding is of.
+    """
+
+    stated: Mapping[str, Compared]
+    files: Mapping[str, tuple[Compared, ...]]
+    problems: tuple[str, ...]
+
+
+Files = Mapping[Path, Sequence[ReferenceValue]]
+Found = tuple[AnalysedTest, Source, Sequence[Judged]]
+
+
+def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
+    """Each test's findings beside the numbers that its bench file and `files` state of them."""
+    tests = tuple(tests)
+    found: list[Found] = []
+    for test in tests:
+        with speaking_of(test.sides):
+            found += filter(None, [_stated(run, test)])
+            found += (_of_file(path, values, test) for path, values in files.items())
+    verdicts = iter(with_verdicts([pair for _, _, pairs in found for pair in pairs]))
+    units = units_of(tests, run.header) if any(pairs for _, _, pairs in found) else {}
+    stated: dict[str, Compared] = {}
+    others: dict[str, tuple[Compared, ...]] = {}
+    for test, source, pairs in found:
+        own = [next(verdicts) for _ in pairs]
+        if not own:
+            continue
+        with speaking_of(test.sides):
+            compared = _compared(own, source, units[test.name])
+        if source.key == "stated":
+            stated[test.name] = compared
+        else:
+            others[test.name] = (*others.get(test.name, ()), compared)
+    return References(stated, others, tuple(_unused(tests, files)))
+
+
+# The bench file -----------------------------------------------------------------------------------
+
+
+def _stated(run: RunReader, test: AnalysedTest) -> Found | None:
+    trials = [each.trial for each in test.trials if _measured(run, each.trial)]
+    bench = _bench(trials[0]) if trials else None
+    if bench is None or not bench.known.values:
+        return None
+    findings = (each for each in test.result.findings if not each.recomputed)
+    known = _to_compare([each for each in findings if each.quantity in QUANTITIES])
+    pairs = []
+    for finding in known:
+        own = [trial for trial in trials if is_of(trial, finding)]
+        on = _bench(own[0]) if own else None
+        if on is None or any(trial.bench != own[0].bench for trial in own[1:]) or why_altered(on):
+            continue
+        stated = stated_value(on, finding.quantity, finding.conditions, finding.unit)
+        if stated is not None:
+            pairs.append(_pair(stated, finding, known))
+    measured = all(pair.reference.origin is Origin.MEASURED for pair in pairs)
+    identified = bench.known.identified if measured else None
+    if identified is None:
+        before, said = "what the bench file states", "The bench file states them"
+        title, column, differ = "Stated by the bench, and found", "Stated", f"differ from {before}"
+    else:
+        before, title, column = (
+            "what was identified",
+            "Identified before, and found now",
+            "Identified",
+        )
+        differ = "changed since they were identified"
+        said = f"The bench file has them from {identified.run} ({identified.command})"
+    said += (
+        "; what both share, such as a torque constant, counts twice, so that small ones go unseen"
+    )
+    return test, Source("stated", title, column, differ, before, said), pairs
+
+
+def _measured(run: RunReader, trial: Trial) -> bool:
+    return run.header.backend != SIMULATED or bool(trial.truth)
+
+
+def _bench(trial: Trial) -> Bench | None:
+    try:
+        return bench_of(trial)
+    except (LookupError, ValidationError, ValueError):
+        return None
+
+
+# A file of values ---------------------------------------------------------------------------------
+
+
+def _of_file(path: Path, values: Sequence[ReferenceValue], test: AnalysedTest) -> Found:
+    pairs: list[Judged] = []
+    for value in values:
+        own = _to_compare(_spoken_of(value, test))
+        pairs += (_pair(value.in_unit_of(finding), finding, own) for finding in own)
+    name = path.name
+    title, said = f"Reference values of {name}, and found", f"The reference values are of {name}"
+    source = Source(f"reference-{path.stem}", title, "Reference", f"differ from {name}", name, said)
+    return test, source, pairs
+
+
+def _spoken_of(value: ReferenceValue, test: AnalysedTest) -> list[Finding]:
+    return [
+        each
+        for each in test.result.findings
+        if not each.recomputed and value.speaks_of(test.name, each)
+    ]
+
+
+def _unused(tests: Sequence[AnalysedTest], files: Files) -> Iterator[str]:
+    """Rows that no finding is of: nothing of a file is left out without a word."""
+    for path, values in files.items():
+        for value in values:
+            if not any(_spoken_of(value, test) for test in tests):
+                yield (
+                    f"{path.name}, {value.place}: no test found {value.estimate.name} in "
+                    f"{value.estimate.unit or 'this unit'} under these conditions; `findings` in "
+                    "report.json has all that was found"
+                )
+
+
+# Both ---------------------------------------------------------------------------------------------
+
+
+def _to_compare(known: Sequence[Finding]) -> list[Finding]:
+    """Of repeated measurements the mean, which tells a smaller change than any of them."""
+    means = [each for each in known if each.conditions.get("statistic") == "mean"]
+    return [each for each in known if each in means or not any(_is_in(each, m) for m in means)]
+
+
+def _is_in(finding: Finding, mean: Finding) -> bool:
+    """Whether a mean is of this number, too: it holds wherever all of the mean's conditions do."""
+    where = {name: value for name, value in mean.conditions.items() if name != "statistic"}
+    return finding.quantity == mean.quantity and where.items() <= finding.conditions.items()
+
+
+def _pair(reference: Estimate, finding: Finding, known: Sequence[Finding]) -> Judged:
+    again = duplicate_of(finding, known)
+    pair = Judged.of(
+        reference, finding.known, quantity=finding.quantity, conditions=finding.conditions
+    )
+    return pair.not_judged(AGAIN(others=again)) if again else pair
+
+
+def _compared(pairs: Sequence[Judged], source: Source, units: TestUnits) -> Compared:
+    told = _told_of(pairs, source, units)
+    table = Table(
+        key=source.key,
+        title=source.title,
+        columns=(
+            Column("quantity", "Quantity"),
+            Column("conditions", "Conditions"),
+            Column("unit", "Unit"),
+            Column("stated", source.column),
+            Column("found", "Found"),
+            Column("difference", "Difference"),
+            Column("change", "Change", "", "percent"),
+            Column("verdict", "Verdict"),
+        ),
+        rows=tuple(_row(pair, units) for pair in pairs),
+        note=(
+            f"{told or 'None of these numbers can be tested'}. {source.said}. "
+            f"A difference is declared where at most {RATE:.0%} of all that this report declares "
+            "are expected to be false (Benjamini and Hochberg)."
+        ),
+    )
+    return Compared(table, told)
+
+
+def _row(pair: Judged, units: TestUnits) -> Mapping[str, Cell]:
+    return {
+        "quantity": quantity_words(pair.quantity),
+        "conditions": conditions_text(pair.conditions, units),
+        "unit": pair.other.unit,
+        "stated": pair.reference,
+        "found": pair.other,
+        "difference": pair.found.difference,
+        "change": pair.found.change,
+        "verdict": pair.outcome,
+    }
+
+
+def _told_of(pairs: Sequence[Judged], source: Source, units: TestUnits) -> str:
+    """Which numbers are not what was stated, or that all are; "" where nothing could be tested."""
+    changed = [pair for pair in pairs if pair.verdict is Verdict.DIFFERENT]
+    tested = sum(pair.testable for pair in pairs)
+    if not tested:
+        return ""
+    if not changed:
+        numbers = "1 number does" if tested == 1 else f"{tested} numbers do"
+        return f"{numbers} not differ from {source.before}, as far as the intervals show"
+    named = "; ".join(_told(pair, units) for pair in changed[:NAMED])
+    more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
+    return f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}"
+
+
+def _told(pair: Judged, units: TestUnits) -> str:
+    where, change = conditions_text(pair.conditions, units), pair.found.change
+    words = f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
+    if math.isnan(change.value):
+        return words
+    size = f"{words} by {_signed(change.value)} %"
+    low, high = (None if end is None else _signed(end) for end in change.combined)
+    return size if None in (low, high) or low == high else f"{size} ({low} to {high} %)"
+
+
+def _signed(share: float) -> str:
+    """In percent."""
+    return f"{'+' if share > 0 else ''}{number(100.0 * share, 2)}"
