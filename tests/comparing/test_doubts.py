@@ -5,11 +5,13 @@ from __future__ import annotations
 import pytest
 
 from campaign.access.analysis import AnalysedTest
-from campaign.comparing.doubts import WRONG_MODEL, doubt
+from campaign.comparing.judging import pairs_of
+from campaign.comparing.pairing import PairedTest
 from campaign.estimate import Origin
 from campaign.estimation.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause
+from campaign.references.judged import WRONG_MODEL, Judged
 from campaign.result import Finding
 from tests.comparing.test_judging import made_up
 
@@ -28,20 +30,26 @@ def test_of(finding: Finding, bench: Bench) -> AnalysedTest:
 test_of.__test__ = False  # type: ignore[attr-defined]
 
 
+def pair_of(findings: list[Finding], bench: Bench) -> Judged:
+    own, other = (test_of(each, bench) for each in findings)
+    (pair,) = pairs_of(PairedTest(own, other, ((findings[0], findings[1]),), (), ()))
+    return pair
+
+
 @pytest.mark.parametrize("side", [0, 1])
 def test_a_number_of_a_model_that_the_data_contradict_is_not_judged(
     platform: Bench, side: int
 ) -> None:
     findings = [torque(Origin.MEASURED), torque(Origin.MEASURED)]
     findings[side] = torque(Origin.CONTRADICTED)
-    tests = test_of(findings[0], platform), test_of(findings[1], platform)
-    told = doubt(tests, (findings[0], findings[1]))
-    assert told in WRONG_MODEL
-    assert str(told).startswith(("the reference", "the other")[side])
-    assert str(CONTRADICTS()) in str(told)
+    told = pair_of(findings, platform)
+    assert told.reason in WRONG_MODEL
+    assert not told.testable
+    assert str(told.reason).startswith(("the reference", "the other")[side])
+    assert str(CONTRADICTS()) in str(told.reason)
 
 
 def test_a_measured_number_is_judged(platform: Bench) -> None:
-    sure = torque(Origin.MEASURED)
-    test = test_of(sure, platform)
-    assert doubt((test, test), (sure, sure)) == NONE
+    told = pair_of([torque(Origin.MEASURED)] * 2, platform)
+    assert told.reason == NONE
+    assert told.testable
