@@ -108,6 +108,14 @@ def test_noise_has_its_band_and_no_other(order: int) -> None:
     assert not np.array_equal(noise, band_noise(2.0, 10.0, 60.0, 200.0, 8, order))
 
 
+def test_a_band_has_the_lines_at_its_ends() -> None:
+    """0.29 Hz of 100 s is line 29, although the product is a little less."""
+    assert 0.29 * 100.0 < 29.0
+    power = np.abs(np.fft.rfft(band_noise(0.1, 0.29, 100.0, 10.0, 7)[:-1])) ** 2
+    present = np.flatnonzero(power > 1e-12 * np.max(power))
+    assert (present[0], present[-1]) == (10, 29)
+
+
 def test_no_noise() -> None:
     with pytest.raises(ValueError, match="duration of"):
         band_noise(1.0, 1.1, 2.0, 100.0, 1)

@@ -160,6 +160,15 @@ def test_dropouts_are_found_where_they_are(motion):
     assert found(motion, "dropout", relative_rate=broken) == []
 
 
+def test_what_is_zero_for_a_tenth_of_a_recording_has_another_reason():
+    motion = rig.sines(0)
+    broken = motion.v.copy()
+    fast = np.abs(motion.v) > 0.3 * np.abs(motion.v).max()
+    broken[fast & (np.arange(len(broken)) % 4 == 0)] = 0.0
+    assert np.mean(broken == 0.0) > 0.05
+    assert found(motion, "dropout", relative_rate=broken) == []
+
+
 @BOTH
 def test_a_noisy_channel_that_stands_still_is_a_dropout(motion):
     quick = int(np.argmax(np.abs(np.gradient(motion.tau[100:-100])))) + 100

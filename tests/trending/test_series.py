@@ -151,3 +151,6 @@ def test_a_change_within_every_single_interval_is_told_as_one():
     assert wide.verdict is narrow.verdict is Verdict.DRIFTS
     assert wide.notes == (WITHIN,)
     assert not narrow.notes
+    (still,) = judged(series(*(number(30 + 0.02 * n, 5.0) for n in (0, 2, 1, 0, 2, 1, 0, 2))))
+    assert still.verdict is Verdict.NOT_SHOWN
+    assert not still.notes, "of what was not declared nothing is said"
