@@ -395,6 +395,24 @@ def test_a_file_may_come_once_more_when_its_columns_were_wrong(folder: Path) -> 
     assert execute(opened(folder)).ending.outcome is Outcome.COMPLETED
 
 
+@pytest.mark.parametrize("accepted", [False, True])
+def test_a_drive_at_its_limit_is_taken_where_the_mapping_accepts_it(
+    folder: Path, accepted: bool
+) -> None:
+    hand_in(folder / "trial-00003", changed(drive_torque=np.clip(GOOD["drive_torque"], -38, 38)))
+    mapping = folder / "columns.toml"
+    text = mapping.read_text(encoding="utf-8")
+    if accepted:
+        column = 'column = "drive_torque"'
+        text = text.replace(column, f'{column}\naccept = ["clipping"]')
+    mapping.write_text(text, encoding="utf-8")
+    done = execute(opened(folder))
+    if accepted:
+        assert done.ending.outcome is Outcome.COMPLETED
+    else:
+        assert done.refused == "clipped"
+
+
 def test_the_manifest_beside_a_recording_says_whose_it_is(folder: Path) -> None:
     hand_in(folder / "trial-00003")
     manifest = (folder / "trial-00004" / "manifest.json").read_bytes()
