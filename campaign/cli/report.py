@@ -99,7 +99,7 @@ def _page(
             formats=chosen_formats(formats),
             trials=_wanted_trials(run, trials),
             zoom=zoom,
-            command=_command(path, references, measure_anew=measure_anew),
+            command=_command(path, measure_anew=measure_anew),
             when_found=write_results,
             references=references,
         )
@@ -130,7 +130,7 @@ def _published(results: PreparedResults) -> str:
         return ""
 
 
-def _command(path: Path, references: Iterable[Path], *, measure_anew: bool) -> str:
+def _command(path: Path, *, measure_anew: bool) -> str:
     """What to type for the same numbers again, from where this command was typed.
 
     A page goes to others, whom no folder of this machine concerns: of an absolute path only the
@@ -143,7 +143,6 @@ def _command(path: Path, references: Iterable[Path], *, measure_anew: bool) -> s
     words += [
         *(["--results FOLDER"] if elsewhere else []),
         *(["--measure-anew"] if measure_anew else []),
-        *(f"--reference {quote(each.name)}" for each in references),
     ]
     return " ".join(words)
 

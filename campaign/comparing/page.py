@@ -14,7 +14,7 @@ from campaign.comparing.comparison import Against, Comparison
 from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters, overlays
 from campaign.comparing.pairing import PairedTest
-from campaign.comparing.pictures import draw_changes, draw_side_by_side
+from campaign.comparing.pictures import change_names, draw_side_by_side
 from campaign.comparing.tables import (
     alone_table,
     bare_differing,
@@ -34,6 +34,7 @@ from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
 from campaign.report.output import MARKER, replaced_folder
+from campaign.report.page.changes import changes_figure
 from campaign.report.page.folder import Download, Folder, ShownFigure, ShownTable
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import variables
@@ -158,7 +159,8 @@ def _against(
         more=max(0, len(declared) - HEADLINES),
         bare=tuple(headline(pair) for pair in bare_differing(against)[:HEADLINES]),
         picture=making.attempt(
-            "the picture of all changes", lambda: _changes(pairs, prefix, folder)
+            "the picture of all changes",
+            lambda: changes_figure(pairs, change_names, folder, f"{prefix}changes"),
         ),
         download=folder.table(table_csv(shorter(table, "finding")), f"{prefix}pairs"),
         tests=tuple(_tests(against, letters, prefix, making)),
@@ -171,21 +173,6 @@ def _against(
 
 def _optional(table: Table | None, name: str, folder: Folder) -> ShownTable | None:
     return None if table is None else folder.shown_table(table, (), name)
-
-
-def _changes(pairs: Sequence[Pair], prefix: str, folder: Folder) -> ShownFigure | None:
-    svg = draw_changes(pairs)
-    if svg is None:
-        return None
-    words = "; ".join(f"{headline(pair)}" for pair in pairs if pair.verdict is Verdict.DIFFERENT)
-    return folder.picture(
-        Drawn.of(svg),
-        "Changes in percent",
-        "Each sign is a number that both runs found, the bar its 95 % interval. Filled: declared"
-        " different. Hollow: no difference is shown, or it is not judged (diamonds).",
-        f"Declared different: {words}." if words else "No difference is declared.",
-        f"{prefix}changes",
-    )
 
 
 def _tests(against: Against, letters: Letters, prefix: str, making: _Making) -> Iterator[ShownTest]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters
@@ -12,52 +12,25 @@ from campaign.comparing.words import condition_words, name_here
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
 from campaign.references.judged import Verdict
+from campaign.report.drawing.changes_picture import MOST, PITCH, name_row, rows
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
-from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER, Look
+from campaign.report.palette import MUTED, Look
 from campaign.text import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PITCH = 0.19
-"""Inches from one row to the next."""
-MOST = 60
-"""Rows that a picture has room for; the tables have them all."""
-LINEAR = 10.0
-"""Percent up to which an axis of changes is linear where some are far larger."""
-FAR = 60.0
-"""Percent beyond which changes count as far larger."""
+
 PANELS = 6
 """Most quantities of a test that are shown side by side."""
-LABEL = 58
-"""Letters of a row's name."""
 
 
-def draw_changes(pairs: Sequence[Pair]) -> str | None:
-    """Every change in percent with its interval, filled where declared; None without any.
-
-    What is not judged is left out, unless nothing else is there.
-    """
-    shown = [pair for pair in pairs if _has_change(pair) and pair.testable]
-    shown = (shown or [pair for pair in pairs if _has_change(pair)])[:MOST]
-    if not shown:
-        return None
-    with canvas(WIDTH, len(shown) * PITCH + 0.9) as sheet:
-        ax = sheet.subplots()
-        limit = _limit(shown)
-        names = row_names(shown)
-        for row, pair in enumerate(shown):
-            _draw_change(ax, pair, row, limit)
-            told = f"{name_here(pair.test, pair.quantity)} · {names[row]}".removesuffix(" · ")
-            _name(ax, row, told, bold=pair.verdict is Verdict.DIFFERENT)
-        if limit > FAR:
-            ax.set_xscale("symlog", linthresh=LINEAR, linscale=1.0)
-            _ticks(ax, limit)
-        ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
-        ax.set_xlim(-limit, limit)
-        _rows(ax, len(shown))
-        ax.set_xlabel("Change, in percent of the reference")
-        return to_svg(sheet)
+def change_names(pairs: Sequence[Pair]) -> list[str]:
+    """`Coulomb friction · direction positive`, of each."""
+    return [
+        f"{name_here(pair.test, pair.quantity)} · {place}".removesuffix(" · ")
+        for pair, place in zip(pairs, row_names(pairs), strict=True)
+    ]
 
 
 def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
@@ -70,8 +43,7 @@ def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
     several = [group[:MOST] for group in groups.values() if len(group) > 1][:PANELS]
     if not several:
         return None
-    rows = [len(group) for group in several]
-    heights = [2 * PITCH * n + 0.75 for n in rows]
+    heights = [2 * PITCH * len(group) + 0.75 for group in several]
     with canvas(WIDTH, sum(heights) + 0.35) as sheet:
         axes = sheet.subplots(len(several), 1, squeeze=False, height_ratios=heights).ravel()
         for ax, group in zip(axes, several, strict=True):
@@ -79,43 +51,6 @@ def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
         handles, labels = axes[0].get_legend_handles_labels()
         sheet.legend(handles, labels, loc="outside upper left", ncols=2, borderpad=0)
         return to_svg(sheet)
-
-
-def _has_change(pair: Pair) -> bool:
-    return pair.found.change.low is not None and pair.found.change.high is not None
-
-
-def _limit(pairs: Sequence[Pair]) -> float:
-    """Half of the axis (percent): all values and, up to three times as far, their intervals."""
-    values = max(abs(100 * pair.found.change.value) for pair in pairs)
-    ends = max(
-        abs(100 * (end or 0.0))
-        for pair in pairs
-        for end in (pair.found.change.low, pair.found.change.high)
-    )
-    return 1.08 * max(min(ends, max(3 * values, 20.0)), values, 0.1)
-
-
-def _draw_change(ax: Axes, pair: Pair, row: int, limit: float) -> None:
-    change = pair.found.change
-    low, value, high = (
-        min(max(100 * (end or 0.0), -limit), limit)
-        for end in (change.low, change.value, change.high)
-    )
-    declared = pair.verdict is Verdict.DIFFERENT
-    look = OTHERS[1] if declared else MUTED
-    ax.plot([low, high], [row, row], color=look.light, linewidth=1.6 if declared else 1.0)
-    face = look.light if declared else PAPER.light
-    ax.plot(
-        [value],
-        [row],
-        marker="o" if pair.testable else "D",
-        markersize=4.5,
-        linestyle="none",
-        color=look.light,
-        markerfacecolor=face,
-        markeredgewidth=1.0,
-    )
 
 
 def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
@@ -131,8 +66,8 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
         for estimate, look, shift, whose in own:
             letter = letters.reference if whose == "r" else letters.other
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
-        _name(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
-    _rows(ax, len(pairs))
+        name_row(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
+    rows(ax, len(pairs))
     words = name_here(first.test, first.quantity)
     label = words[:1].upper() + words[1:]
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
@@ -177,29 +112,3 @@ def _varied(pairs: Sequence[Pair]) -> frozenset[str]:
     """Names of conditions that do not have one value in all pairs."""
     names = {name for pair in pairs for name in pair.conditions}
     return frozenset(n for n in names if len({repr(p.conditions.get(n)) for p in pairs}) > 1)
-
-
-def _name(ax: Axes, row: int, name: str, *, bold: bool) -> None:
-    text: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "center"}
-    short = name if len(name) <= LABEL else f"{name[: LABEL - 1]}…"
-    colour = INK.light if bold else MUTED.light
-    weight = "bold" if bold else "normal"
-    ax.text(-0.015, row, short, fontsize=7.5, color=colour, weight=weight, **text)
-
-
-def _rows(ax: Axes, count: int) -> None:
-    ax.set_ylim(count - 0.4, -0.6)
-    ax.yaxis.set_visible(False)
-    ax.spines["left"].set_visible(False)
-    ax.grid(axis="y", visible=False)
-    for row in range(count - 1):
-        ax.axhline(row + 0.5, color=HAIRLINE.light, linewidth=0.4, zorder=0)
-
-
-def _ticks(ax: Axes, limit: float) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    sizes = [10.0**n for n in range(1, 9) if 10.0**n <= limit]
-    ax.xaxis.set_major_locator(FixedLocator([*(-s for s in reversed(sizes)), 0.0, *sizes]))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda t, _: f"{t:g}".replace("-", "−")))

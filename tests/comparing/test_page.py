@@ -147,7 +147,7 @@ def test_a_figure_that_cannot_be_drawn_costs_only_itself(pair: Comparison, monke
     def broken(*_: object) -> str:
         raise ValueError("no ink")
 
-    monkeypatch.setattr("campaign.comparing.page.draw_changes", broken)
+    monkeypatch.setattr("campaign.comparing.page.changes_figure", broken)
     monkeypatch.setattr("campaign.comparing.page.draw", lambda figure: "<svg></svg>")
     html, files = render(pair, templates_folder())
     assert "the picture of all changes cannot be shown: ValueError: no ink" in html

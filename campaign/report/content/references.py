@@ -65,10 +65,12 @@ class Compared:
 
     Attributes:
         told: without its full stop; "" where nothing could be tested.
+        pairs: with the name of each.
     """
 
     table: Table
     told: str
+    pairs: tuple[tuple[Judged, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,8 @@ def _of_file(path: Path, values: Sequence[ReferenceValue], test: AnalysedTest) -
         own = _to_compare(_spoken_of(value, test))
         pairs += (_pair(value.in_unit_of(finding), finding, own) for finding in own)
     name = path.name
-    title, said = f"Reference values of {name}, and found", f"The reference values are of {name}"
+    title = f"Reference values of {name}, and found"
+    said = f"The reference values are of {name}"
     source = Source(f"reference-{path.stem}", title, "Reference", f"differ from {name}", name, said)
     return test, source, pairs
 
@@ -243,7 +246,7 @@ def _compared(pairs: Sequence[Judged], source: Source, units: TestUnits) -> Comp
             "are expected to be false (Benjamini and Hochberg)."
         ),
     )
-    return Compared(table, told)
+    return Compared(table, told, tuple((pair, _name(pair, units)) for pair in pairs))
 
 
 def _row(pair: Judged, units: TestUnits) -> Mapping[str, Cell]:
@@ -274,13 +277,17 @@ def _told_of(pairs: Sequence[Judged], source: Source, units: TestUnits) -> str:
 
 
 def _told(pair: Judged, units: TestUnits) -> str:
-    where, change = conditions_text(pair.conditions, units), pair.found.change
-    words = f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
+    words, change = _name(pair, units), pair.found.change
     if math.isnan(change.value):
         return words
     size = f"{words} by {_signed(change.value)} %"
     low, high = (None if end is None else _signed(end) for end in change.combined)
     return size if None in (low, high) or low == high else f"{size} ({low} to {high} %)"
+
+
+def _name(pair: Judged, units: TestUnits) -> str:
+    where = conditions_text(pair.conditions, units)
+    return f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
 
 
 def _signed(share: float) -> str:

@@ -18,10 +18,12 @@ from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
 from campaign.report.content.published_beside import as_compared, with_published
+from campaign.report.content.references import Compared
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.strips import draw_strips
+from campaign.report.page.changes import changes_figure
 from campaign.report.page.drawings import (
     OVERVIEW,
     Drawable,
@@ -203,11 +205,7 @@ def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section
         tables_ = [published[n] for n in mine]
         stated = document.references.stated.get(test.name)
         files = document.references.files.get(test.name, ())
-        expected = (
-            document.truths.get(test.name),
-            stated.table if stated else None,
-            *(each.table for each in files),
-        )
+        expected = document.truths.get(test.name), (stated, *files)
         sections.append(_section(place, makers[test.name], document.scoreboard, tables_, expected))
     return tuple(sections)
 
@@ -261,12 +259,35 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     return download
 
 
+Expected = tuple[Table | None, Sequence[Compared | None]]
+"""What is true of a test, and its references: the bench file first."""
+
+
+def _changes(problems: list[str], compared: Compared, maker: _Maker) -> ShownFigure | None:
+    """The picture of a comparison of two numbers or more."""
+    if len(compared.pairs) < 2:
+        return None
+    names = {id(pair): name for pair, name in compared.pairs}
+    key = f"{maker.test.name}-{compared.table.key}"
+    shown: ShownFigure | None = _attempt(
+        problems,
+        key,
+        lambda: changes_figure(
+            [pair for pair, _ in compared.pairs],
+            lambda shown: [names[id(pair)] for pair in shown],
+            maker.folder,
+            key,
+        ),
+    )
+    return shown
+
+
 def _section(
     place: int,
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    expected: Sequence[Table | None],
+    expected: Expected,
 ) -> Section:
     with speaking_of(maker.test.sides):
         return _section_of_axis(place, maker, scoreboard, published, expected)
@@ -277,15 +298,15 @@ def _section_of_axis(
     maker: _Maker,
     scoreboard: Scoreboard,
     published: Sequence[PublishedTable],
-    expected: Sequence[Table | None],
+    expected: Expected,
 ) -> Section:
     test, folder = maker.test, maker.folder
     left_out = tuple(_left_out(test))
     problems = [test.problem] if test.problem else []
     comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
-    truth, prediction, *references = (
-        None if each is None else maker.table(each) for each in expected
-    )
+    truth, references = expected
+    prediction, *others = (None if each is None else maker.table(each.table) for each in references)
+    changes = [_changes(problems, each, maker) for each in references if each is not None]
     figures = [
         shown
         for figure in test.result.figures
@@ -305,9 +326,10 @@ def _section_of_axis(
         comparisons=tuple(comparisons),
         problems=(*left_out, *problems),
         left_out=left_out,
-        truth=truth,
+        truth=None if truth is None else maker.table(truth),
         prediction=prediction,
-        references=tuple(filter(None, references)),
+        references=tuple(filter(None, others)),
+        changes=tuple(filter(None, changes)),
         summary=summary_of(test),
     )
 
