@@ -233,8 +233,9 @@ def words(result: Result) -> str:
 
 def test_multisines_tell_the_response_its_noise_and_distortion() -> None:
     result = analyse(KIND, shaken())
-    (row,) = table(result, "best-linear").rows
-    assert (row["realisations"], row["periods"]) == (7, 2)
+    (source,) = table(result, "responses").rows
+    assert "7 realisations of 2 periods" in str(source["excitation"])
+    (row,) = table(result, "distortion").rows
     even, odd = row["even"], row["odd"]
     assert isinstance(odd, float)
     # Friction of this bench is alike both ways: it distorts at odd lines.
@@ -242,7 +243,16 @@ def test_multisines_tell_the_response_its_noise_and_distortion() -> None:
     assert even is None or cast("float", even) < 0.1 * odd
     crests = [cast("float", each["crest_factor"]) for each in table(result, "reached").rows]
     assert max(crests) < 1.75
-    assert [figure.key for figure in result.figures] == ["command", "response", "levels"]
+    drawn = ["command", "bode-1-load", "distortion-1-load", "coherence"]
+    assert [figure.key for figure in result.figures] == drawn
+
+
+def test_a_dead_torque_sensor_tells_no_response() -> None:
+    first = shaken()[0]
+    torque = replace(first.samples.channels["drive_torque"], samples=0.0 * first.samples.time)
+    dead = replace(first.samples, channels={**first.samples.channels, "drive_torque": torque})
+    told, *_ = analyse(KIND, [replace(first, samples=dead)]).notes
+    assert "drive_torque never changes" in told
 
 
 def test_a_limit_is_held_beside_what_was_reached() -> None:

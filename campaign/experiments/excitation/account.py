@@ -1,4 +1,4 @@
-"""What excitations come to: what was asked and reached, responses, and inverse dynamics."""
+"""What excitations come to: what was asked and reached, and inverse dynamics."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ import numpy as np
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.estimation.excitation_design.fourier import STILL
-from campaign.estimation.frequency.best_linear import BestLinear, best_linear
-from campaign.estimation.frequency.measured import MeasuredResponse
-from campaign.estimation.frequency.welch import Record, welch_response
 from campaign.estimation.gate import admitted_together
 from campaign.estimation.inverse.coefficients import coefficients
 from campaign.estimation.inverse.motion import (
@@ -40,22 +37,8 @@ from campaign.trial import Trial
 
 BAND, LOWEST_BAND = 40.0, 25.0
 """Corner of the low-pass of a series: times its highest harmonic, and at least (Hz)."""
-COHERENT = 0.2
-"""Points of a response whose error is above this share of their size are left out."""
 FORCES = ("inertia", "viscous", "coulomb", "offset", "gravity", "spring")
 """Beginnings of terms that grow with the torque constant."""
-
-
-@dataclass(frozen=True)
-class Response:
-    """Torque to rate of the trials of one place.
-
-    best: of multisines, what they tell besides; None for anything else.
-    """
-
-    measured: MeasuredResponse
-    best: BestLinear | None
-    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -137,70 +120,6 @@ def reached_rate(data: TrialData) -> tuple[Array, Array]:
     return recording.time[cut], recording[GYRO_RATE][cut]
 
 
-# Responses ----------------------------------------------------------------------------------------
-
-
-def response_of(group: Sequence[TrialData]) -> Response:
-    """Of the trials of one place. Raises ValueError where they tell none."""
-    if options_of(group[0].trial).signal == "multisine":
-        return _best_linear(group)
-    rate = group[0].trial.task.sample_rate
-    records = [Record(rate, *_signals(data)) for data in group if _is_whole(data)]
-    if not records:
-        raise ValueError("every trial has lost samples")
-    found = welch_response(records, "reference")
-    found = found.at(found.error < COHERENT * np.abs(found.values))
-    if not len(found.frequency):
-        raise ValueError("no frequency is coherent: the command hardly moves the load")
-    return Response(found, None, ())
-
-
-def _best_linear(group: Sequence[TrialData]) -> Response:
-    options, task = options_of(group[0].trial), group[0].trial.task
-    command = task.command
-    if not isinstance(command, MultiSine):
-        raise ValueError("its command is no sum of sines")
-    whole = [data for data in group if _is_whole(data)]
-    remarks = [
-        f"{data.trial.label}: it has lost samples, and is left out of the response."
-        for data in group
-        if data not in whole
-    ]
-    if not whole:
-        raise ValueError("every trial has lost samples")
-    torque, answer, reference = (
-        np.stack(each) for each in zip(*(_signals(data) for data in whole), strict=True)
-    )
-    lines = np.sort(np.round(np.array(command.frequencies) * options.period).astype(np.int64))
-    best = best_linear(
-        torque, answer, task.sample_rate, options.periods, lines, "reference", reference
-    )
-    return Response(best.response, best, (*remarks, *best.undetermined))
-
-
-def _signals(data: TrialData) -> tuple[Array, Array, Array]:
-    """Torque, rate, and what came from outside, of the part that is measured, each (n,).
-
-    Raises ValueError for one that stays what it is: no response is made of that.
-    """
-    recording = data.recording()
-    cut = measured_part(data.trial, recording)
-    _refuse_constant(recording, cut, DRIVE_TORQUE, GYRO_RATE)
-    reference = data.trial.task.command.sample(recording.time[cut])
-    return recording[DRIVE_TORQUE][cut], recording[GYRO_RATE][cut], reference
-
-
-def _refuse_constant(recording: Recording, cut: slice, *names: str) -> None:
-    for name in names:
-        samples = recording[name][cut]
-        if np.all(samples == samples[0]):
-            raise ValueError(f"{name} never changes: is its sensor connected?")
-
-
-def _is_whole(data: TrialData) -> bool:
-    return all(np.all(np.isfinite(each)) for each in _signals(data))
-
-
 # Inverse dynamics ---------------------------------------------------------------------------------
 
 
@@ -225,7 +144,9 @@ def motion_of(data: TrialData) -> Motion:
     angle, torque = recording[RELATIVE_ANGLE], recording[DRIVE_TORQUE]
     if not np.all(np.isfinite(angle)) or not np.all(np.isfinite(torque)):
         raise ValueError("it has lost samples")
-    _refuse_constant(recording, slice(None), RELATIVE_ANGLE, DRIVE_TORQUE)
+    for name in (RELATIVE_ANGLE, DRIVE_TORQUE):
+        if np.ptp(recording[name]) == 0.0:
+            raise ValueError(f"{name} never changes: is its sensor connected?")
     fewer = decimated(np.column_stack([angle, torque]), _first_decimation(data.trial))
     low_pass = filtering_of(data.trial).low_pass
     return motion_of_position(_fewer_times(data), fewer[:, 0], fewer[:, 1], low_pass)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.estimate import Estimate
-from campaign.experiments.excitation.account import Dynamics, Response
-from campaign.experiments.excitation.tables import distortion_findings
+from campaign.experiments.excitation.account import Dynamics
+from campaign.experiments.responses.sources import Source
+from campaign.experiments.responses.tables import distortion_of
 from campaign.experiments.shared.common import OF_RECORDING
 from campaign.experiments.shared.conclusion_parts import (
     Part,
@@ -19,15 +20,14 @@ from campaign.experiments.shared.conclusion_parts import (
 from campaign.result import Amount, Conclusion
 
 
-def response_conclusion(response: Response, told: Sequence[Part], command: str) -> Conclusion:
+def response_conclusion(source: Source, told: Sequence[Part]) -> Conclusion:
     """Over which band the response is known, and what friction adds to it."""
-    measured = response.measured
+    measured = next(iter(source.responses.values()))
     where: Parts = (*told, ": ") if told else ()
     low, high = float(measured.frequency[0]), float(measured.frequency[-1])
     band: Parts = (setting(low, "Hz"), " to ", setting(high, "Hz"))
     start = "the response of the rate to the drive torque is known from "
-    distorted = distortion_findings(response.best) if response.best else []
-    return conclusion(where, start, band, tuple(_distortion(distorted)))
+    return conclusion(where, start, band, tuple(_distortion(distortion_of(source))))
 
 
 def _distortion(found: Sequence[Estimate]) -> Iterator[Part]:

@@ -128,7 +128,18 @@ def sources(
     remarks += [
         f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
     ]
-    return found, remarks
+    return _named_apart(found), remarks
+
+
+def _named_apart(found: Sequence[Source]) -> list[Source]:
+    """Where names are alike, with the trials: a matrix may sweep what no name tells."""
+    names = [each.name for each in found]
+    return [
+        replace(each, name=f"{each.name}, trials {each.trials[0]} to {each.trials[-1]}")
+        if names.count(each.name) > 1
+        else each
+        for each in found
+    ]
 
 
 def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:

@@ -110,15 +110,18 @@ def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
     )
 
 
-def totals(distortion: Distortion | None) -> dict[str, Estimate]:
-    """Of the band, by parity; of a single period none."""
-    if distortion is None:
-        return {}
+def distortion_of(source: Source) -> list[Estimate]:
+    """Even and odd, of the band and the first sensor; none of what tells none."""
+    found = next((each.distortion for each in source.best.values()), None)
+    return [] if found is None else list(_totals(found).values())
+
+
+def _totals(distortion: Distortion) -> dict[str, Estimate]:
     return {"even": total(distortion, "even"), "odd": total(distortion, "odd")}
 
 
 def _band(distortion: Distortion) -> dict[str, Estimate]:
-    found = totals(distortion)
+    found = _totals(distortion)
     return found | {f"{name}_level": _decibels(each) for name, each in found.items()}
 
 
