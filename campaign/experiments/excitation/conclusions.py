@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.estimate import Estimate
-from campaign.experiments.excitation.account import Dynamics
 from campaign.experiments.responses.sources import Source
 from campaign.experiments.responses.tables import distortion_of
-from campaign.experiments.shared.common import OF_RECORDING
 from campaign.experiments.shared.conclusion_parts import (
     Part,
     Parts,
@@ -17,7 +15,8 @@ from campaign.experiments.shared.conclusion_parts import (
     listed,
     setting,
 )
-from campaign.result import Amount, Conclusion
+from campaign.result import Amount, Conclusion, Finding
+from campaign.text import words
 
 
 def response_conclusion(source: Source, told: Sequence[Part]) -> Conclusion:
@@ -42,28 +41,17 @@ def _distortion(found: Sequence[Estimate]) -> Iterator[Part]:
     yield from listed(parts)
 
 
-def dynamics_conclusion(found: Dynamics, told: Sequence[Part], period: float) -> Conclusion:
-    """What the series told, and how well it was made for that."""
+def dynamics_conclusion(
+    found: Sequence[Finding], told: Sequence[Part], period: float
+) -> Conclusion:
+    """What the series told."""
     where: Parts = (*told, ": ") if told else ()
     items: list[Parts] = []
-    for name, each in found.estimates.items():
-        words = name.replace("_", " ")
-        if words.startswith("coulomb"):
-            words = f"Coulomb friction{words.removeprefix('coulomb')}"
-        elif words.startswith("viscous"):
-            words = f"viscous friction{words.removeprefix('viscous')}"
-        items.append((f"{words} ", Amount(each)))
-    designed = Estimate.without_interval("designed", found.designed, "", OF_RECORDING())
-    reached = Estimate.without_interval("reached", found.fit.likeness, "", OF_RECORDING())
-    return conclusion(
-        where,
-        "the series of ",
-        setting(period, "s"),
-        " tells ",
-        listed(items),
-        "; its columns have a condition number of ",
-        Amount(reached),
-        ", where ",
-        Amount(designed),
-        " was designed",
-    )
+    for each in found:
+        name = words(each.quantity)
+        if name.startswith("coulomb"):
+            name = f"Coulomb friction{name.removeprefix('coulomb')}"
+        elif name.startswith("viscous"):
+            name = f"viscous friction{name.removeprefix('viscous')}"
+        items.append((f"{name} ", Amount(each.known)))
+    return conclusion(where, "the series of ", setting(period, "s"), " tells ", listed(items))

@@ -9,28 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
-from campaign.experiments.excitation.account import (
-    dynamics_of,
-    metrics_of,
-    options_of,
-)
+from campaign.experiments.any_motion.inverse_result import InverseDynamicsOptions, identify
+from campaign.experiments.excitation.account import metrics_of, options_of
 from campaign.experiments.excitation.commands import courses, start_of
 from campaign.experiments.excitation.conclusions import dynamics_conclusion, response_conclusion
-from campaign.experiments.excitation.figures import (
-    command_figure,
-    dynamics_figure,
-    plane_figure,
-)
+from campaign.experiments.excitation.figures import command_figure, plane_figure
 from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.excitation.tables import (
-    dynamics_table,
-    reached_tables,
-)
+from campaign.experiments.excitation.tables import reached_tables
 from campaign.experiments.interface import (
     Chosen,
     Experiment,
@@ -175,7 +166,7 @@ def _analyse(data: TestData) -> Result:
     ]
     for group, suffix in zip(groups, suffixes, strict=True):
         if options_of(group[0].trial).signal == "fourier":
-            results.append(_of_series(group, suffix, told(conditions(group[0]))))
+            results.append(_of_series(data, group, suffix, told(conditions(group[0]))))
     tables = [*reached_tables(accounts), *(t for each in results for t in each.tables)]
     return Result(
         tuple(tables),
@@ -216,20 +207,26 @@ def _responses(trials: Sequence[TrialData], told: Callable[[Place], Parts]) -> R
     )
 
 
-def _of_series(group: Sequence[TrialData], suffix: str, told: Parts) -> Result:
-    """Inverse dynamics of one place of the sweep."""
+def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Parts) -> Result:
+    """Inverse dynamics of one place of the sweep, with the terms that the series is made for."""
+    options = options_of(group[0].trial)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
+    asked = InverseDynamicsOptions(terms=options.terms)
     try:
-        dynamics = dynamics_of(group)
+        found = identify(replace(data, trials=tuple(group)), asked)
     except ValueError as error:
         text = f"{group[0].trial.label}: {error}"
         return Result(notes=(f"{text}.",), conclusions=(conclusion(text),))
-    period = options_of(group[0].trial).period
+    findings = tuple(replace(each, conditions=place) for each in found.findings)
     return Result(
-        (dynamics_table(dynamics, suffix),),
-        (dynamics_figure(dynamics, group, suffix), plane_figure(group, suffix)),
-        tuple(Finding.of(each, place) for each in dynamics.estimates.values()),
-        conclusions=(dynamics_conclusion(dynamics, told, period),),
+        tuple(replace(each, key=f"{each.key}{suffix}") for each in found.tables),
+        (
+            *(replace(each, key=f"{each.key}{suffix}") for each in found.figures),
+            plane_figure(group, suffix),
+        ),
+        findings,
+        found.notes,
+        (dynamics_conclusion(findings, told, options.period),),
     )
 
 

@@ -1,19 +1,18 @@
-"""Figures of excitations: asked and reached, and inverse dynamics."""
+"""Figures of excitations: what was asked, and what was reached."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
 from campaign.channels import DRIVE_TORQUE
 from campaign.experiments.excitation.account import (
-    Dynamics,
     measured_part,
     motion_of,
     options_of,
     reached_rate,
-    wanted_of,
 )
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.figures import FREQUENCY, decibel
@@ -98,43 +97,14 @@ def _filled(samples: Array) -> Array:
     return np.asarray(np.nan_to_num(samples))
 
 
-def dynamics_figure(found: Dynamics, group: Sequence[TrialData], suffix: str) -> Figure:
-    """Measured and modelled torque of the first trial, and what is left."""
-    left = found.torque - found.predicted
-    first = found.time - found.time[0] <= options_of(group[0].trial).period
-    moves = found.moves > 0
-    fitted = np.where(moves, left, np.nan)
-    time = found.time[first]
-    return Figure(
-        key=f"torque{suffix}",
-        title="Torque of the series, measured and modelled",
-        caption="One period. The model's torque has the terms that the series was searched for; "
-        "what they leave over is drawn where the axis moves, which is where they are fitted.",
-        alt="Measured and modelled drive torque over time, and their difference.",
-        panels=(
-            Panel(
-                TIME,
-                Axis("Drive torque", "N m", "N m"),
-                [
-                    Curve(time, found.torque[first], "measured", "measured"),
-                    Curve(time, found.predicted[first], "model", "fit", "thin"),
-                ],
-            ),
-            Panel(
-                TIME,
-                Axis("Left over", "N m", "N m"),
-                [Curve(time, fitted[first], "", "measured", "thin")],
-            ),
-        ),
-        trials=(group[0].trial.number,),
-    )
-
-
 def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     """Where in angle and rate a series goes, asked and reached."""
     data = group[0]
-    moved, wanted = motion_of(data), wanted_of(data)
-    first = moved.time - moved.time[0] <= options_of(data.trial).period
+    moved, task = motion_of(data), data.trial.task
+    first = slice(round(options_of(data.trial).period * task.sample_rate) + 1)
+    time = moved.time[first]
+    command = cast("MultiSine", task.command)
+    angle = command.integral(time, 1) - command.integral(np.zeros(1), 1) + task.start_angle
     return Figure(
         key=f"plane{suffix}",
         title="Where the series goes",
@@ -146,7 +116,7 @@ def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
                 Axis("Angle", "rad", "deg"),
                 Axis("Rate", "rad/s", "deg/s"),
                 [
-                    Curve(wanted.position[first], wanted.rate[first], "asked", "reference"),
+                    Curve(angle, command.sample(time), "asked", "reference"),
                     Curve(moved.position[first], moved.rate[first], "reached", "measured", "thin"),
                 ],
             ),

@@ -1,14 +1,11 @@
-"""Tables of excitations, and what of them is a finding."""
+"""Tables of excitations: what was asked, and what was reached."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
-from campaign.estimation.inverse.terms import TERMS
-from campaign.experiments.excitation.account import Dynamics
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.shared.common import OF_RECORDING
 from campaign.physics.complete import limits_of
@@ -70,46 +67,4 @@ def _row(data: TrialData, found: Mapping[str, Estimate]) -> dict[str, Cell]:
         **{name: found.get(name) for name, _ in USED},
         "used": None if nearest is None else shares[nearest],
         "limit": nearest,
-    }
-
-
-def dynamics_table(found: Dynamics, suffix: str) -> Table:
-    """Each coefficient with its meaning, and how well the motion told them apart."""
-    rows: list[dict[str, Cell]] = [
-        {
-            "term": name.replace("_", " "),
-            "meaning": TERMS[name].meaning,
-            "unit": estimate.unit,
-            "value": estimate,
-        }
-        for name, estimate in found.estimates.items()
-    ]
-    designed, reached = found.designed, found.fit.likeness
-    rows += [
-        _plain("condition number, designed", "Of the motion that was asked.", designed),
-        _plain("condition number, reached", "Of the motion as it was recorded.", reached),
-        _plain("left over", "Norm of the residual over that of the torque.", found.fit.relative),
-    ]
-    return Table(
-        key=f"inverse-dynamics{suffix}",
-        title="Inverse dynamics of the series",
-        columns=(
-            Column("term", "Term"),
-            Column("meaning", "Meaning"),
-            Column("unit", "Unit"),
-            Column("value", "Value"),
-        ),
-        rows=tuple(rows),
-        note="Condition numbers are of columns of unit length, which no choice of units changes, "
-        f"behind the same filters. Rows that stand still are left out; {DRIVE_TORQUE} is as it was "
-        "recorded, without a delay: `campaign identify` looks for one, and for further terms.",
-    )
-
-
-def _plain(term: str, meaning: str, value: float) -> dict[str, Cell]:
-    return {
-        "term": term,
-        "meaning": meaning,
-        "unit": "",
-        "value": Estimate.without_interval("value", value, "", OF_RECORDING()),
     }
