@@ -57,7 +57,7 @@ FAVARD = 0.5 * math.pi
 
 def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
     moved = (RELATIVE_ANGLE,) if options.signal == "fourier" else (GYRO_RATE,)
-    can_use = () if options.signal == "fourier" else (RELATIVE_ANGLE,)
+    can_use = (GYRO_RATE,) if options.signal == "fourier" else (RELATIVE_ANGLE,)
     mode: Literal["rate", "torque"] = options.command
     for course in courses(options, bench):
         yield TrialRequest(
@@ -244,5 +244,8 @@ EXPERIMENT = Experiment(
         GYRO_RATE: "how the load answers",
         RELATIVE_ANGLE: "how a series moved it",
     },
-    can_use={RELATIVE_ANGLE: "largest angle beside its limit"},
+    can_use={
+        RELATIVE_ANGLE: "largest angle beside its limit",
+        GYRO_RATE: "acceleration of the load in space: that of its angle stands in for it",
+    },
 )
