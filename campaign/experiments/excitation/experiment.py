@@ -218,6 +218,7 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Pa
         text = f"{group[0].trial.label}: {error}"
         return Result(notes=(f"{text}.",), conclusions=(conclusion(text),))
     findings = tuple(replace(each, conditions=place) for each in found.findings)
+    terms = [each for each in findings if each.quantity in options.terms]
     return Result(
         tuple(replace(each, key=f"{each.key}{suffix}") for each in found.tables),
         (
@@ -226,7 +227,7 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Pa
         ),
         findings,
         found.notes,
-        (dynamics_conclusion(findings, told, options.period),),
+        (dynamics_conclusion(terms, told, options.period),),
     )
 
 
