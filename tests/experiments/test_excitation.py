@@ -13,7 +13,6 @@ import pytest
 from campaign.backends.serial import SerialBackend, SerialOptions
 from campaign.estimation.gate import UNPHYSICAL
 from campaign.experiments import experiments
-from campaign.experiments.excitation.account import dynamics_of, motion_of
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import Experiment
 from campaign.physics.bench import Bench
@@ -25,8 +24,9 @@ from campaign.result import Result
 from campaign.signals import MultiSine, Polyline
 from campaign.trial import Trial
 from tests.backends.test_files import opened
+from tests.estimation.coverage import holds
 from tests.experiments.asked import suitable
-from tests.experiments.laboratory import Done, analyse, execute, table, trials
+from tests.experiments.laboratory import Done, analyse, execute, finding, table, trials
 from tests.link.controllers import controller
 from tests.physics.benches import bench
 
@@ -182,33 +182,28 @@ def test_a_file_of_another_mode_is_refused(tmp_path: Path) -> None:
 
 def test_a_series_tells_the_inertia_and_friction_of_the_bench() -> None:
     result = analyse(KIND, series())
-    found = {each.quantity: each.estimate for each in result.findings}
-    inertia, viscous = found["inertia"], found["viscous"]
-    assert inertia is not None
-    assert viscous is not None
+    inertia, viscous = (finding(result, name).known for name in ("inertia", "viscous"))
+    assert viscous.has_interval
     # The motor side turns with the load: its inertia is that of the axis, as the bench says it.
-    assert inertia.low is not None
-    assert inertia.high is not None
-    assert inertia.low < cast("float", bench().axis.inertia) < inertia.high
-    rows = {row["term"]: row["value"] for row in table(result, "inverse-dynamics").rows}
-    designed = rows["condition number, designed"]
-    assert isinstance(designed, float)
-    assert 1.0 < designed < 4.0
-    assert rows["condition number, reached"] == pytest.approx(designed, rel=0.2)
-    assert [figure.key for figure in result.figures] == ["command", "torque", "plane"]
+    assert holds(inertia, cast("float", bench().axis.inertia))
+    drawn = ["command", "friction-over-rate", "residuals", "plane"]
+    assert [figure.key for figure in result.figures] == drawn
     assert "tells inertia" in words(result)
 
 
-def test_a_force_of_the_wrong_sign_has_no_inertia_and_no_friction(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    turned = motion_of(series()[0])
-    turned = replace(turned, force=-turned.force)
-    monkeypatch.setattr("campaign.experiments.excitation.account.motion_of", lambda _: turned)
-    found = dynamics_of(series()[:1]).estimates
-    assert found["inertia"].value < 0.0
+def turned(done: Done, factor: float) -> Done:
+    """The same with its torque times a factor."""
+    torque = done.samples.channels["drive_torque"]
+    torque = replace(torque, samples=factor * torque.samples)
+    samples = replace(done.samples, channels={**done.samples.channels, "drive_torque": torque})
+    return replace(done, samples=samples)
+
+
+def test_a_force_of_the_wrong_sign_has_no_inertia_and_no_friction() -> None:
+    result = analyse(KIND, [turned(series()[0], -1.0)])
+    assert finding(result, "inertia").known.value < 0.0
     for name in ("inertia", "coulomb_positive", "coulomb_negative"):
-        assert found[name].reason in UNPHYSICAL
+        assert finding(result, name).known.reason in UNPHYSICAL
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -216,13 +211,9 @@ def test_what_friction_does_in_reversals_is_part_of_the_interval(seed: int) -> N
     on = load_bench("platform")
     (trial,) = trials(KIND, on, {"signal": "fourier", "periods": 3, "seed": seed})
     played = execute([trial.model_copy(update={"seed": 100 + seed})])
-    inertia = dynamics_of(played).estimates["inertia"]
-    parts = {each.source: each.standard_uncertainty for each in inertia.systematic}
-    assert parts["slow rows"] is not None
-    assert parts["slow rows"] > 0.0
-    assert inertia.low is not None
-    away = abs(inertia.value - cast("float", on.axis.inertia))
-    assert away <= np.hypot(inertia.value - inertia.low, 1.96 * parts["slow rows"])
+    inertia = finding(analyse(KIND, played), "inertia").known
+    assert "slow" in {each.source for each in inertia.systematic}
+    assert holds(inertia, cast("float", on.axis.inertia))
 
 
 def words(result: Result) -> str:
@@ -233,8 +224,9 @@ def words(result: Result) -> str:
 
 def test_multisines_tell_the_response_its_noise_and_distortion() -> None:
     result = analyse(KIND, shaken())
-    (row,) = table(result, "best-linear").rows
-    assert (row["realisations"], row["periods"]) == (7, 2)
+    (source,) = table(result, "responses").rows
+    assert "7 realisations of 2 periods" in str(source["excitation"])
+    (row,) = table(result, "distortion").rows
     even, odd = row["even"], row["odd"]
     assert isinstance(odd, float)
     # Friction of this bench is alike both ways: it distorts at odd lines.
@@ -242,7 +234,13 @@ def test_multisines_tell_the_response_its_noise_and_distortion() -> None:
     assert even is None or cast("float", even) < 0.1 * odd
     crests = [cast("float", each["crest_factor"]) for each in table(result, "reached").rows]
     assert max(crests) < 1.75
-    assert [figure.key for figure in result.figures] == ["command", "response", "levels"]
+    drawn = ["command", "bode-1-load", "distortion-1-load", "coherence"]
+    assert [figure.key for figure in result.figures] == drawn
+
+
+def test_a_dead_torque_sensor_tells_no_response() -> None:
+    told, *_ = analyse(KIND, [turned(shaken()[0], 0.0)]).notes
+    assert "drive_torque never changes" in told
 
 
 def test_a_limit_is_held_beside_what_was_reached() -> None:

@@ -14,12 +14,12 @@ from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
-from campaign.experiments.frequency_response.model.amplitudes import by_amplitude
 from campaign.experiments.frequency_response.model.axis_numbers import UNKNOWN
 from campaign.experiments.frequency_response.model.frequency_fit import TOO_FEW
-from campaign.experiments.frequency_response.model.repeating import unused
-from campaign.experiments.frequency_response.model.signals import base_frequency
-from campaign.experiments.frequency_response.model.sources import _lines
+from campaign.experiments.responses.amplitudes import by_amplitude
+from campaign.experiments.responses.repeating import unused
+from campaign.experiments.responses.signals import base_frequency
+from campaign.experiments.responses.sources import _lines
 from campaign.identify.material import choose
 from campaign.result import Result
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero

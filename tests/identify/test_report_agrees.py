@@ -16,17 +16,18 @@ from campaign.resources import protocols_folder
 from campaign.result import Result
 from campaign.trial import Trial
 from tests.experiments.asked import asked
-from tests.experiments.laboratory import Done, execute
+from tests.experiments.laboratory import Done, execute, table_of_estimates
 
 PROTOCOLS = sorted(protocols_folder().glob("*.toml"))
 MODELS = {
     "breakaway": "ramps",
+    "excitation": "frequency_response",
     "frequency_response": "frequency_response",
     "presliding_multisine": "presliding",
     "velocity_map": "friction_map",
 }
-SWEPT = {"frequency", "speed", "start_angle"}
-"""What trials of one sine sweep, or of one map, differ in."""
+SWEPT = {"frequency", "speed", "start_angle", "realisation", "amplitude"}
+"""What trials of one sine sweep, of one map, or of one test of multisines differ in."""
 CURVE = ("viscous_friction", "coulomb_torque", "static_torque", "stribeck_velocity")
 QUANTITIES = {
     "ramps": {"breakaway_torque": "breakaway_torque", "strongest_stiffness": "bristle_stiffness"},
@@ -71,6 +72,9 @@ def test_report_and_identification_agree(path: Path) -> None:
     for test, trials in planned(path).items():
         done, kind = executed(trials), trials[0].kind
         report = result_of(experiments()[kind], TestData(test, kind, {}, tuple(done)))
+        if kind == "excitation":
+            agree_on_an_excitation(report, done)
+            continue
         identified = asked(MODELS[kind], done)
         # Of both directions, which stand first, or of the only one.
         means = [f for f in report.findings if kind != "breakaway" or "statistic" in f.conditions]
@@ -84,6 +88,28 @@ def test_report_and_identification_agree(path: Path) -> None:
         assert names.keys() <= told.keys(), test
         for name, quantity in names.items():
             assert replace(told[name], name=quantity) == found[quantity], (test, name)
+
+
+def agree_on_an_excitation(report: Result, done: list[Done]) -> None:
+    """Distortion of multisines, in its tables; inverse dynamics of a series, with its terms."""
+    options = done[0].trial.options
+    if options["signal"] == "fourier":
+        identified = asked("inverse_dynamics", done, terms=options["terms"])
+        assert [each.known for each in report.findings] == [
+            each.known for each in identified.findings
+        ]
+        assert {each.quantity for each in report.findings} == {*options["terms"], "delay"}
+        return
+    identified = asked("frequency_response", done)
+    for key in ("responses", "distortion", "distortion-lines"):
+        one, other = (table_of_estimates(each, key).rows for each in (report, identified))
+        assert sorted(map(str, one)) == sorted(map(str, other)), key
+    levels = [
+        row[parity]
+        for row in table_of_estimates(report, "distortion").rows
+        for parity in ("even", "odd")
+    ]
+    assert [each.known for each in report.findings] == levels
 
 
 def agree_on_a_map(report: Result, told: dict[str, Estimate]) -> None:

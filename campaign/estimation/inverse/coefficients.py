@@ -1,14 +1,11 @@
-"""Coefficients of an inverse dynamic model as estimates: scatter, and what other rows would say.
-
-`coefficients` is for terms that are known and a force that is not late. Where terms and delay are
-to be found as well, `campaign.experiments.any_motion` does that, with the same two steps.
-"""
+"""Coefficients of an inverse dynamic model as estimates: scatter, and what other rows would say."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 
 import numpy as np
 
@@ -20,29 +17,10 @@ from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import Term
 from campaign.reason import Cause
 
-FASTER = 5.0
-"""times the slowest rate of a row: rows below that are left out to see what they do."""
 METHOD = "least squares; deviation with autocorrelation (Newey and West)"
 TOO_FEW_ROWS = Cause(
     "too few independent rows", "what is left over is worth too few independent rows"
 )
-
-
-def coefficients(
-    motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering
-) -> tuple[Regression, dict[str, Estimate]]:
-    """Of all motions together, by the names of the terms.
-
-    Systematic parts of a coefficient are how far it goes with half the band of the rows, and
-    without slow rows, where friction is more than these terms say (Stribeck's, bristles, a force
-    that is late as it reverses). Raises ValueError where the motions do not tell the terms apart.
-    """
-    fit = regress([rows(motion, terms, filtering) for motion in motions])
-    parts = {"band": filtering.half_band}
-    if filtering.slowest > 0.0:
-        parts["slow rows"] = replace(filtering, slowest=FASTER * filtering.slowest)
-    moved = {name: shifts(fit, motions, terms, each) for name, each in parts.items()}
-    return fit, estimates(fit, terms, moved)
 
 
 def estimates(
@@ -76,15 +54,25 @@ def shifts(
     fit: Regression,
     motions: Sequence[Motion],
     terms: Sequence[Term],
-    filtering: Filtering,
+    filterings: Sequence[Filtering],
     delay: float = 0.0,
 ) -> Array | None:
-    """How far coefficients go with rows made otherwise, shape (k,); None where they tell none.
+    """How far coefficients go at most with rows made otherwise, shape (k,); None where these tell
+    none.
 
     delay: by which the force is late in these rows (s).
     """
-    try:
-        other = regress([rows(motion, terms, filtering, delay) for motion in motions])
-    except ValueError:
-        return None
-    return np.asarray(np.abs(other.values - fit.values))
+
+    def other(filtering: Filtering) -> Array:
+        return regress([rows(motion, terms, filtering, delay) for motion in motions]).values
+
+    return farthest(fit.values, [partial(other, each) for each in filterings])
+
+
+def farthest(values: Array, others: Iterable[Callable[[], Array]]) -> Array | None:
+    """How far other values of shape (k,) go at most; None without any. ValueError makes none."""
+    found = []
+    for other in others:
+        with suppress(ValueError):
+            found.append(np.abs(other() - values))
+    return np.max(found, axis=0) if found else None

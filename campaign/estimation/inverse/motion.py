@@ -25,6 +25,8 @@ LOW_PASS, LOW_PASS_SHARE = 100.0, 0.2
 """Hz, and share of the sample rate: the smaller is the corner, where nobody says another."""
 REGRESSION_RATE = 100.0
 """Hz; samples are decimated to about this where nobody says how far."""
+FASTER = (2.0, 5.0)
+"""times the slowest rate, below which rows are left out to see what sliding that sets in does."""
 SHORTEST = 8
 """Decimated samples that a piece of a motion must have to be used."""
 
@@ -58,9 +60,9 @@ class Filtering:
         return replace(self, decimation=2 * self.decimation)
 
     @property
-    def faster(self) -> Self:
-        """Without rows up to twice the rate: what happens as sliding sets in counts for less."""
-        return replace(self, slowest=2.0 * self.slowest)
+    def faster(self) -> tuple[Self, ...]:
+        """Without rows up to higher rates: what happens as sliding sets in counts for less."""
+        return tuple(replace(self, slowest=times * self.slowest) for times in FASTER)
 
 
 @dataclass(frozen=True, eq=False)

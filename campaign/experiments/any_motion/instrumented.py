@@ -12,12 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS
+from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS, farthest
 from campaign.estimation.inverse.delay import LONGEST
 from campaign.estimation.inverse.instruments import WEAK, Instrumented, by_instruments
 from campaign.estimation.inverse.motion import Array, Filtering, Motion
@@ -203,18 +204,21 @@ def _iterated(
         if fitted:
             delay = min(max(delay + float(found.fit.values[-1]), -reach), reach)
     along = ALONG_FORCE if loops is None else ALONG_WANTED
-    others = {"band": (filtering.half_band, before), "slow": (filtering.faster, before)}
+    others = {
+        "band": [(filtering.half_band, before)],
+        "slow": [(each, before) for each in filtering.faster],
+    }
     if not fitted and not stated:
         doubt = max(1.0 / pieces[0].motion.sample_rate, abs(before) / NORMAL_95)
-        others["delay"] = (filtering, before - doubt)
-    parts: dict[str, Array | None] = {}
-    for source, (rows, late) in others.items():
-        try:
-            other = _regressed(pieces, made, terms, at, rows, late, fitted=fitted)
-        except ValueError:
-            parts[source] = None
-        else:
-            parts[source] = np.abs(other.fit.values - found.fit.values)
+        others["delay"] = [(filtering, before - doubt)]
+
+    def other(rows: Filtering, late: float) -> Array:
+        return _regressed(pieces, made, terms, at, rows, late, fitted=fitted).fit.values
+
+    parts = {
+        source: farthest(found.fit.values, [partial(other, *each) for each in every])
+        for source, every in others.items()
+    }
     told = [
         _estimate(term.name, term.unit, along, found, index, float(values[index]), parts)
         for index, term in enumerate(terms)

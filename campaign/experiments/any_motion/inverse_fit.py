@@ -308,12 +308,12 @@ def _estimates(
     """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
     fit, terms = best.structure.fit, best.structure.terms
     parts = {
-        "band": shifts(fit, motions, terms, filtering.half_band, best.delay),
+        "band": shifts(fit, motions, terms, [filtering.half_band], best.delay),
         "slow": shifts(fit, motions, terms, filtering.faster, best.delay),
     }
     if late.origin is not Origin.GIVEN:
         parts["delay"] = shifts(
-            fit, motions, terms, filtering, best.delay + _doubt(best, late, motions[0])
+            fit, motions, terms, [filtering], best.delay + _doubt(best, late, motions[0])
         )
     bends = [TERMS[f"{term.name}{SQUARED}"] for term in terms if f"{term.name}{SQUARED}" in TERMS]
     if bends:

@@ -166,16 +166,18 @@ def with_slowest(filtering: Filtering, pieces: Sequence[Moved], slowest: float |
 
 
 def _pieces(archived: TrialData, filtering: Filtering) -> Iterator[Moved]:
-    recording = archived.recording()
+    recording, task = archived.recording(), archived.trial.task
     force = force_of(archived)
     sources = _sources(recording, force)
     good = np.all([np.isfinite(recording[name]) for name in sources], axis=0)
-    rate = archived.trial.task.sample_rate
+    rate = task.sample_rate
     enough = min(round(SHORTEST_PIECE * rate), round(MOST * len(good)))
     fewest = max(FEWEST_SAMPLES, enough + filtering.skip)
     for piece in whole_pieces(good, fewest):
         parts = {name: np.asarray(recording[name][piece], dtype=float) for name in sources}
         parts[FORCE] = parts.pop(force)
+        if task.mode == "rate" and not parts.keys() & {REFERENCE, COMMAND}:
+            parts[COMMAND] = task.command.sample(recording.time[piece])
         yield Moved(
             archived.trial.number,
             _motion(recording.time[piece], parts, filtering),

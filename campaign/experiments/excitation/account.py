@@ -1,80 +1,23 @@
-"""What excitations come to: what was asked and reached, responses, and inverse dynamics."""
+"""What an excitation asked for, and what it reached."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
 
 import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
-from campaign.estimation.excitation_design.fourier import STILL
-from campaign.estimation.frequency.best_linear import BestLinear, best_linear
-from campaign.estimation.frequency.measured import MeasuredResponse
-from campaign.estimation.frequency.welch import Record, welch_response
-from campaign.estimation.gate import admitted_together
-from campaign.estimation.inverse.coefficients import coefficients
-from campaign.estimation.inverse.motion import (
-    REGRESSION_RATE,
-    Filtering,
-    Motion,
-    decimated,
-    first_kept,
-    motion_of_position,
-)
-from campaign.estimation.inverse.regression import Regression
-from campaign.estimation.inverse.rows import all_rows, moving, rows
-from campaign.estimation.inverse.terms import TERMS, Term
+from campaign.estimation.inverse.motion import Filtering, Motion
+from campaign.experiments.any_motion.motions import moved
 from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import OF_RECORDING
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.physics.limits import motion as asked_of
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.signals import MultiSine
 from campaign.trial import Trial
-
-BAND, LOWEST_BAND = 40.0, 25.0
-"""Corner of the low-pass of a series: times its highest harmonic, and at least (Hz)."""
-COHERENT = 0.2
-"""Points of a response whose error is above this share of their size are left out."""
-FORCES = ("inertia", "viscous", "coulomb", "offset", "gravity", "spring")
-"""Beginnings of terms that grow with the torque constant."""
-
-
-@dataclass(frozen=True)
-class Response:
-    """Torque to rate of the trials of one place.
-
-    best: of multisines, what they tell besides; None for anything else.
-    """
-
-    measured: MeasuredResponse
-    best: BestLinear | None
-    remarks: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Dynamics:
-    """An inverse dynamic model of the series of one place, and how well its motion told it.
-
-    Attributes:
-        time, torque, predicted: of the rows of the first trial, shape (n,).
-        moves: 1 for rows that count, 0 where the axis stands, shape (n,).
-        designed: condition number of the columns of the motion that was asked, of unit length.
-    """
-
-    fit: Regression
-    estimates: Mapping[str, Estimate]
-    time: Array
-    torque: Array
-    predicted: Array
-    moves: Array
-    designed: float
 
 
 def options_of(trial: Trial) -> ExcitationOptions:
@@ -137,149 +80,7 @@ def reached_rate(data: TrialData) -> tuple[Array, Array]:
     return recording.time[cut], recording[GYRO_RATE][cut]
 
 
-# Responses ----------------------------------------------------------------------------------------
-
-
-def response_of(group: Sequence[TrialData]) -> Response:
-    """Of the trials of one place. Raises ValueError where they tell none."""
-    if options_of(group[0].trial).signal == "multisine":
-        return _best_linear(group)
-    rate = group[0].trial.task.sample_rate
-    records = [Record(rate, *_signals(data)) for data in group if _is_whole(data)]
-    if not records:
-        raise ValueError("every trial has lost samples")
-    found = welch_response(records, "reference")
-    found = found.at(found.error < COHERENT * np.abs(found.values))
-    if not len(found.frequency):
-        raise ValueError("no frequency is coherent: the command hardly moves the load")
-    return Response(found, None, ())
-
-
-def _best_linear(group: Sequence[TrialData]) -> Response:
-    options, task = options_of(group[0].trial), group[0].trial.task
-    command = task.command
-    if not isinstance(command, MultiSine):
-        raise ValueError("its command is no sum of sines")
-    whole = [data for data in group if _is_whole(data)]
-    remarks = [
-        f"{data.trial.label}: it has lost samples, and is left out of the response."
-        for data in group
-        if data not in whole
-    ]
-    if not whole:
-        raise ValueError("every trial has lost samples")
-    torque, answer, reference = (
-        np.stack(each) for each in zip(*(_signals(data) for data in whole), strict=True)
-    )
-    lines = np.sort(np.round(np.array(command.frequencies) * options.period).astype(np.int64))
-    best = best_linear(
-        torque, answer, task.sample_rate, options.periods, lines, "reference", reference
-    )
-    return Response(best.response, best, (*remarks, *best.undetermined))
-
-
-def _signals(data: TrialData) -> tuple[Array, Array, Array]:
-    """Torque, rate, and what came from outside, of the part that is measured, each (n,).
-
-    Raises ValueError for one that stays what it is: no response is made of that.
-    """
-    recording = data.recording()
-    cut = measured_part(data.trial, recording)
-    _refuse_constant(recording, cut, DRIVE_TORQUE, GYRO_RATE)
-    reference = data.trial.task.command.sample(recording.time[cut])
-    return recording[DRIVE_TORQUE][cut], recording[GYRO_RATE][cut], reference
-
-
-def _refuse_constant(recording: Recording, cut: slice, *names: str) -> None:
-    for name in names:
-        samples = recording[name][cut]
-        if np.all(samples == samples[0]):
-            raise ValueError(f"{name} never changes: is its sensor connected?")
-
-
-def _is_whole(data: TrialData) -> bool:
-    return all(np.all(np.isfinite(each)) for each in _signals(data))
-
-
-# Inverse dynamics ---------------------------------------------------------------------------------
-
-
-def filtering_of(trial: Trial) -> Filtering:
-    """For rows of a series: its harmonics and what friction adds, not the sensor's noise."""
-    options = options_of(trial)
-    rate = trial.task.sample_rate / _first_decimation(trial)
-    corner = max(LOWEST_BAND, BAND * options.harmonics / options.period)
-    corner = min(corner, Filtering.for_rate(rate).low_pass)
-    slowest = STILL * asked_of(trial.task).rate
-    return Filtering(corner, max(1, round(rate / corner)), slowest=slowest)
-
-
-def _first_decimation(trial: Trial) -> int:
-    """In two steps: a filter that passes as little as a series needs is not exact in one."""
-    return max(1, round(trial.task.sample_rate / REGRESSION_RATE))
-
-
 def motion_of(data: TrialData) -> Motion:
-    """How a series moved. Raises ValueError for lost samples, and for a sensor that is dead."""
-    recording = data.recording()
-    angle, torque = recording[RELATIVE_ANGLE], recording[DRIVE_TORQUE]
-    if not np.all(np.isfinite(angle)) or not np.all(np.isfinite(torque)):
-        raise ValueError("it has lost samples")
-    _refuse_constant(recording, slice(None), RELATIVE_ANGLE, DRIVE_TORQUE)
-    fewer = decimated(np.column_stack([angle, torque]), _first_decimation(data.trial))
-    low_pass = filtering_of(data.trial).low_pass
-    return motion_of_position(_fewer_times(data), fewer[:, 0], fewer[:, 1], low_pass)
-
-
-def _fewer_times(data: TrialData) -> Array:
-    time, factor = data.recording().time, _first_decimation(data.trial)
-    return time[first_kept(len(time), factor) :: factor]
-
-
-def wanted_of(data: TrialData) -> Motion:
-    """How it was meant to move."""
-    task, time = data.trial.task, _fewer_times(data)
-    command = task.command
-    if not isinstance(command, MultiSine):
-        raise ValueError("its command is no sum of sines")
-    angle = command.integral(time, 1) - command.integral(np.zeros(1), 1) + task.start_angle
-    rate, acceleration = command.sample(time), command.integral(time, -1)
-    return Motion(time, angle, rate, acceleration, np.zeros_like(time))
-
-
-def dynamics_of(group: Sequence[TrialData]) -> Dynamics:
-    """Of all trials of one place together. Raises ValueError where they do not tell the terms."""
-    first = group[0]
-    options, filtering = options_of(first.trial), filtering_of(first.trial)
-    terms = [TERMS[name] for name in options.terms]
-    motions = [motion_of(data) for data in group]
-    fit, found = coefficients(motions, terms, filtering)
-    piece = all_rows(motions[0], terms, filtering)
-    scaled = {name: _with_constants(each, first) for name, each in found.items()}
-    matters = dict(zip(options.terms, map(float, fit.matters), strict=True))
-    return Dynamics(
-        fit,
-        admitted_together(scaled, matters),
-        piece.time,
-        piece.force,
-        piece.columns @ fit.values,
-        moving(motions[0], filtering),
-        _designed(wanted_of(first), terms, filtering),
-    )
-
-
-def _designed(wanted: Motion, terms: Sequence[Term], filtering: Filtering) -> float:
-    """Through the same filters as what was measured."""
-    columns = rows(wanted, terms, filtering).columns
-    length = np.linalg.norm(columns, axis=0)
-    return float(np.linalg.cond(columns / length)) if np.all(length > 0) else math.inf
-
-
-def _with_constants(one: Estimate, data: TrialData) -> Estimate:
-    """With what a wrong constant of the torque would do to it."""
-    if not one.has_interval or not one.name.startswith(FORCES):
-        return one
-    bench = bench_of(data.trial)
-    if bench.motor is not None and not data.trial.recording:
-        one = with_systematic(one, bench, TORQUE_CONSTANT, one.value)
-    return with_scale(replace(one), data, DRIVE_TORQUE)
+    """How a series moved: its longest part without a lost sample. Raises ValueError for none."""
+    pieces = moved((data,), Filtering.for_rate(data.trial.task.sample_rate))
+    return max((each.motion for each in pieces), key=lambda motion: len(motion.time))

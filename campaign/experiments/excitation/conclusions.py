@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from campaign.estimate import Estimate
-from campaign.experiments.excitation.account import Dynamics, Response
-from campaign.experiments.excitation.tables import distortion_findings
-from campaign.experiments.shared.common import OF_RECORDING
+from campaign.experiments.responses.sources import Source
+from campaign.experiments.responses.tables import distortion_of
 from campaign.experiments.shared.conclusion_parts import (
     Part,
     Parts,
@@ -16,18 +15,18 @@ from campaign.experiments.shared.conclusion_parts import (
     listed,
     setting,
 )
-from campaign.result import Amount, Conclusion
+from campaign.result import Amount, Conclusion, Finding
+from campaign.text import words
 
 
-def response_conclusion(response: Response, told: Sequence[Part], command: str) -> Conclusion:
+def response_conclusion(source: Source, told: Sequence[Part]) -> Conclusion:
     """Over which band the response is known, and what friction adds to it."""
-    measured = response.measured
+    measured = next(iter(source.responses.values()))
     where: Parts = (*told, ": ") if told else ()
     low, high = float(measured.frequency[0]), float(measured.frequency[-1])
     band: Parts = (setting(low, "Hz"), " to ", setting(high, "Hz"))
     start = "the response of the rate to the drive torque is known from "
-    distorted = distortion_findings(response.best) if response.best else []
-    return conclusion(where, start, band, tuple(_distortion(distorted)))
+    return conclusion(where, start, band, tuple(_distortion(distortion_of(source))))
 
 
 def _distortion(found: Sequence[Estimate]) -> Iterator[Part]:
@@ -42,28 +41,17 @@ def _distortion(found: Sequence[Estimate]) -> Iterator[Part]:
     yield from listed(parts)
 
 
-def dynamics_conclusion(found: Dynamics, told: Sequence[Part], period: float) -> Conclusion:
-    """What the series told, and how well it was made for that."""
+def dynamics_conclusion(
+    found: Sequence[Finding], told: Sequence[Part], period: float
+) -> Conclusion:
+    """What the series told."""
     where: Parts = (*told, ": ") if told else ()
     items: list[Parts] = []
-    for name, each in found.estimates.items():
-        words = name.replace("_", " ")
-        if words.startswith("coulomb"):
-            words = f"Coulomb friction{words.removeprefix('coulomb')}"
-        elif words.startswith("viscous"):
-            words = f"viscous friction{words.removeprefix('viscous')}"
-        items.append((f"{words} ", Amount(each)))
-    designed = Estimate.without_interval("designed", found.designed, "", OF_RECORDING())
-    reached = Estimate.without_interval("reached", found.fit.likeness, "", OF_RECORDING())
-    return conclusion(
-        where,
-        "the series of ",
-        setting(period, "s"),
-        " tells ",
-        listed(items),
-        "; its columns have a condition number of ",
-        Amount(reached),
-        ", where ",
-        Amount(designed),
-        " was designed",
-    )
+    for each in found:
+        name = words(each.quantity)
+        if name.startswith("coulomb"):
+            name = f"Coulomb friction{name.removeprefix('coulomb')}"
+        elif name.startswith("viscous"):
+            name = f"viscous friction{name.removeprefix('viscous')}"
+        items.append((f"{name} ", Amount(each.known)))
+    return conclusion(where, "the series of ", setting(period, "s"), " tells ", listed(items))

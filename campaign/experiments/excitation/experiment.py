@@ -8,48 +8,47 @@ one's own are for whatever else is to be identified (`campaign identify`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
-from campaign.experiments.excitation.account import (
-    dynamics_of,
-    metrics_of,
-    options_of,
-    response_of,
-)
+from campaign.experiments.any_motion.inverse_result import InverseDynamicsOptions, identify
+from campaign.experiments.excitation.account import metrics_of, options_of
 from campaign.experiments.excitation.commands import courses, start_of
 from campaign.experiments.excitation.conclusions import dynamics_conclusion, response_conclusion
-from campaign.experiments.excitation.figures import (
-    command_figure,
-    dynamics_figure,
-    levels_figure,
-    plane_figure,
-    response_figure,
-)
+from campaign.experiments.excitation.figures import command_figure, plane_figure
 from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.excitation.tables import (
-    distortion_findings,
-    dynamics_table,
-    reached_tables,
-    response_table,
+from campaign.experiments.excitation.tables import reached_tables
+from campaign.experiments.interface import (
+    Chosen,
+    Experiment,
+    TestData,
+    TrialData,
+    bench_of,
+    metrics,
 )
-from campaign.experiments.interface import Chosen, Experiment, TestData, TrialData, metrics
+from campaign.experiments.responses.figures import coherence_figure, response_figures
+from campaign.experiments.responses.signals import usable
+from campaign.experiments.responses.sources import Reading, sources
+from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
 from campaign.experiments.shared.choices import Choices, share
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
-from campaign.experiments.shared.conclusion_parts import Settings, conclusion
+from campaign.experiments.shared.conclusion_parts import Parts, Settings, conclusion, shared
 from campaign.experiments.shared.fitting import NO_ROOM, PEAK, usual
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.physics.bench import Bench
-from campaign.result import Conclusion, Figure, Finding, Result, Table
+from campaign.result import Finding, Result, Value
 from campaign.trial import Task, TrialRequest
 
 OWN = ("realisation",)
 """What distinguishes the trials of one group."""
 STEADY = "steady"
 """The window that is measured."""
+READING = Reading("auto", "H1", None, None)
+Place = Mapping[str, Value]
 SWING = 0.7
 """of the angle limit that a command of a rate may use up by the experiment's own choice."""
 FAVARD = 0.5 * math.pi
@@ -58,7 +57,7 @@ FAVARD = 0.5 * math.pi
 
 def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
     moved = (RELATIVE_ANGLE,) if options.signal == "fourier" else (GYRO_RATE,)
-    can_use = () if options.signal == "fourier" else (RELATIVE_ANGLE,)
+    can_use = (GYRO_RATE,) if options.signal == "fourier" else (RELATIVE_ANGLE,)
     mode: Literal["rate", "torque"] = options.command
     for course in courses(options, bench):
         yield TrialRequest(
@@ -151,18 +150,23 @@ def _analyse(data: TestData) -> Result:
             accounts.append((item, metrics(item, _measure)))
         except ValueError as error:
             notes.append(f"{item.trial.label}: {error}.")
-    usable = [item for item, _ in accounts]
-    if not usable:
+    known = [item for item, _ in accounts]
+    if not known:
         return Result(notes=tuple(notes))
-    settings = Settings.of(data, ExcitationOptions)
-    several = swept(data, OWN)
-    results = []
-    groups = list(grouped(usable, OWN).values())
-    for number, group in enumerate(groups, start=1):
-        suffix = f"-{number}" if len(groups) > 1 else ""
-        place = {path: group[0].trial.point.get(path) for path in several}
-        told = settings.place({k: v for k, v in conditions(group[0]).items() if k in place})
-        results.append(_of_group(group, suffix, told))
+    settings, several = Settings.of(data, ExcitationOptions), swept(data, OWN)
+
+    def told(place: Place) -> Parts:
+        return settings.place({name: value for name, value in place.items() if name in several})
+
+    groups = list(grouped(known, OWN).values())
+    suffixes = [f"-{number}" for number in range(1, len(groups) + 1)] if len(groups) > 1 else [""]
+    results = [
+        Result(figures=tuple(map(command_figure, groups, suffixes))),
+        _responses([each for each in known if options_of(each.trial).signal != "fourier"], told),
+    ]
+    for group, suffix in zip(groups, suffixes, strict=True):
+        if options_of(group[0].trial).signal == "fourier":
+            results.append(_of_series(data, group, suffix, told(conditions(group[0]))))
     tables = [*reached_tables(accounts), *(t for each in results for t in each.tables)]
     return Result(
         tuple(tables),
@@ -170,39 +174,60 @@ def _analyse(data: TestData) -> Result:
         tuple(finding for each in results for finding in each.findings),
         tuple(dict.fromkeys([*notes, *(note for each in results for note in each.notes)])),
         tuple(each for result in results for each in result.conclusions),
-        telling=next((f.key for r in results for f in r.figures[1:]), ""),
+        telling=next((f.key for each in results[1:] for f in each.figures), ""),
     )
 
 
-def _of_group(group: Sequence[TrialData], suffix: str, told: Sequence[Any]) -> Result:
-    """Trials of one place of the sweep."""
+def _responses(trials: Sequence[TrialData], told: Callable[[Place], Parts]) -> Result:
+    """Of all that shakes, as `campaign identify` has them without options."""
+    if not trials:
+        return Result()
+    own, why = usable(trials)
+    if not own:
+        return Result(notes=(f"{why}.",))
+    found, remarks = sources(own, bench_of(own[0].trial), READING)
+    if not found:
+        said = tuple(conclusion(each.removesuffix(".")) for each in remarks)
+        return Result(notes=tuple(remarks), conclusions=said)
+    found.sort(key=lambda each: each.trials)
+    by_number = {each.trial.number: conditions(each) for each in own}
+    findings, conclusions = [], []
+    for source in found:
+        place = shared([by_number[number] for number in source.trials])
+        place = {name: value for name, value in place.items() if name not in OWN}
+        findings += [Finding.of(each, place) for each in distortion_of(source)]
+        conclusions.append(response_conclusion(source, told(place)))
+        remarks += source.remarks
+    return Result(
+        (sources_table(found), *distortion_tables(found)),
+        (*response_figures(found), coherence_figure(found)),
+        tuple(findings),
+        tuple(remarks),
+        tuple(conclusions),
+    )
+
+
+def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Parts) -> Result:
+    """Inverse dynamics of one place of the sweep, with the terms that the series is made for."""
     options = options_of(group[0].trial)
-    figures: list[Figure] = [command_figure(group, suffix)]
-    tables: list[Table] = []
-    findings: list[Finding] = []
-    conclusions: list[Conclusion] = []
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
+    asked = InverseDynamicsOptions(terms=options.terms)
     try:
-        if options.signal == "fourier":
-            dynamics = dynamics_of(group)
-            tables.append(dynamics_table(dynamics, suffix))
-            figures += [dynamics_figure(dynamics, group, suffix), plane_figure(group, suffix)]
-            findings += [Finding.of(each, place) for each in dynamics.estimates.values()]
-            conclusions.append(dynamics_conclusion(dynamics, told, options.period))
-            return Result(tuple(tables), tuple(figures), tuple(findings), (), tuple(conclusions))
-        response = response_of(group)
+        found = identify(replace(data, trials=tuple(group)), asked)
     except ValueError as error:
         text = f"{group[0].trial.label}: {error}"
-        return Result((), tuple(figures), notes=(f"{text}.",), conclusions=(conclusion(text),))
-    figures.append(response_figure(response, group, suffix))
-    if response.best is not None:
-        tables.append(response_table(response.best, suffix))
-        findings += [Finding.of(each, place) for each in distortion_findings(response.best)]
-        if response.best.distortion is not None:
-            figures.append(levels_figure(response.best, group, suffix))
-    conclusions.append(response_conclusion(response, told, options.command))
+        return Result(notes=(f"{text}.",), conclusions=(conclusion(text),))
+    findings = tuple(replace(each, conditions=place) for each in found.findings)
+    terms = [each for each in findings if each.quantity in options.terms]
     return Result(
-        tuple(tables), tuple(figures), tuple(findings), response.remarks, tuple(conclusions)
+        tuple(replace(each, key=f"{each.key}{suffix}") for each in found.tables),
+        (
+            *(replace(each, key=f"{each.key}{suffix}") for each in found.figures),
+            plane_figure(group, suffix),
+        ),
+        findings,
+        found.notes,
+        (dynamics_conclusion(terms, told, options.period),),
     )
 
 
@@ -220,5 +245,8 @@ EXPERIMENT = Experiment(
         GYRO_RATE: "how the load answers",
         RELATIVE_ANGLE: "how a series moved it",
     },
-    can_use={RELATIVE_ANGLE: "largest angle beside its limit"},
+    can_use={
+        RELATIVE_ANGLE: "largest angle beside its limit",
+        GYRO_RATE: "acceleration of the load in space: that of its angle stands in for it",
+    },
 )

@@ -1,32 +1,26 @@
-"""Figures of excitations: asked and reached, response with its distortion, inverse dynamics."""
+"""Figures of excitations: what was asked, and what was reached."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
 from campaign.channels import DRIVE_TORQUE
-from campaign.estimation.continuation import DECIBEL
-from campaign.estimation.frequency.best_linear import BestLinear
-from campaign.estimation.frequency.distortion import Level
 from campaign.experiments.excitation.account import (
-    Dynamics,
-    Response,
     measured_part,
     motion_of,
     options_of,
     reached_rate,
-    wanted_of,
 )
 from campaign.experiments.interface import TrialData
-from campaign.experiments.shared.captions import setting, trials_of
+from campaign.experiments.responses.figures import FREQUENCY, decibel
+from campaign.experiments.shared.captions import setting
 from campaign.result import Array, Axis, Curve, Figure, Panel, Style
 from campaign.signals import MultiSine
 
 TIME = Axis("Time", "s", "s")
-FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
-PHASE = Axis("Phase", "rad", "deg")
 SHOWN = 20.0
 """s of a course that are drawn, at most."""
 CYCLES = 40.0
@@ -91,7 +85,7 @@ def _spectrum(command: object, asked: Array, reached: Array, rate: float) -> Pan
     curves = []
     style: Style
     for values, label, series in ((one, "asked", "reference"), (other, "reached", "measured")):
-        level = _decibel(values / largest)
+        level = decibel(values / largest)
         seen = (level > FLOOR) & (frequency > 0)
         style = ("points" if series == "reference" else "line+points") if lines else "line"
         curves.append(Curve(frequency[seen], level[seen], label, series, style))
@@ -103,122 +97,14 @@ def _filled(samples: Array) -> Array:
     return np.asarray(np.nan_to_num(samples))
 
 
-def _decibel(values: Array) -> Array:
-    return np.asarray(DECIBEL * np.log(np.maximum(values, 1e-300)))
-
-
-def response_figure(response: Response, group: Sequence[TrialData], suffix: str) -> Figure:
-    """Gain and phase from torque to rate, with intervals."""
-    measured = response.measured
-    size = np.maximum(np.abs(measured.values), 1e-300)
-    half = 1.96 * measured.widened / size
-    half = np.where(half < 1.0, half, np.nan)
-    level, x = _decibel(size), measured.frequency
-    phase = np.unwrap(np.angle(measured.values))
-    phase -= 2.0 * np.pi * np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
-    low, high = level + _decibel(1.0 - half), level + _decibel(1.0 + half)
-    wide = np.arcsin(half)
-    best = response.best
-    told = f"Bars are 95 % intervals. {measured.method.capitalize()}."
-    if best is not None:
-        told = (
-            f"Best linear approximation for an {best.excitation}: with another size or band "
-            "friction makes it another one. Bars are 95 % intervals by scatter over realisations."
-        )
-    return Figure(
-        key=f"response{suffix}",
-        title="Response, drive torque to rate",
-        caption=told,
-        alt="Gain and phase from drive torque to rate over frequency, with intervals.",
-        panels=(
-            Panel(
-                FREQUENCY,
-                Axis("Gain, dB of 1 rad/s per N·m"),
-                [Curve(x, level, "", "measured", "points", low=low, high=high)],
-            ),
-            Panel(
-                FREQUENCY,
-                PHASE,
-                [Curve(x, phase, "", "measured", "points", low=phase - wide, high=phase + wide)],
-            ),
-        ),
-        trials=trials_of(group),
-    )
-
-
-def levels_figure(best: BestLinear, group: Sequence[TrialData], suffix: str) -> Figure:
-    """What the rate has at excited lines, and at those that were left out."""
-    distortion = best.distortion
-    if distortion is None:
-        raise ValueError("a single period tells no distortion")
-    x = best.response.frequency
-    answered = _decibel(np.sqrt(distortion.excited))
-    curves = [Curve(x, answered, "excited lines", "measured", "points")]
-    for name, told in (("even", distortion.even), ("odd", distortion.odd)):
-        curves += _level(name, told)
-    noise = np.concatenate([distortion.even.noise, distortion.odd.noise])
-    at = np.concatenate([distortion.even.frequency, distortion.odd.frequency])
-    order = np.argsort(at)
-    curves.append(Curve(at[order], _decibel(np.sqrt(noise[order])), "noise", "noise", "thin"))
-    return Figure(
-        key=f"levels{suffix}",
-        title="Distortion and noise of the rate",
-        caption="RMS of single lines. At lines that the command leaves out lies what the axis adds "
-        "by itself: at odd ones friction that is alike both ways, at even ones what differs by "
-        "direction. Where no level is drawn, it is no more than the noise.",
-        alt="Levels of the rate over frequency: excited lines, even and odd distortion, noise.",
-        panels=(Panel(FREQUENCY, Axis("RMS of a line, dB of 1 rad/s"), curves),),
-        trials=trials_of(group),
-    )
-
-
-def _level(name: str, told: Level) -> list[Curve]:
-    sure = told.significant
-    if not np.any(sure):
-        return []
-    low, high = told.interval()
-    down = np.where(low[sure] > 0, _decibel(low[sure]), np.nan)
-    level, up = _decibel(told.rms[sure]), _decibel(high[sure])
-    return [Curve(told.frequency[sure], level, name, name, "points", low=down, high=up)]
-
-
-def dynamics_figure(found: Dynamics, group: Sequence[TrialData], suffix: str) -> Figure:
-    """Measured and modelled torque of the first trial, and what is left."""
-    left = found.torque - found.predicted
-    first = found.time - found.time[0] <= options_of(group[0].trial).period
-    moves = found.moves > 0
-    fitted = np.where(moves, left, np.nan)
-    time = found.time[first]
-    return Figure(
-        key=f"torque{suffix}",
-        title="Torque of the series, measured and modelled",
-        caption="One period. The model's torque has the terms that the series was searched for; "
-        "what they leave over is drawn where the axis moves, which is where they are fitted.",
-        alt="Measured and modelled drive torque over time, and their difference.",
-        panels=(
-            Panel(
-                TIME,
-                Axis("Drive torque", "N m", "N m"),
-                [
-                    Curve(time, found.torque[first], "measured", "measured"),
-                    Curve(time, found.predicted[first], "model", "fit", "thin"),
-                ],
-            ),
-            Panel(
-                TIME,
-                Axis("Left over", "N m", "N m"),
-                [Curve(time, fitted[first], "", "measured", "thin")],
-            ),
-        ),
-        trials=(group[0].trial.number,),
-    )
-
-
 def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     """Where in angle and rate a series goes, asked and reached."""
     data = group[0]
-    moved, wanted = motion_of(data), wanted_of(data)
-    first = moved.time - moved.time[0] <= options_of(data.trial).period
+    moved, task = motion_of(data), data.trial.task
+    first = slice(round(options_of(data.trial).period * task.sample_rate) + 1)
+    time = moved.time[first]
+    command = cast("MultiSine", task.command)
+    angle = command.integral(time, 1) - command.integral(np.zeros(1), 1) + task.start_angle
     return Figure(
         key=f"plane{suffix}",
         title="Where the series goes",
@@ -230,7 +116,7 @@ def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
                 Axis("Angle", "rad", "deg"),
                 Axis("Rate", "rad/s", "deg/s"),
                 [
-                    Curve(wanted.position[first], wanted.rate[first], "asked", "reference"),
+                    Curve(angle, command.sample(time), "asked", "reference"),
                     Curve(moved.position[first], moved.rate[first], "reached", "measured", "thin"),
                 ],
             ),

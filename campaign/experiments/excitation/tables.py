@@ -1,18 +1,11 @@
-"""Tables of excitations, and what of them is a finding."""
+"""Tables of excitations: what was asked, and what was reached."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
-from campaign.channels import DRIVE_TORQUE
 from campaign.estimate import Estimate
-from campaign.estimation.frequency.best_linear import BestLinear
-from campaign.estimation.frequency.distortion import total
-from campaign.estimation.inverse.terms import TERMS
-from campaign.experiments.excitation.account import Dynamics
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.shared.common import OF_RECORDING
 from campaign.physics.complete import limits_of
@@ -74,99 +67,4 @@ def _row(data: TrialData, found: Mapping[str, Estimate]) -> dict[str, Cell]:
         **{name: found.get(name) for name, _ in USED},
         "used": None if nearest is None else shares[nearest],
         "limit": nearest,
-    }
-
-
-def distortion_findings(best: BestLinear) -> list[Estimate]:
-    """Even and odd distortion over the RMS of the output; none of a single period."""
-    if best.distortion is None:
-        return []
-    return [total(best.distortion, "even"), total(best.distortion, "odd")]
-
-
-def response_table(best: BestLinear, suffix: str) -> Table:
-    """What the best linear approximation belongs to, and what else the output holds."""
-    excitation, size = best.excitation, np.abs(best.response.values)
-    even, odd = distortion_findings(best) or (None, None)
-    noise = np.sqrt(best.noise * excitation.realisations) / size
-    apart = np.sqrt(best.nonlinear) / size
-    return Table(
-        key=f"best-linear{suffix}",
-        title="Best linear approximation, distortion and noise",
-        columns=(
-            Column("realisations", "Realisations", exact=True),
-            Column("periods", "Periods", exact=True),
-            Column("lines", "Lines", exact=True),
-            Column("lowest", "Lowest", "Hz", "Hz", exact=True),
-            Column("highest", "Highest", "Hz", "Hz", exact=True),
-            Column("torque", "Torque, RMS", "N m", "N m", reason=OF_RECORDING()),
-            Column("even", "Even distortion", "", "percent"),
-            Column("odd", "Odd distortion", "", "percent"),
-            Column("noise", "Noise", "", "percent", reason=OF_RECORDING()),
-            Column("nonlinear", "Nonlinear scatter", "", "percent", reason=OF_RECORDING()),
-        ),
-        rows=(
-            {
-                "realisations": excitation.realisations,
-                "periods": excitation.periods,
-                "lines": excitation.lines,
-                "lowest": excitation.lowest,
-                "highest": excitation.highest,
-                "torque": excitation.rms,
-                "even": even,
-                "odd": odd,
-                "noise": _median(noise),
-                "nonlinear": _median(apart),
-            },
-        ),
-        note="Distortion: RMS over that of the output, from lines that the command left out. Noise "
-        "and nonlinear scatter: of a line in one realisation over the response there, the median "
-        "of all lines; the first is over periods, the second what more there is over realisations.",
-    )
-
-
-def _median(values: np.ndarray) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else None
-
-
-def dynamics_table(found: Dynamics, suffix: str) -> Table:
-    """Each coefficient with its meaning, and how well the motion told them apart."""
-    rows: list[dict[str, Cell]] = [
-        {
-            "term": name.replace("_", " "),
-            "meaning": TERMS[name].meaning,
-            "unit": estimate.unit,
-            "value": estimate,
-        }
-        for name, estimate in found.estimates.items()
-    ]
-    designed, reached = found.designed, found.fit.likeness
-    rows += [
-        _plain("condition number, designed", "Of the motion that was asked.", designed),
-        _plain("condition number, reached", "Of the motion as it was recorded.", reached),
-        _plain("left over", "Norm of the residual over that of the torque.", found.fit.relative),
-    ]
-    return Table(
-        key=f"inverse-dynamics{suffix}",
-        title="Inverse dynamics of the series",
-        columns=(
-            Column("term", "Term"),
-            Column("meaning", "Meaning"),
-            Column("unit", "Unit"),
-            Column("value", "Value"),
-        ),
-        rows=tuple(rows),
-        note="Condition numbers are of columns of unit length, which no choice of units changes, "
-        f"behind the same filters. Rows that stand still are left out; {DRIVE_TORQUE} is as it was "
-        "recorded, without a delay: `campaign identify` looks for one, and for further terms.",
-    )
-
-
-def _plain(term: str, meaning: str, value: float) -> dict[str, Cell]:
-    return {
-        "term": term,
-        "meaning": meaning,
-        "unit": "",
-        "value": Estimate.without_interval("value", value, "", OF_RECORDING()),
     }

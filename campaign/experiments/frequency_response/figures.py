@@ -11,10 +11,9 @@ from campaign.estimation.continuation import DECIBEL, Continuation
 from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.servo import ServoCharacteristics
 from campaign.experiments.frequency_response.marks import bandwidths, margins
+from campaign.experiments.responses.figures import FREQUENCY, PHASE
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
-FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
-PHASE = Axis("Phase", "rad", "deg")
 SHOWN_BEYOND = 1.2
 """An extrapolated curve is drawn to this many times the crossover that it is for."""
 

@@ -21,7 +21,6 @@ from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.gate import admitted, admitted_together
 from campaign.estimation.intervals import MODEL_MISFIT
 from campaign.experiments.frequency_response.model.axis_numbers import by_rule, odd_distortion
-from campaign.experiments.frequency_response.model.distortion_tables import distortion_tables
 from campaign.experiments.frequency_response.model.figures import figures
 from campaign.experiments.frequency_response.model.frequency_fit import (
     Band,
@@ -32,15 +31,12 @@ from campaign.experiments.frequency_response.model.frequency_fit import (
     masses,
     too_few,
 )
-from campaign.experiments.frequency_response.model.signals import Excited, usable
-from campaign.experiments.frequency_response.model.sources import Reading, sources
 from campaign.experiments.frequency_response.model.tables import (
     correlations_table,
     fits_table,
     loop_tables,
     masses_table,
     modes_table,
-    sources_table,
 )
 from campaign.experiments.frequency_response.model.validation import Validation, models, validated
 from campaign.experiments.frequency_response.model.validation_shown import (
@@ -50,6 +46,9 @@ from campaign.experiments.frequency_response.model.validation_shown import (
     validation_tables,
 )
 from campaign.experiments.interface import Model, TestData, TrialData
+from campaign.experiments.responses.signals import Excited, usable
+from campaign.experiments.responses.sources import Reading, sources
+from campaign.experiments.responses.tables import distortion_tables, sources_table
 from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen
 from campaign.physics.bench import Bench
@@ -131,12 +130,12 @@ def _analyse(data: TestData) -> Result:
             raise ValueError(f"of the validation {why}")
     validation = validated(data.trials, unseen, data.bench, how, fits)
     tables = (
-        sources_table(found),
+        sources_table([each.source for each in found]),
         masses_table(told),
         correlations_table(told, _told_names(parameters)),
         modes_table(found),
         *loop_tables(found),
-        *distortion_tables(found),
+        *distortion_tables([each.source for each in found]),
         fits_table(found, told),
         *validation_tables(validation),
     )

@@ -19,7 +19,7 @@ from campaign.estimation.frequency.distortion import total
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import shifted_by
-from campaign.experiments.frequency_response.model.sources import Source
+from campaign.experiments.responses.sources import Source
 from campaign.reason import Cause
 
 BENT = 0.03

@@ -24,7 +24,7 @@ from campaign.experiments.frequency_response.model.axis_numbers import (
     odd_distortion,
     of_axis,
 )
-from campaign.experiments.frequency_response.model.sources import Source, fitted_part
+from campaign.experiments.responses.sources import Source, fitted_part
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 

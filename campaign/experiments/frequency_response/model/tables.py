@@ -12,36 +12,9 @@ from campaign.estimation.frequency.orders import order_of
 from campaign.estimation.frequency.two_mass import METHOD
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
 from campaign.experiments.frequency_response.tables import Sweep, margin_tables
+from campaign.experiments.responses.tables import NAME, SENSOR
 from campaign.result import Column, Table
 from campaign.text import words
-
-NAME = Column("source", "Response", exact=True)
-SENSOR = Column("side", "Sensor", exact=True)
-
-
-def sources_table(found: Sequence[FrequencyFit]) -> Table:
-    """What each response was measured with: a best linear approximation belongs to that."""
-    rows: list[dict[str, Any]] = [
-        {
-            "source": each.source.name,
-            "excitation": each.source.excitation,
-            "trials": len(each.source.trials),
-            "points": max(len(r.frequency) for r in each.source.responses.values()),
-        }
-        for each in found
-    ]
-    return Table(
-        "responses",
-        "Responses, and what they were measured with",
-        (
-            NAME,
-            Column("excitation", "Excitation", exact=True),
-            Column("trials", "Trials", exact=True),
-            Column("points", "Frequencies", exact=True),
-        ),
-        tuple(rows),
-        note="Of a nonlinear drive each response holds for its own excitation.",
-    )
 
 
 def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:

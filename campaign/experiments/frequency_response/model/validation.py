@@ -19,15 +19,15 @@ from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
-from campaign.experiments.frequency_response.model.signals import Signals, signals, whole_stretches
-from campaign.experiments.frequency_response.model.sources import (
+from campaign.experiments.frequency_response.model.tables import drive_name
+from campaign.experiments.interface import TrialData
+from campaign.experiments.responses.signals import Signals, signals, whole_stretches
+from campaign.experiments.responses.sources import (
     Reading,
     Source,
     fitted_part,
     sources,
 )
-from campaign.experiments.frequency_response.model.tables import drive_name
-from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.signals import MultiSine

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from campaign.estimation.frequency.measured import MeasuredResponse
-from campaign.experiments.frequency_response.model.figures import FREQUENCY, TORQUE, decibel, panels
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit
-from campaign.experiments.frequency_response.model.tables import NAME, SENSOR
 from campaign.experiments.frequency_response.model.validation import (
     Model,
     Prediction,
     Validation,
     apart,
 )
+from campaign.experiments.responses.figures import FREQUENCY, TORQUE, decibel, panels
+from campaign.experiments.responses.sources import fitted_part
+from campaign.experiments.responses.tables import NAME, SENSOR
 from campaign.reason import Cause
 from campaign.result import Amount, Axis, Column, Conclusion, Curve, Figure, Mark, Panel, Table
 
@@ -288,8 +289,6 @@ def weighted(model: Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fitted(model: Model) -> MeasuredResponse:
-    from campaign.experiments.frequency_response.model.sources import fitted_part
-
     slack = 1.0 + 1e-9
     return fitted_part(model.source, model.side, model.lowest / slack, model.highest * slack)
 

@@ -101,11 +101,13 @@ def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
     """Of one trial. Raises ValueError where what is excited is not known."""
     task, recording = trial.trial.task, trial.recording()
     answers, channels = _answers(recording, bench)
+    if not changes(recording[DRIVE_TORQUE]):
+        raise ValueError(f"{DRIVE_TORQUE} never changes")
     reference = None
     command = recording[COMMAND] if COMMAND in recording.channels else None
     if command is None and task.mode != "recorded":
         command = task.command.sample(recording.time)
-    if command is not None and np.nanstd(command) > 0:
+    if command is not None and changes(command):
         reference = command
     if reference is None and excited == "reference":
         raise ValueError(
@@ -132,6 +134,12 @@ def signals(trial: TrialData, bench: Bench, excited: Excited) -> Signals:
     )
 
 
+def changes(samples: Array) -> bool:
+    """Whether a signal, shape (n,), is more than one number; lost samples do not count."""
+    known = samples[np.isfinite(samples)]
+    return bool(known.size and np.ptp(known) > 0)
+
+
 def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dict[Side, str]]:
     answers: dict[Side, Array] = {}
     channels: dict[Side, str] = {}
@@ -140,7 +148,7 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
             if name not in recording.channels or name in channels.values():
                 continue
             samples = recording[name]
-            if not np.nanstd(samples) > 0:
+            if not changes(samples):
                 continue
             if side == "motor":
                 if bench.ratio is None:

@@ -1,4 +1,4 @@
-"""Levels of even and odd distortion, in the band and line by line, as they are published."""
+"""Tables of responses: what they were measured with, distortion in the band and line by line."""
 
 from __future__ import annotations
 
@@ -19,27 +19,53 @@ from campaign.estimation.frequency.distortion import (
 )
 from campaign.estimation.frequency_response import Array
 from campaign.estimation.intervals import LEVEL
-from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit
-from campaign.experiments.frequency_response.model.tables import NAME, SENSOR
+from campaign.experiments.responses.sources import Source
 from campaign.reason import Cause
 from campaign.result import Column, Table
 
+NAME = Column("source", "Response", exact=True)
+SENSOR = Column("side", "Sensor", exact=True)
 EXCITATION = Column("excitation", "Excitation", exact=True)
 LEVEL_ONLY = Cause("level", "a level, not a number of the rig")
 NOT_FROM_ZERO = Cause("not told from zero", "not told from zero")
 ONE_REALISATION = Cause("distortion not shown", "a single realisation does not show it")
 
 
-def distortion_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
+def sources_table(found: Sequence[Source]) -> Table:
+    """What each response was measured with: a best linear approximation belongs to that."""
+    rows: list[dict[str, Any]] = [
+        {
+            "source": each.name,
+            "excitation": each.excitation,
+            "trials": len(each.trials),
+            "points": max(len(r.frequency) for r in each.responses.values()),
+        }
+        for each in found
+    ]
+    return Table(
+        "responses",
+        "Responses, and what they were measured with",
+        (
+            NAME,
+            EXCITATION,
+            Column("trials", "Trials", exact=True),
+            Column("points", "Frequencies", exact=True),
+        ),
+        tuple(rows),
+        note="Of a nonlinear drive each response holds for its own excitation.",
+    )
+
+
+def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
     """Of the whole band, and of each line; nothing where no repeated multisine shows any."""
     rows: list[dict[str, Any]] = []
     lines: list[dict[str, Any]] = []
     for each in found:
-        for side, best in each.source.best.items():
+        for side, best in each.best.items():
             if best.distortion is None:
                 continue
-            own = {"source": each.source.name, "side": side}
-            rows.append({**own, **_band(best.distortion), "excitation": each.source.excitation})
+            own = {"source": each.name, "side": side}
+            rows.append({**own, **_band(best.distortion), "excitation": each.excitation})
             lines += [{**own, **line} for line in _lines(best, best.distortion)]
     if not rows:
         return
@@ -84,9 +110,18 @@ def distortion_tables(found: Sequence[FrequencyFit]) -> Iterator[Table]:
     )
 
 
+def distortion_of(source: Source) -> list[Estimate]:
+    """Even and odd, of the band and the first sensor; none of what tells none."""
+    found = next((each.distortion for each in source.best.values()), None)
+    return [] if found is None else list(_totals(found).values())
+
+
+def _totals(distortion: Distortion) -> dict[str, Estimate]:
+    return {"even": total(distortion, "even"), "odd": total(distortion, "odd")}
+
+
 def _band(distortion: Distortion) -> dict[str, Estimate]:
-    parities: tuple[Parity, ...] = ("even", "odd")
-    found = {parity: total(distortion, parity) for parity in parities}
+    found = _totals(distortion)
     return found | {f"{name}_level": _decibels(each) for name, each in found.items()}
 
 

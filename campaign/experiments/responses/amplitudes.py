@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from campaign.estimation.least_squares import Array
-from campaign.experiments.frequency_response.model.signals import Signals
 from campaign.experiments.interface import TrialData
+from campaign.experiments.responses.signals import Signals
 from campaign.units import rate_here
 
 SAME_SIZE = 1.1

@@ -19,7 +19,7 @@ from campaign.estimation.gate import admitted_together, refused
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.figures import figures
 from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
-from campaign.experiments.any_motion.motions import force_of, read, usable, with_slowest
+from campaign.experiments.any_motion.motions import force_of, read, with_slowest
 from campaign.experiments.any_motion.tables import (
     correlated,
     deviations_table,
@@ -30,7 +30,6 @@ from campaign.experiments.any_motion.tables import (
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.directions import with_offset
 from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.recorded_motion import of_any_motion
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen, is_value
@@ -93,7 +92,8 @@ class InverseDynamicsOptions(Options):
     """Names of the model's terms; absent: they are chosen."""
 
 
-def _identify(data: TestData, options: InverseDynamicsOptions) -> Result:
+def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
+    """From all trials together. Raises ValueError where they tell nothing."""
     data.say("step 1 of 4, the motion")
     filtering, pieces, unseen = read(data, options.low_pass, options.decimation, options.skip)
     filtering = with_slowest(filtering, pieces, options.slowest)
@@ -316,12 +316,3 @@ def _settings(
             fitted = 0.0 if one.kind == "at most" else max(one.value, 0.0)
             told[BENCH[name]] = (fitted, "N m s/rad", "as fitted, and not determined")
     return told
-
-
-EXPERIMENT = of_any_motion(
-    name="inverse_dynamics",
-    summary="inertia and friction of any motion, by regression of the force",
-    options=InverseDynamicsOptions,
-    suits=usable,
-    identify=_identify,
-)

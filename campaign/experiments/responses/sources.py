@@ -18,20 +18,20 @@ from campaign.estimation.frequency.welch import Excited as Excitation
 from campaign.estimation.frequency_response import Array, Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
-from campaign.experiments.frequency_response.model.amplitudes import Recorded, by_amplitude, size_of
-from campaign.experiments.frequency_response.model.repeating import (
+from campaign.experiments.interface import TrialData
+from campaign.experiments.responses.amplitudes import Recorded, by_amplitude, size_of
+from campaign.experiments.responses.repeating import (
     found_repeating,
     repeated,
     unused,
 )
-from campaign.experiments.frequency_response.model.signals import (
+from campaign.experiments.responses.signals import (
     Excited,
     Signals,
     base_frequency,
     signals,
     whole_stretches,
 )
-from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Sine
 from campaign.units import rate_here
@@ -128,7 +128,18 @@ def sources(
     remarks += [
         f"{'; '.join(dict.fromkeys(labels))}: {error}." for error, labels in refused.items()
     ]
-    return found, remarks
+    return _named_apart(found), remarks
+
+
+def _named_apart(found: Sequence[Source]) -> list[Source]:
+    """Where names are alike, with the trials: a matrix may sweep what no name tells."""
+    names = [each.name for each in found]
+    return [
+        replace(each, name=f"{each.name}, trials {each.trials[0]} to {each.trials[-1]}")
+        if names.count(each.name) > 1
+        else each
+        for each in found
+    ]
 
 
 def _key(trial: TrialData, how: Reading) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from campaign.channels import COMMAND, DRIVE_TORQUE
 from campaign.estimation.frequency.multisine import repetition
-from campaign.experiments.frequency_response.model.signals import SENSORS, Excited
 from campaign.experiments.interface import TrialData
+from campaign.experiments.responses.signals import SENSORS, Excited
 from campaign.physics.bench import Bench
 
 
