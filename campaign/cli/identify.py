@@ -21,9 +21,10 @@ from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
 from campaign.identify.material import Chosen, choose
-from campaign.identify.page import next_measurement, refuse_foreign, write_identification
+from campaign.identify.page import PAGE, next_measurement, write_identification
 from campaign.identify.tables import changes_table, told
 from campaign.interrupts import unwinding
+from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit, words
 
@@ -52,7 +53,7 @@ def identify_run(
     compared = choose(results, compare) if compare else None
     sides = [each for each in (chosen, unseen, compared) if each is not None]
     output = page or _beside(chosen)
-    refuse_foreign(output)  # before minutes of work, and before a bench is written
+    refuse_other(output, PAGE)  # before minutes of work, and before a bench is written
     if bench is not None:
         _refuse_foreign_bench(bench)
     with _waiting() as say:

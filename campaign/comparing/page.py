@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
-from campaign.access.analysis import one_line
 from campaign.axis_kind import speaking_of, words_here
 from campaign.comparing.comparison import Against, Comparison
 from campaign.comparing.judging import Pair
@@ -26,16 +24,15 @@ from campaign.comparing.tables import (
     sentences,
     shorter,
 )
-from campaign.errors import UsageError
 from campaign.estimation.family import RATE
-from campaign.plain_text import on_a_page
 from campaign.references.judged import Verdict
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import MARKER, replaced_folder
+from campaign.report.output import write_page
 from campaign.report.page.changes import changes_figure
 from campaign.report.page.folder import Download, Folder, ShownFigure, ShownTable
+from campaign.report.page.making import Making
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import variables
 from campaign.result import Figure, Table
@@ -45,8 +42,6 @@ UNTOLD = ("test", "quantity", "conditions", "p")
 """Columns that a test's own tables leave to the table of all pairs."""
 HEADLINES = 12
 """Most declared differences that are told on top of the page."""
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -88,40 +83,19 @@ class ShownAgainst:
     changes: ShownTable
 
 
-@dataclass
-class _Making:
-    """What is collected while the page is laid out."""
-
-    folder: Folder = field(default_factory=Folder)
-    problems: list[str] = field(default_factory=list)
-
-    def attempt(self, what: str, make: Callable[[], T]) -> T | None:
-        try:
-            return make()
-        except Exception as error:  # noqa: BLE001 (one bad figure must not cost the page)
-            self.problems.append(f"{what} cannot be shown: {one_line(error)}")
-            return None
-
-
 def write_comparison(comparison: Comparison, output: Path, packaged_templates: Path) -> Path:
     """Write `comparison.html`, `tables/` and `figures/` into the folder `output`; the page's path.
 
     The same archives give the same bytes. Raises UsageError when `output` is anything but a
     comparison that was written here, or cannot be written.
     """
-    _refuse_other(output)
     html, files = render(comparison, packaged_templates)
-    with replaced_folder(output) as new:
-        for name, text in {PAGE: html, **files}.items():
-            path = new / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
-    return output / PAGE
+    return write_page(output, PAGE, {PAGE: html, **files})
 
 
 def render(comparison: Comparison, packaged_templates: Path) -> tuple[str, dict[str, str]]:
     """The page's text, and the other files by name; nothing is written."""
-    making = _Making()
+    making = Making()
     making.problems += [problem for side in comparison.sides for problem in side.problems]
     several = len(comparison.against) > 1
     shown = [_against(each, comparison, making, several=several) for each in comparison.against]
@@ -135,14 +109,8 @@ def render(comparison: Comparison, packaged_templates: Path) -> tuple[str, dict[
     return fill_packaged("compare.html", context, packaged_templates), making.folder.files
 
 
-def _refuse_other(output: Path) -> None:
-    """A report is a folder of ours as well, and no comparison takes its place."""
-    if (output / MARKER).is_file() and not (output / PAGE).is_file():
-        raise UsageError(f"{output} is a report, not a comparison; name another with --output")
-
-
 def _against(
-    against: Against, comparison: Comparison, making: _Making, *, several: bool
+    against: Against, comparison: Comparison, making: Making, *, several: bool
 ) -> ShownAgainst:
     letters = Letters(against.reference.letter, against.other.letter)
     both = (letters.reference, letters.other)
@@ -175,7 +143,7 @@ def _optional(table: Table | None, name: str, folder: Folder) -> ShownTable | No
     return None if table is None else folder.shown_table(table, (), name)
 
 
-def _tests(against: Against, letters: Letters, prefix: str, making: _Making) -> Iterator[ShownTest]:
+def _tests(against: Against, letters: Letters, prefix: str, making: Making) -> Iterator[ShownTest]:
     for place, tested in enumerate(against.pairing.tests, start=1):
         pairs = [pair for pair in against.pairs if pair.test is tested.reference]
         if not pairs:
@@ -214,7 +182,7 @@ def _tests(against: Against, letters: Letters, prefix: str, making: _Making) -> 
 
 
 def _figures(
-    tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: _Making
+    tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: Making
 ) -> tuple[tuple[ShownFigure, ...], tuple[str, ...]]:
     """Numbers side by side, figures over each other, and why some are not."""
     folder = making.folder

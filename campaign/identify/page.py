@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from campaign import __version__
-from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
 from campaign.access.sentences import remarks, sentence
 from campaign.axis_kind import speaking_of, words_here
-from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
 from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
-from campaign.plain_text import on_a_page
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw, series_of
-from campaign.report.output import replaced_folder
-from campaign.report.page.folder import Folder, ShownFigure, ShownTable
+from campaign.report.output import write_page
+from campaign.report.page.folder import ShownFigure, ShownTable
+from campaign.report.page.making import Making
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import Look, looks_of_page, variables
 from campaign.result import Figure, Result
@@ -46,7 +44,6 @@ CURES = {
 }
 """What makes a systematic part smaller, by its source."""
 PAGE, DATA = "identification.html", "identification.json"
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -64,17 +61,9 @@ class ShownSection:
 
 
 @dataclass
-class _Making:
-    folder: Folder = field(default_factory=Folder)
-    problems: list[str] = field(default_factory=list)
+class _Making(Making):
     looks: Mapping[str, Look] = field(default_factory=dict)
     """Of the series of all figures: the same series looks the same all over the page."""
-
-    def attempt(self, what: str, make: Callable[[], T]) -> Iterator[T]:
-        try:
-            yield make()
-        except Exception as error:  # noqa: BLE001 (one bad figure must not cost the page)
-            self.problems.append(f"{what} cannot be shown: {one_line(error)}")
 
 
 def write_identification(
@@ -85,7 +74,6 @@ def write_identification(
     bench: name of the bench file that was written; "" for none. The same archives give the same
     bytes. Raises UsageError when `output` is something else than an identification.
     """
-    refuse_foreign(output)
     making = _Making(looks=_looks(found))
     with speaking_of(found.bench.sides):
         parameters = parameters_table(found.sections)
@@ -109,26 +97,7 @@ def write_identification(
         }
         html = fill_packaged("identify.html", context, packaged_templates)
     files = {PAGE: html, DATA: as_json(found, command), **making.folder.files}
-    with replaced_folder(output) as new:
-        for name, text in files.items():
-            path = new / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
-    return output / PAGE
-
-
-def refuse_foreign(output: Path) -> None:
-    """Raises UsageError when `output` is there and something else than an identification."""
-    try:
-        foreign = (
-            any(output.iterdir()) and not (output / PAGE).is_file()
-            if output.is_dir()
-            else output.exists()
-        )
-    except OSError as error:
-        raise UsageError(f"{output}: cannot be read: {error.strerror}") from None
-    if foreign:
-        raise UsageError(f"{output} is no identification; name another folder with --page")
+    return write_page(output, PAGE, files)
 
 
 def next_measurement(found: Identification) -> str:
@@ -167,9 +136,8 @@ def _section(
     name = section.model.name
     folder = making.folder
     figures = [
-        shown
+        making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
         for figure in result.figures
-        for shown in making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
     ]
     tables = [folder.shown_table(each, (), f"{name}-{each.key}") for each in result.tables]
     changes = None
@@ -182,7 +150,7 @@ def _section(
         warnings=tuple(f"{name}: {each.text}" for each in section.identified.warnings),
         conclusions=tuple(sentence(each) for each in result.conclusions),
         remarks=tuple(remarks(result.conclusions)),
-        figures=tuple(figures),
+        figures=tuple(filter(None, figures)),
         tables=tuple(tables),
         changes=changes,
     )

@@ -13,7 +13,6 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import listed
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
-from campaign.plain_text import on_a_page
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import NO_FILES, Document, document_of
@@ -23,7 +22,7 @@ from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
 from campaign.report.formats.as_json import report_json
 from campaign.report.formats.interface import Format, Written
 from campaign.report.made_before import Formats, all_formats, made_before, remember
-from campaign.report.output import replaced_folder
+from campaign.report.output import replaced_folder, write_files
 from campaign.report.page.damage_notice import Notice, told_on_page
 from campaign.report.page.drawings import Drawable, Key
 from campaign.report.page.folder import Folder
@@ -121,10 +120,7 @@ def build_report(
     own_pages = trial_pages(report.layout, trials, Templates(packaged_templates, templates))
     pages = {"report.html": html, "report.json": report_json(report.layout), **folder.files}
     with replaced_folder(output) as new:
-        for name, text in chain(pages.items(), own_pages):
-            path = new / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
+        write_files(new, chain(pages.items(), own_pages))
         added = _write_formats(kinds, Written(report.layout, report.notice, new))
         files = _files(new)
         remember(new, run, added, trials)

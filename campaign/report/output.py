@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from campaign.errors import UsageError
+from campaign.plain_text import on_a_page
 
 MARKER = ".campaign-report"
 """A file that says the folder is a report and may be replaced by a newer one.
@@ -19,6 +20,34 @@ name. Whatever else is in the folder, or was changed there, is somebody's own.
 """
 EDITED = ".edited"
 """What the name of a file ends with that somebody had changed, once there is a new one."""
+
+
+def write_page(output: Path, page: str, files: Mapping[str, str]) -> Path:
+    """Write the files of a page of its own kind into the folder `output`; the page's path.
+
+    Raises UsageError when `output` is something else, or cannot be written.
+    """
+    refuse_other(output, page)
+    with replaced_folder(output) as new:
+        write_files(new, files.items())
+    return output / page
+
+
+def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:
+    """Write texts by their names, in folders or not."""
+    for name, text in files:
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
+
+
+def refuse_other(output: Path, page: str) -> None:
+    """Raises UsageError when `output` is there, and no folder with that page."""
+    _refuse_foreign(output)
+    if (output / MARKER).is_file() and not (output / page).is_file():
+        raise UsageError(
+            f"{output} has no {page}, and is another page of campaign; name another folder"
+        )
 
 
 @contextmanager
@@ -87,7 +116,7 @@ def _refuse_foreign(output: Path) -> None:
     if foreign:
         raise UsageError(
             f"{output} is there already and is no report of campaign; "
-            "name another folder with --output, or move it away"
+            "name another folder, or move it away"
         )
 
 

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from campaign import __version__
-from campaign.access.analysis import one_line
 from campaign.access.estimates import row_of
 from campaign.access.plain_json import json_text
 from campaign.axis_kind import speaking_of, words_here
-from campaign.errors import UsageError
 from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.estimation.trends.family import POWER
-from campaign.plain_text import on_a_page
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import MARKER, replaced_folder
-from campaign.report.page.folder import Folder, ShownFigure
+from campaign.report.output import write_page
+from campaign.report.page.folder import ShownFigure
+from campaign.report.page.making import Making
 from campaign.report.page.packaged import fill_packaged
 from campaign.report.palette import variables
 from campaign.result import Figure
@@ -46,20 +42,6 @@ PAGE, DATA = "trend.html", "trend.json"
 HEADLINES = 20
 """Most declared numbers that are told on top, and drawn."""
 
-T = TypeVar("T")
-
-
-@dataclass
-class _Making:
-    folder: Folder = field(default_factory=Folder)
-    problems: list[str] = field(default_factory=list)
-
-    def attempt(self, what: str, make: Callable[[], T]) -> Iterator[T]:
-        try:
-            yield make()
-        except Exception as error:  # noqa: BLE001 (one bad figure must not cost the page)
-            self.problems.append(f"{what} cannot be shown: {one_line(error)}")
-
 
 def write_trends(trends: Trends, output: Path, packaged_templates: Path, command: str) -> Path:
     """Write the page, its data, tables and figures into the folder `output`; the page's path.
@@ -67,27 +49,20 @@ def write_trends(trends: Trends, output: Path, packaged_templates: Path, command
     The same archives give the same bytes. Raises UsageError when `output` is something else than
     trends.
     """
-    if (output / MARKER).is_file() and not (output / PAGE).is_file():
-        raise UsageError(f"{output} shows no trends; name another folder with --output")
     html, files = render(trends, packaged_templates, command)
-    with replaced_folder(output) as new:
-        for name, text in {PAGE: html, DATA: as_json(trends, command), **files}.items():
-            path = new / name
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
-    return output / PAGE
+    return write_page(output, PAGE, {PAGE: html, DATA: as_json(trends, command), **files})
 
 
 def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str, dict[str, str]]:
     """The page's text, and the other files by name; nothing is written."""
-    making = _Making()
+    making = Making()
     folder = making.folder
     making.problems += [problem for member in trends.members for problem in member.problems]
     making.problems += [problem for fitted in trends.fitted for problem in fitted.problems]
     declared = trends.declared[:HEADLINES]
     shown = [_declared(each, trends, making, n) for n, each in enumerate(declared, start=1)]
     multiples = small_multiples(trends.of(Verdict.NOT_SHOWN), trends.covariate)
-    small = [] if multiples is None else list(_drawn(multiples, making))
+    small = None if multiples is None else _drawn(multiples, making)
     every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
     judged = [each for each in trends.followed if each.change is not None]
     on_page = page_table(judged, trends.covariate)
@@ -99,7 +74,7 @@ def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str,
         "title": title_of(trends),
         "shown": shown,
         "more": max(0, len(trends.declared) - HEADLINES),
-        "small": small,
+        "small": [small] if small else [],
         "sentences": tuple(sentences(trends)),
         "judged": folder.shown_table(on_page, (), "judged") if judged else None,
         "all": folder.table(table_csv(every), "followed"),
@@ -138,20 +113,21 @@ class ShownNumber:
     figures: tuple[ShownFigure, ...]
 
 
-def _declared(each: Followed, trends: Trends, making: _Making, place: int) -> ShownNumber:
+def _declared(each: Followed, trends: Trends, making: Making, place: int) -> ShownNumber:
     told = headline(each, trends)
     figure = declared_figure(each, trends, told, place)
     notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
     beside = (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps))
+    drawn = tuple(filter(None, [_drawn(figure, making)]))
     caution = WITHIN if WITHIN in each.notes else ""
-    return ShownNumber(told, caution, tuple(filter(None, beside)), tuple(_drawn(figure, making)))
+    return ShownNumber(told, caution, tuple(filter(None, beside)), drawn)
 
 
-def _drawn(figure: Figure, making: _Making) -> Iterator[ShownFigure]:
-    def make() -> ShownFigure:
-        return making.folder.figure(figure, Drawn.of(draw(figure), figure), (), figure.key)
-
-    yield from making.attempt(figure.key, partial(make))
+def _drawn(figure: Figure, making: Making) -> ShownFigure | None:
+    return making.attempt(
+        figure.key,
+        lambda: making.folder.figure(figure, Drawn.of(draw(figure), figure), (), figure.key),
+    )
 
 
 def as_json(trends: Trends, command: str) -> str:

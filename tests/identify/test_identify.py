@@ -177,7 +177,7 @@ def test_a_page_takes_no_report_s_place(results: Path, run: str, tmp_path: Path)
     folder.mkdir()
     (folder / ".campaign-report").write_text("a report\n", encoding="utf-8")
     (folder / "report.html").write_text("<p>mine", encoding="utf-8")
-    with pytest.raises(UsageError, match="no identification"):
+    with pytest.raises(UsageError, match=r"has no identification\.html"):
         identify_run(f"{run}:monday", results, models=PLAIN, page=folder)
     assert (folder / "report.html").read_text(encoding="utf-8") == "<p>mine"
 
@@ -241,7 +241,7 @@ def test_what_is_not_ours_is_told_before_anything_is_done(
         bench.mkdir()
     else:
         bench.write_text('title = "a protocol"', encoding="utf-8")
-    with pytest.raises(UsageError, match=r"no identification|no bench|is a folder"):
+    with pytest.raises(UsageError, match=r"no report of campaign|no bench|is a folder"):
         identify_run(f"{run}:monday", results, models=PLAIN, page=page, bench=bench)
     assert bench.is_dir() or not bench.exists() or "a protocol" in bench.read_text("utf-8")
 
