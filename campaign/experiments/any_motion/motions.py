@@ -18,6 +18,7 @@ from campaign.channels import (
     TEMPERATURE,
 )
 from campaign.estimation.inverse.motion import (
+    REGRESSION_RATE,
     Array,
     Filtering,
     Motion,
@@ -27,8 +28,11 @@ from campaign.estimation.inverse.motion import (
     zero_phase,
 )
 from campaign.experiments.interface import TestData, TrialData
+from campaign.signals import MultiSine
 from campaign.trial import Recording
 
+ROWS, FEWEST_ROWS = 20.0, 25.0
+"""of a commanded sum of sines: per period of its highest frequency, and per second at least."""
 SLOWEST = 0.02
 """of the fastest rate: what is slower counts as standing still, where nobody says otherwise."""
 MOST_SAMPLES = 5_000_000
@@ -93,9 +97,8 @@ def read(
     """
     rate = data.trials[0].trial.task.sample_rate
     plain = Filtering.for_rate(rate)
-    filtering = Filtering(
-        low_pass or plain.low_pass, decimation or plain.decimation, round(skip * rate)
-    )
+    decimation = decimation or max(plain.decimation, round(rate / rows_of(data.trials)))
+    filtering = Filtering(low_pass or plain.low_pass, decimation, round(skip * rate))
     pieces = moved(data.trials, filtering)
     if not data.validation:
         return filtering, pieces, ()
@@ -103,6 +106,16 @@ def read(
     if why:
         raise ValueError(f"of the validation {why}")
     return filtering, pieces, moved(unseen, filtering)
+
+
+def rows_of(trials: Sequence[TrialData]) -> float:
+    """Rows per second that slow sums of sines need: those of friction in reversals are more."""
+    highest = 0.0
+    for task in (each.trial.task for each in trials):
+        if task.mode != "rate" or not isinstance(task.command, MultiSine):
+            return REGRESSION_RATE
+        highest = max(highest, *task.command.frequencies)
+    return max(FEWEST_ROWS, ROWS * highest)
 
 
 def moved(trials: Sequence[TrialData], filtering: Filtering) -> tuple[Moved, ...]:
