@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from campaign.estimation.elastic_mode import elastic_mode
+from campaign.estimation.elastic_mode import _freedom, elastic_mode
 from campaign.estimation.frequency_response import Response
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.drives import Drive
@@ -75,3 +75,11 @@ def held(draws: int, seed: int) -> dict[str, list[bool]]:
 )
 def test_intervals_of_a_mode_hold_its_truth(draws: int, seed: int) -> None:
     assert rejected(held(draws, seed)) == {}
+
+
+def test_residuals_that_resemble_their_neighbours_count_less() -> None:
+    """White ones all count; in equal pairs, of correlation one half, a third of them does."""
+    white = np.tile([1.0, -1.0, -1.0, 1.0], 50)  # products of neighbours cancel
+    pairs = np.repeat(np.tile([1.0, -1.0, -1.0, 1.0], 50), 2)
+    assert _freedom(white, 10) == pytest.approx(190.0, rel=0.01)
+    assert _freedom(pairs, 10) == pytest.approx(390.0 / 3.0, rel=0.02)

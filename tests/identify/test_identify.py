@@ -18,15 +18,16 @@ from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments.interface import Model, suitable
 from campaign.identify import experiments_by_model
-from campaign.identify.identification import Identification, _section, identify
+from campaign.identify.identification import Identification, _section, identify, widest
 from campaign.identify.material import choose
-from campaign.identify.page import _advice, write_identification
+from campaign.identify.page import _advice, next_measurement, write_identification
 from campaign.identify.tables import parameters_table
 from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.resources import templates_folder
 from campaign.result import Amount, Conclusion
+from campaign.text import words
 from tests.estimation.coverage import holds
 from tests.estimation.rigs import Rig
 
@@ -83,6 +84,18 @@ def test_unseen_motion_is_predicted(found: Identification) -> None:
     assert section.result is not None
     [table] = [t for t in section.result.tables if t.key == "structures"]
     assert all(0.0 < row["validation"].value < 0.5 for row in table.rows)  # type: ignore[union-attr]
+
+
+def test_what_to_measure_next_is_told_of_the_widest_interval(found: Identification) -> None:
+    parameter = widest(found.parameters)
+    assert parameter is not None
+    share = 100.0 * parameter.estimate.half_width / abs(parameter.estimate.value)
+    told = (
+        f"The widest interval is that of {words(parameter.estimate.name)}: ± {share:.2g} % of it."
+    )
+    assert told in next_measurement(found)
+    nothing = replace(found, sections=())
+    assert next_measurement(nothing) == ""
 
 
 def test_what_changed_is_declared_and_what_did_not_is_not(
