@@ -40,6 +40,7 @@ from campaign.protocol.limit_check import in_display_units
 from campaign.protocol.problems import find_faults
 from campaign.reason import Reason
 from campaign.report.content.opening import _answer
+from campaign.report.content.references import References
 from campaign.report.content.tables import remarks
 from campaign.report.content.truth import _bias
 from campaign.resources import protocols_folder
@@ -286,7 +287,7 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
         name="t", title="T", kind="k", problem="", trials=(), failed=(), result=said, sides=DIRECT
     )
     remark = "Of unknown size, and in no interval: force constant."
-    assert _answer(test, None, None).remarks == (remark,)  # type: ignore[arg-type]
+    assert _answer(test, None, References({}, {}, ())).remarks == (remark,)  # type: ignore[arg-type]
     with speaking_of(DIRECT):
         assert list(remarks(table)) == [remark]
         assert systematic(found) == "force constant unknown"

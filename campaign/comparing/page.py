@@ -12,7 +12,7 @@ from campaign.comparing.comparison import Against, Comparison
 from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters, overlays
 from campaign.comparing.pairing import PairedTest
-from campaign.comparing.pictures import change_names, draw_side_by_side
+from campaign.comparing.pictures import draw_side_by_side, with_names
 from campaign.comparing.tables import (
     alone_table,
     bare_differing,
@@ -29,7 +29,7 @@ from campaign.references.judged import Verdict
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import write_page
+from campaign.report.output import refuse_other, write_page
 from campaign.report.page.changes import changes_figure
 from campaign.report.page.folder import Download, Folder, ShownFigure, ShownTable
 from campaign.report.page.making import Making
@@ -89,6 +89,7 @@ def write_comparison(comparison: Comparison, output: Path, packaged_templates: P
     The same archives give the same bytes. Raises UsageError when `output` is anything but a
     comparison that was written here, or cannot be written.
     """
+    refuse_other(output, PAGE)
     html, files = render(comparison, packaged_templates)
     return write_page(output, PAGE, {PAGE: html, **files})
 
@@ -116,7 +117,6 @@ def _against(
     both = (letters.reference, letters.other)
     prefix = f"{letters.other.lower()}-" if several else ""
     folder = making.folder
-    pairs = sorted(against.pairs, key=lambda pair: pair.verdict is not Verdict.DIFFERENT)
     table = pair_table("pairs", "All pairs", against.pairs, both)
     declared = against.of(Verdict.DIFFERENT)
     return ShownAgainst(
@@ -128,7 +128,7 @@ def _against(
         bare=tuple(headline(pair) for pair in bare_differing(against)[:HEADLINES]),
         picture=making.attempt(
             "the picture of all changes",
-            lambda: changes_figure(pairs, change_names, folder, f"{prefix}changes"),
+            lambda: changes_figure(with_names(against.pairs), folder, f"{prefix}changes"),
         ),
         download=folder.table(table_csv(shorter(table, "finding")), f"{prefix}pairs"),
         tests=tuple(_tests(against, letters, prefix, making)),

@@ -25,10 +25,10 @@ PANELS = 6
 """Most quantities of a test that are shown side by side."""
 
 
-def change_names(pairs: Sequence[Pair]) -> list[str]:
-    """`Coulomb friction · direction positive`, of each."""
+def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
+    """Each with its name: `Coulomb friction · direction positive`."""
     return [
-        f"{name_here(pair.test, pair.quantity)} · {place}".removesuffix(" · ")
+        (pair, f"{name_here(pair.test, pair.quantity)} · {place}".removesuffix(" · "))
         for pair, place in zip(pairs, row_names(pairs), strict=True)
     ]
 

@@ -21,7 +21,7 @@ from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw, series_of
-from campaign.report.output import write_page
+from campaign.report.output import refuse_other, write_page
 from campaign.report.page.folder import ShownFigure, ShownTable
 from campaign.report.page.making import Making
 from campaign.report.page.packaged import fill_packaged
@@ -74,6 +74,7 @@ def write_identification(
     bench: name of the bench file that was written; "" for none. The same archives give the same
     bytes. Raises UsageError when `output` is something else than an identification.
     """
+    refuse_other(output, PAGE)
     making = _Making(looks=_looks(found))
     with speaking_of(found.bench.sides):
         parameters = parameters_table(found.sections)
@@ -221,7 +222,7 @@ def _method_tree(section: Section) -> dict[str, Any]:
         "changes": [
             {"before": row_of(each.reference), "after": row_of(each.other),
              "difference": row_of(each.found.difference), "p": each.found.p,
-             "adjusted": each.adjusted}
+             "adjusted": each.adjusted, "verdict": each.outcome}
             for each in section.changes
         ],
     }  # fmt: skip

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,8 @@ NEEDED = ("quantity", "value", "unit")
 OWN = (*NEEDED, "low", "high", "test")
 CONDITION = re.compile(r"(?P<name>[^\[\]]+?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 """Head of a condition's column: a name, and the unit of its numbers in brackets."""
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Sizes of numbers, in any unit."""
 NO_INTERVAL = Cause("reference without interval", "the file states no interval (low, high)")
 
 
@@ -35,12 +37,14 @@ class ReferenceValue:
 
     Attributes:
         conditions: SI; a finding states each of them alike.
+        units: of conditions that have one in the file, by name.
         test: the test that it is for; "" for any.
         place: of the row, in words.
     """
 
     estimate: Estimate
     conditions: Mapping[str, Value]
+    units: Mapping[str, str]
     test: str
     place: str
 
@@ -70,50 +74,81 @@ def read_values(path: Path) -> tuple[ReferenceValue, ...]:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UsageError(f"{path}: is no CSV file in UTF-8: {error}") from None
-    heads = [head.strip() for head in rows[0]] if rows else []
-    lacking = [name for name in NEEDED if name not in heads]
-    if lacking or len(set(heads)) < len(heads):
-        what = f"there is no column {', '.join(lacking)}" if lacking else "two columns are alike"
+    heads = [_Head.of(head.strip()) for head in (rows[0] if rows else [])]
+    names = [head.name for head in heads if head.name]
+    lacking = [name for name in NEEDED if name not in names]
+    twice = next((name for name in names if names.count(name) > 1), "")
+    if lacking or twice:
+        what = f"there is no column {', '.join(lacking)}" if lacking else f"{twice!r} stands twice"
         raise UsageError(
             f"{path}, line 1: {what}; the first line names columns, separated by commas: "
             f"{', '.join(OWN)}, and conditions such as direction or frequency [Hz]"
         )
-    found = tuple(_values(path, heads, rows[1:]))
-    if not found:
-        raise UsageError(f"{path}: it has no row below the names of the columns")
-    return found
-
-
-def _values(
-    path: Path, heads: Sequence[str], rows: Sequence[Sequence[str]]
-) -> Iterator[ReferenceValue]:
-    for line, row in enumerate(rows, start=2):
-        cells = [cell.strip() for cell in row]
-        if not any(cells):
+    found: dict[str, ReferenceValue] = {}
+    for line, row in enumerate(rows[1:], start=2):
+        if not any(map(str.strip, row)):
             continue
         try:
-            if len(cells) != len(heads):
-                raise ValueError(f"{len(cells)} cells; the first line has {len(heads)}")
-            told = dict(zip(heads, cells, strict=True))
-            conditions = {
-                name: value
-                for head, cell in told.items()
-                if head not in OWN and cell
-                for name, value in [_condition(head, cell)]
-            }
-            yield ReferenceValue(_estimate(told), conditions, told.get("test", ""), f"line {line}")
+            value = _value(heads, row, f"line {line}")
+            about = repr((value.estimate.name, dict(sorted(value.conditions.items())), value.test))
+            if about in found:
+                raise ValueError(f"it is of the same number as {found[about].place}")
         except ValueError as error:
             raise UsageError(f"{path}, line {line}: {error}") from None
+        found[about] = value
+    if not found:
+        raise UsageError(f"{path}: it has no row below the names of the columns")
+    return tuple(found.values())
+
+
+@dataclass(frozen=True)
+class _Head:
+    """Name of a column, and the unit in its brackets; None without any."""
+
+    name: str
+    unit: str | None = None
+
+    @classmethod
+    def of(cls, text: str) -> _Head:
+        match = CONDITION.fullmatch(text)
+        return cls(text) if match is None else cls(match["name"], match["unit"])
+
+    def condition(self, cell: str) -> Value:
+        """A word or a number of the cell (SI). Raises ValueError."""
+        if self.unit is not None:
+            return to_si(f"{_number(self.name, cell)} {self.unit}")
+        try:
+            return _number(self.name, cell)
+        except ValueError:
+            return {"true": True, "false": False}.get(cell.lower(), cell)
+
+
+def _value(heads: Sequence[_Head], row: Sequence[str], place: str) -> ReferenceValue:
+    if len(row) != len(heads):
+        raise ValueError(f"{len(row)} cells; the first line has {len(heads)}")
+    cells = {head: cell.strip() for head, cell in zip(heads, row, strict=True) if cell.strip()}
+    if unnamed := [cell for head, cell in cells.items() if not head.name]:
+        raise ValueError(f"{unnamed[0]!r} stands in a column without a name")
+    own = {head.name: cell for head, cell in cells.items() if head.name in OWN}
+    conditions = {head: cell for head, cell in cells.items() if head.name not in OWN}
+    return ReferenceValue(
+        _estimate(own),
+        {head.name: head.condition(cell) for head, cell in conditions.items()},
+        {head.name: head.unit for head in conditions if head.unit is not None},
+        own.get("test", ""),
+        place,
+    )
 
 
 def _estimate(told: Mapping[str, str]) -> Estimate:
-    """Raises ValueError, as `_condition` does."""
-    if not told["quantity"]:
+    """Raises ValueError."""
+    if "quantity" not in told:
         raise ValueError("quantity is empty")
-    to_si(f"1 {told['unit']}")  # it is a unit
-    value = _number("value", told["value"])
-    ends = [_number(name, cell) for name in ("low", "high") if (cell := told.get(name, ""))]
-    what = (told["quantity"], value, told["unit"])
+    unit = told.get("unit", "")
+    to_si(f"1 {unit}")  # it is a unit
+    value = _number("value", told.get("value", ""))
+    ends = [_number(name, told[name]) for name in ("low", "high") if name in told]
+    what = (told["quantity"], value, unit)
     if not ends:
         return Estimate.without_interval(*what, NO_INTERVAL(), origin=Origin.GIVEN)
     if len(ends) == 1:
@@ -124,20 +159,6 @@ def _estimate(told: Mapping[str, str]) -> Estimate:
     return Estimate(*what, low, high, LEVEL, origin=Origin.GIVEN)
 
 
-def _condition(head: str, cell: str) -> tuple[str, Value]:
-    """Name and value (SI) of a condition: a number, or a word."""
-    match = CONDITION.fullmatch(head)
-    if match is None:
-        raise ValueError(f"the column {head!r} is no name with a unit in brackets")
-    name, unit = match["name"], match["unit"]
-    if unit is None:
-        try:
-            return name, float(cell)
-        except ValueError:
-            return name, cell
-    return name, to_si(f"{_number(head, cell)} {unit}")
-
-
 def _number(name: str, cell: str) -> float:
     try:
         value = float(cell)
@@ -145,4 +166,6 @@ def _number(name: str, cell: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise ValueError(f"{name} is a number, but {cell!r} stands there")
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"{name} is {cell}, which nothing measures")
     return value

@@ -25,9 +25,8 @@ EDITED = ".edited"
 def write_page(output: Path, page: str, files: Mapping[str, str]) -> Path:
     """Write the files of a page of its own kind into the folder `output`; the page's path.
 
-    Raises UsageError when `output` is something else, or cannot be written.
+    Raises UsageError when `output` is no folder of ours, or cannot be written.
     """
-    refuse_other(output, page)
     with replaced_folder(output) as new:
         write_files(new, files.items())
     return output / page

@@ -16,7 +16,7 @@ from campaign.estimation.trends.family import POWER
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import write_page
+from campaign.report.output import refuse_other, write_page
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.making import Making
 from campaign.report.page.packaged import fill_packaged
@@ -49,6 +49,7 @@ def write_trends(trends: Trends, output: Path, packaged_templates: Path, command
     The same archives give the same bytes. Raises UsageError when `output` is something else than
     trends.
     """
+    refuse_other(output, PAGE)
     html, files = render(trends, packaged_templates, command)
     return write_page(output, PAGE, {PAGE: html, DATA: as_json(trends, command), **files})
 

@@ -40,7 +40,7 @@ def recorded(*made: Channel) -> Any:
     """A trial that has nothing but these."""
     channels = {each.name: each for each in made}
     recording = Recording(TIME[: len(made[0].samples)], channels)
-    task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE)
+    task = SimpleNamespace(sample_rate=RATE, duration=len(TIME) / RATE, mode="recorded")
     trial = SimpleNamespace(
         number=1,
         kind="motion",

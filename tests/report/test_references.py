@@ -194,12 +194,12 @@ def test_nothing_is_held_against_nothing(
     assert document.opening.answers[0].prediction == ""
 
 
-VALUES = """quantity,value,unit,low,high,direction,preload [N mm]
-coulomb_torque,16000,N mm,15800,16200,positive,
-coulomb_torque,16,N m,,,positive,
-inertia,2,kg m^2,1.95,2.05,,
-coulomb_torque,16,N m,15.8,16.2,negative,
-coulomb_torque,16,N m,15.8,16.2,positive,1000
+VALUES = """quantity,value,unit,low,high,test,direction,preload [N mm]
+coulomb_torque,16000,N mm,15800,16200,,positive,
+coulomb_torque,16,N m,,,breakaway,positive,
+inertia,2,kg m^2,1.95,2.05,,,
+coulomb_torque,16,N m,15.8,16.2,,negative,
+coulomb_torque,16,N m,15.8,16.2,,positive,1000
 """
 
 
@@ -257,10 +257,11 @@ def test_bench_and_file_are_one_family(made_up: ModuleType, tmp_path: Path) -> N
     path = tmp_path / "values.csv"
     told = found("coulomb_torque", 16.555, 0.2, "N m")
     close = found("inertia", 2.02, 0.05, "kg m^2")
-    text = "quantity,value,unit,low,high\n{}"
+    text = "quantity,value,unit,low,high,test,direction\n{}"
+    places = (",", "breakaway,", ",positive")  # of the same finding
     rows = {
-        "three": "inertia,2.6,kg m^2,1,4\n",
-        "five": "inertia,2.6,kg m^2,1,4\n" * 3,
+        name: "".join(f"inertia,2.6,kg m^2,1,4,{place}\n" for place in places[:count])
+        for name, count in (("three", 1), ("five", 3))
     }
     verdicts = {}
     for name, row in rows.items():
@@ -295,17 +296,23 @@ def test_files_stand_on_the_page_and_in_the_data(made_up: ModuleType, tmp_path: 
     [
         ("", "line 1: there is no column quantity, value, unit"),
         ("quantity;value;unit\n", "line 1: there is no column quantity, value, unit"),
-        ("quantity,value,unit,unit\n", "line 1: two columns are alike"),
+        ("quantity,value,unit,unit\n", "line 1: 'unit' stands twice"),
+        ("quantity,value,unit,f [Hz],f [rad/s]\n", "line 1: 'f' stands twice"),
         ("quantity,value,unit\n", "no row below"),
         ("quantity,value,unit\ninertia,2\n", "line 2: 2 cells; the first line has 3"),
         ("quantity,value,unit\n,2,kg m^2\n", "line 2: quantity is empty"),
         ("quantity,value,unit\ninertia,two,kg m^2\n", "line 2: value is a number, but 'two'"),
+        ("quantity,value,unit\ninertia,1e308,kg m^2\n", "which nothing measures"),
+        ("quantity,value,unit,\ninertia,2,kg m^2,3\n", "'3' stands in a column without a name"),
+        (
+            "quantity,value,unit,way\nf,2,N,up\nf,2,N,down\nf,3,N,up\n",
+            "line 4: it is of the same number as line 2",
+        ),
         ("quantity,value,unit\ninertia,nan,kg m^2\n", "line 2: value is a number, but 'nan'"),
         ("quantity,value,unit\n\ninertia,2,furlong\n", "line 3: 'furlong' is not a unit"),
         ("quantity,value,unit,low,high\ninertia,2,kg m^2,1,\n", "low and high go together"),
         ("quantity,value,unit,low,high\ninertia,2,kg m^2,3,4\n", "value lies between low and high"),
-        ("quantity,value,unit,f [Hz\ninertia,2,kg m^2,3\n", "is no name with a unit in brackets"),
-        ("quantity,value,unit,f [Hz]\ninertia,2,kg m^2,low\n", "f [Hz] is a number, but 'low'"),
+        ("quantity,value,unit,f [Hz]\ninertia,2,kg m^2,low\n", "f is a number, but 'low'"),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, message: str) -> None:
@@ -326,3 +333,59 @@ def test_a_number_of_a_contradicted_model_is_not_judged(
     (compared,) = document.references.files["breakaway"]
     assert ["contradict" in str(row["verdict"]) for row in compared.table.rows] == [True]
     assert compared.told == ""
+
+
+def test_conditions_have_their_unit_and_their_kind(made_up: ModuleType, tmp_path: Path) -> None:
+    """10 rad/s is no frequency of 10 Hz; true is no word."""
+    one = found("torque", 2.0, 0.1, "N m")
+    at = {"frequency": 10.0, "loaded": True}
+    text = "quantity,value,unit,low,high,frequency [{}],loaded,\ntorque,2,N m,1.9,2.1,{},true,\n"
+    for unit, value, matches in (("Hz", 10, True), ("kHz", 0.01, True), ("rad/s", 10, False)):
+        (tmp_path / unit.replace("/", "")).mkdir()
+        _, document = with_file(
+            made_up,
+            tmp_path / unit.replace("/", ""),
+            text.format(unit, value),
+            findings=[Finding.of(one, at)],
+        )
+        assert bool(document.references.files) is matches, unit
+        assert bool(document.references.problems) is not matches
+
+
+def test_a_test_that_there_is_not_is_named(made_up: ModuleType, tmp_path: Path) -> None:
+    text = "quantity,value,unit,test\ninertia,2,kg m^2,breakway\n"
+    _, document = with_file(made_up, tmp_path, text, found("inertia", 2.0, 0.1, "kg m^2"))
+    assert document.references.problems == (
+        "values.csv, line 2: there is no test breakway; there are breakaway",
+    )
+
+
+def test_a_number_beyond_a_bound_is_told(made_up: ModuleType, tmp_path: Path) -> None:
+    least = Estimate("bandwidth", 20.0, "Hz", low=20.0, kind="at least")
+    text = "quantity,value,unit,low,high\nbandwidth,11.8,Hz,11.7,11.9\n"
+    _, document = with_file(made_up, tmp_path, text, least)
+    (compared,) = document.references.files["breakaway"]
+    assert [row["verdict"] for row in compared.table.rows] == ["beyond a bound"]
+    assert compared.told == "1 number lies beyond a bound, of which no test is made"
+
+
+def test_what_is_declared_is_in_the_words_of_the_picture(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    """Also where it has no change in percent, as its sign changes."""
+    path = tmp_path / "values.csv"
+    path.write_text(
+        "quantity,value,unit,low,high\noffset,-1,N m,-1.1,-0.9\ninertia,2,kg m^2,1.95,2.05\n",
+        encoding="utf-8",
+    )
+    told = (found("offset", 1.0, 0.1, "N m"), found("inertia", 2.01, 0.05, "kg m^2"))
+    run, kinds, _ = analysed(made_up, tmp_path, *told)
+    page, *_ = render(
+        run,  # type: ignore[arg-type]
+        tmp_path,
+        kinds,
+        templates_folder(),
+        references={path: read_values(path)},
+    )
+    assert "Declared different: offset (direction positive)." in page
+    assert page.count("Changes in percent") >= 2  # on its place, and in the list of figures

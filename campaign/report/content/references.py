@@ -34,6 +34,7 @@ from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
 from campaign.text import number, quantity_words
 from campaign.trial import Trial
+from campaign.units import same_dimension
 
 NAMED = 3
 """Most changes that one sentence names."""
@@ -95,13 +96,13 @@ Found = tuple[AnalysedTest, Source, Sequence[Judged]]
 def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
     """Each test's findings beside the numbers that its bench file and `files` state of them."""
     tests = tuple(tests)
+    units = units_of(tests, run.header) if tests else {}
     found: list[Found] = []
     for test in tests:
         with speaking_of(test.sides):
             found += filter(None, [_stated(run, test)])
-            found += (_of_file(path, values, test) for path, values in files.items())
+            found += (_of_file(p, values, units[test.name]) for p, values in files.items())
     verdicts = iter(with_verdicts([pair for _, _, pairs in found for pair in pairs]))
-    units = units_of(tests, run.header) if any(pairs for _, _, pairs in found) else {}
     stated: dict[str, Compared] = {}
     others: dict[str, tuple[Compared, ...]] = {}
     for test, source, pairs in found:
@@ -114,7 +115,7 @@ def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -
             stated[test.name] = compared
         else:
             others[test.name] = (*others.get(test.name, ()), compared)
-    return References(stated, others, tuple(_unused(tests, files)))
+    return References(stated, others, tuple(_unused(units, files)))
 
 
 # The bench file -----------------------------------------------------------------------------------
@@ -169,35 +170,44 @@ def _bench(trial: Trial) -> Bench | None:
 # A file of values ---------------------------------------------------------------------------------
 
 
-def _of_file(path: Path, values: Sequence[ReferenceValue], test: AnalysedTest) -> Found:
-    pairs: list[Judged] = []
-    for value in values:
-        own = _to_compare(_spoken_of(value, test))
-        pairs += (_pair(value.in_unit_of(finding), finding, own) for finding in own)
+def _of_file(path: Path, values: Sequence[ReferenceValue], units: TestUnits) -> Found:
+    own = [(value, each) for value in values for each in _to_compare(_spoken_of(value, units))]
+    known = list({id(finding): finding for _, finding in own}.values())
+    pairs = [_pair(value.in_unit_of(finding), finding, known) for value, finding in own]
     name = path.name
     title = f"Reference values of {name}, and found"
     said = f"The reference values are of {name}"
     source = Source(f"reference-{path.stem}", title, "Reference", f"differ from {name}", name, said)
-    return test, source, pairs
+    return units.test, source, pairs
 
 
-def _spoken_of(value: ReferenceValue, test: AnalysedTest) -> list[Finding]:
+def _spoken_of(value: ReferenceValue, units: TestUnits) -> list[Finding]:
+    """What a row is of; a condition in another unit than it is measured in is none."""
+    for name, unit in value.units.items():
+        shown = units.of(name)
+        if shown is not None and not same_dimension(shown.si, unit):
+            return []
     return [
         each
-        for each in test.result.findings
-        if not each.recomputed and value.speaks_of(test.name, each)
+        for each in units.test.result.findings
+        if not each.recomputed and value.speaks_of(units.test.name, each)
     ]
 
 
-def _unused(tests: Sequence[AnalysedTest], files: Files) -> Iterator[str]:
+def _unused(units: Mapping[str, TestUnits], files: Files) -> Iterator[str]:
     """Rows that no finding is of: nothing of a file is left out without a word."""
     for path, values in files.items():
         for value in values:
-            if not any(_spoken_of(value, test) for test in tests):
+            if any(_spoken_of(value, own) for own in units.values()):
+                continue
+            told = f"{path.name}, {value.place}: "
+            if value.test and value.test not in units:
+                yield f"{told}there is no test {value.test}; there are {', '.join(units)}"
+            else:
                 yield (
-                    f"{path.name}, {value.place}: no test found {value.estimate.name} in "
-                    f"{value.estimate.unit or 'this unit'} under these conditions; `findings` in "
-                    "report.json has all that was found"
+                    f"{told}no test found {value.estimate.name} in "
+                    f"{value.estimate.unit or 'a unit of no dimension'} under these conditions; "
+                    "`findings` in report.json has all that was found, with its conditions in SI"
                 )
 
 
@@ -263,17 +273,22 @@ def _row(pair: Judged, units: TestUnits) -> Mapping[str, Cell]:
 
 
 def _told_of(pairs: Sequence[Judged], source: Source, units: TestUnits) -> str:
-    """Which numbers are not what was stated, or that all are; "" where nothing could be tested."""
+    """Which numbers are not what was stated, or that all are; "" where nothing could be judged."""
     changed = [pair for pair in pairs if pair.verdict is Verdict.DIFFERENT]
     tested = sum(pair.testable for pair in pairs)
-    if not tested:
-        return ""
-    if not changed:
+    beyond = sum(pair.verdict is Verdict.BEYOND_BOUND for pair in pairs)
+    told = []
+    if changed:
+        named = "; ".join(_told(pair, units) for pair in changed[:NAMED])
+        more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
+        told.append(f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}")
+    elif tested:
         numbers = "1 number does" if tested == 1 else f"{tested} numbers do"
-        return f"{numbers} not differ from {source.before}, as far as the intervals show"
-    named = "; ".join(_told(pair, units) for pair in changed[:NAMED])
-    more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
-    return f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}"
+        told.append(f"{numbers} not differ from {source.before}, as far as the intervals show")
+    if beyond:
+        lie = "1 number lies" if beyond == 1 else f"{beyond} numbers lie"
+        told.append(f"{lie} beyond a bound, of which no test is made")
+    return "; ".join(told)
 
 
 def _told(pair: Judged, units: TestUnits) -> str:

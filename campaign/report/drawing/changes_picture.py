@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from campaign.references.judged import J, Judged, Verdict
+from campaign.references.judged import Judged, Verdict
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER
 
@@ -24,23 +24,23 @@ LABEL = 58
 """Letters of a row's name."""
 
 
-def with_change(pairs: Sequence[J]) -> list[J]:
+def with_change(pairs: Sequence[tuple[Judged, str]]) -> list[tuple[Judged, str]]:
     """Those that are drawn: what is not judged is left out, unless nothing else is there."""
-    known = [p for p in pairs if p.found.change.low is not None and p.found.change.high is not None]
-    return ([pair for pair in known if pair.testable] or known)[:MOST]
+    known = [
+        each for each in pairs if None not in (each[0].found.change.low, each[0].found.change.high)
+    ]
+    return ([each for each in known if each[0].testable] or known)[:MOST]
 
 
-def draw_changes(shown: Sequence[Judged], names: Sequence[str]) -> str:
-    """Every change in percent with its interval, filled where declared.
+def draw_changes(shown: Sequence[tuple[Judged, str]]) -> str:
+    """Every change in percent with its interval, filled where declared; with names of the rows.
 
-    Args:
-        shown: of `with_change`, at least one.
-        names: of the rows.
+    shown: of `with_change`, at least one.
     """
     with canvas(WIDTH, len(shown) * PITCH + 0.9) as sheet:
         ax = sheet.subplots()
-        limit = _limit(shown)
-        for row, (pair, name) in enumerate(zip(shown, names, strict=True)):
+        limit = _limit([pair for pair, _ in shown])
+        for row, (pair, name) in enumerate(shown):
             _draw_change(ax, pair, row, limit)
             name_row(ax, row, name, bold=pair.verdict is Verdict.DIFFERENT)
         if limit > FAR:

@@ -133,7 +133,6 @@ def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
     if section.prediction is not None:
         yield _grid(section.prediction)
     yield from map(_grid, section.references)
-    yield from section.changes
     for figure in section.figures:
         if figure is telling:
             told = f"Figure {figure.number}, {figure.title}, stands on top of the report."

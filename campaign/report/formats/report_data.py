@@ -182,7 +182,7 @@ class Figure(_Part):
     trials: tuple[int, ...]
     """Those that it shows, as the page says; empty where it says none."""
     panels: tuple[Panel, ...]
-    """Empty for a picture of the scoreboard, whose numbers are in `scoreboard`."""
+    """Empty for a picture of what is in `scoreboard`, `prediction` or `references`."""
 
 
 class Comparison(_Part):

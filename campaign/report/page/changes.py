@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from campaign.references.judged import J, Verdict
+from campaign.references.judged import Judged, Verdict
 from campaign.report.drawing.changes_picture import draw_changes, with_change
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.page.folder import Folder, ShownFigure
 
 
 def changes_figure(
-    pairs: Sequence[J], names_of: Callable[[Sequence[J]], Sequence[str]], folder: Folder, key: str
+    pairs: Sequence[tuple[Judged, str]], folder: Folder, key: str
 ) -> ShownFigure | None:
-    """Added to the folder; None where no change has an interval.
-
-    `names_of`: of the rows that are shown.
-    """
+    """Pairs with their names, those declared different first; None without a change to draw."""
+    pairs = sorted(pairs, key=lambda each: each[0].verdict is not Verdict.DIFFERENT)
     shown = with_change(pairs)
     if not shown:
         return None
-    names = names_of(shown)
-    declared = [n for n, p in zip(names, shown, strict=True) if p.verdict is Verdict.DIFFERENT]
+    declared = [name for pair, name in pairs if pair.verdict is Verdict.DIFFERENT]
     return folder.picture(
-        Drawn.of(draw_changes(shown, names)),
+        Drawn.of(draw_changes(shown)),
         "Changes in percent",
         "Each sign is a number with a reference, the bar the 95 % interval of its change. Filled: "
         "declared different. Hollow: no difference is shown, or it is not judged (diamonds).",

@@ -102,7 +102,7 @@ class Section:
         truth: what it found beside what is true, where that is known.
         prediction: what it found beside what its bench file states, where that is tested.
         references: what it found beside files of reference values.
-        changes: pictures of the bench file's comparison, and of those of files.
+        figures: pictures of changes against references, then those of its analysis.
         summary: its conditions in a line.
     """
 
@@ -117,14 +117,13 @@ class Section:
     truth: ShownTable | None = None
     prediction: ShownTable | None = None
     references: tuple[ShownTable, ...] = ()
-    changes: tuple[ShownFigure, ...] = ()
     summary: str = ""
 
     @property
     def items(self) -> tuple[ShownFigure | ShownTable | Comparison, ...]:
         """Its figures and tables in the order of the page."""
         held = [each for each in (self.truth, self.prediction, *self.references) if each]
-        return (*self.comparisons, *held, *self.changes, *self.figures, *self.tables)
+        return (*self.comparisons, *held, *self.figures, *self.tables)
 
 
 @dataclass

@@ -267,17 +267,9 @@ def _changes(problems: list[str], compared: Compared, maker: _Maker) -> ShownFig
     """The picture of a comparison of two numbers or more."""
     if len(compared.pairs) < 2:
         return None
-    names = {id(pair): name for pair, name in compared.pairs}
     key = f"{maker.test.name}-{compared.table.key}"
     shown: ShownFigure | None = _attempt(
-        problems,
-        key,
-        lambda: changes_figure(
-            [pair for pair, _ in compared.pairs],
-            lambda shown: [names[id(pair)] for pair in shown],
-            maker.folder,
-            key,
-        ),
+        problems, key, lambda: changes_figure(compared.pairs, maker.folder, key)
     )
     return shown
 
@@ -321,7 +313,7 @@ def _section_of_axis(
         anchor=f"test-{place}",
         test=test,
         conditions=tuple(conditions_of(test, maker.units)),
-        figures=tuple(figures),
+        figures=(*filter(None, changes), *figures),
         tables=tuple(shown_tables),
         comparisons=tuple(comparisons),
         problems=(*left_out, *problems),
@@ -329,7 +321,6 @@ def _section_of_axis(
         truth=None if truth is None else maker.table(truth),
         prediction=prediction,
         references=tuple(filter(None, others)),
-        changes=tuple(filter(None, changes)),
         summary=summary_of(test),
     )
 
