@@ -35,8 +35,8 @@ def _distortion(found: Sequence[Estimate]) -> Iterator[Part]:
         return
     parts: list[Parts] = []
     for each in known:
-        parity = each.name.split("_")[0]
-        parts.append((Amount(each, "percent"), f" of it is {parity} distortion"))
+        parity, is_ = each.name.split("_")[0], "" if parts else "is "
+        parts.append((f"{parity} distortion {is_}", Amount(each, "percent")))
     yield "; of the rate's RMS, "
     yield from listed(parts)
 
