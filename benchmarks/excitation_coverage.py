@@ -1,10 +1,11 @@
 """How often intervals of excitations hold the truth, on rigs unlike the shipped ones.
 
 Run with `python -m benchmarks.excitation_coverage [--rigs 20] [--seeds 20] [--first 200]`. Two
-tables: what the report of `excitation` itself tells of three rigs, seed by seed (inertia and
-friction by a Fourier series, levels of distortion by multisines), and what `campaign identify
---model frequency_response` makes of multisines at one amplitude and at two on random rigs. Truth is
-the bench that was simulated; of a level of distortion, which no bench states, the mean over seeds.
+tables: what the report of `excitation` itself tells of three rigs, seed by seed, and of random ones
+(inertia and friction by a Fourier series, levels of distortion by multisines), and what `campaign
+identify --model frequency_response` makes of multisines at one amplitude and at two on random rigs.
+Truth is the bench that was simulated; of a level of distortion, which no bench states, the mean
+over seeds.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from campaign.physics.bench import Bench
 from tests.estimation.coverage import holds
 from tests.estimation.excited_rigs import THREE, excited_rig
 from tests.experiments.asked import asked
-from tests.experiments.excited import by_lines, by_series, played, rate, true_dynamics
+from tests.experiments.excited import by_lines, by_series, played, rate, series, true_dynamics
 from tests.experiments.laboratory import Done
 
 WIDE = {"signal": "multisine", "lowest": "0.5 Hz", "highest": "40 Hz", "period": "4 s"}
@@ -67,6 +68,19 @@ def judged(found: Sequence[Estimate], truth: Mapping[str, float], held: Held) ->
         if one.name in truth and one.kind == "number":
             told = one.has_interval and one.origin is not Origin.NOT_DETERMINED
             held[one.name].append(holds(one, truth[one.name]) if told else None)
+
+
+def random_series(seed: int) -> Held:
+    """Of one random rig: what the report tells of a Fourier series."""
+    on = excited_rig(seed, linear=bool(seed % 2), alike=bool(seed % 4 > 1))
+    held: Held = defaultdict(list)
+    try:
+        found = series(on, seed)
+    except ValueError as error:
+        print(f"rig {seed}: {error}")
+        return held
+    judged(found, true_dynamics(on), held)
+    return held
 
 
 def responses(seed: int) -> dict[str, Held]:
@@ -139,7 +153,11 @@ def main() -> None:
             for found in levels:
                 judged(found, true_levels(levels), held)
             made += rows(name, held)
-        print(table(headings, made))
+        random: Held = defaultdict(list)
+        for one in pool.map(random_series, range(options.first, options.first + options.rigs)):
+            for number, each in one.items():
+                random[number] += each
+        print(table(headings, [*made, *rows("random rigs", random)]))
         together: dict[str, Held] = defaultdict(lambda: defaultdict(list))
         for each in pool.map(responses, range(options.first, options.first + options.rigs)):
             for what, held in each.items():

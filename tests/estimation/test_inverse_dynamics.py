@@ -132,6 +132,18 @@ def test_decimation_keeps_the_last_sample(count: int) -> None:
     assert kept[30:-30] == pytest.approx(expected[30:-30], abs=0.01)
 
 
+@pytest.mark.parametrize("factor", [10, 40, 100])
+def test_what_is_constant_passes_and_what_is_slow_by_its_ripple(factor: int) -> None:
+    """Also of large factors, for which one polynomial of the filter is not exact."""
+    time = np.arange(20_000) / 1000.0
+    slow = np.sin(2 * np.pi * 0.02 * 1000.0 / factor * time)
+    kept = decimated(np.column_stack([slow, np.full_like(time, 3.0)]), factor)
+    middle = slice(len(kept) // 4, -len(kept) // 4)
+    ripple = 10.0 ** (2.0 * 0.05 / 20.0) - 1.0  # of a filter that is passed twice
+    assert np.abs(kept[middle, 0] - slow[::-factor][::-1][middle]).max() < ripple
+    assert kept[middle, 1] == pytest.approx(3.0, rel=1e-10)
+
+
 def test_what_is_fast_does_not_pass_a_decimation() -> None:
     time = np.arange(5000) / 1000.0
     fast = np.sin(2 * np.pi * 70.0 * time)

@@ -37,8 +37,12 @@ def played(on: Bench, options: Mapping[str, Any], first: int) -> tuple[Done, ...
 
 
 def by_series(name: str, seed: int) -> list[Estimate]:
-    """What the report tells of inertia and friction."""
-    on = THREE[name]()
+    """What the report tells of inertia and friction of one of three rigs."""
+    return series(THREE[name](), seed)
+
+
+def series(on: Bench, seed: int) -> list[Estimate]:
+    """The same of any. Raises ValueError where a trial fails."""
     options = {**SERIES, "max_rate": rate(on, 0.5), "seed": seed}
     with speaking_of(on.sides):
         result = analyse("excitation", played(on, options, 5000 * seed))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from campaign.backends.serial import SerialBackend, SerialOptions
 from campaign.estimation.gate import UNPHYSICAL
 from campaign.experiments import experiments
+from campaign.experiments.any_motion.motions import rows_of
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import Experiment
 from campaign.physics.bench import Bench
@@ -220,6 +222,17 @@ def words(result: Result) -> str:
     return " ".join(
         part if isinstance(part, str) else "#" for each in result.conclusions for part in each.parts
     )
+
+
+@pytest.mark.parametrize(
+    ("mode", "highest", "expected"),
+    [("rate", 1.0, 25.0), ("rate", 4.0, 80.0), ("torque", 1.0, 100.0)],
+)
+def test_slow_series_have_fewer_rows(mode: str, highest: float, expected: float) -> None:
+    """Friction as sliding sets in is in rows beside a reversal, which are left out with it."""
+    command = MultiSine(frequencies=(0.5, highest), amplitudes=(1.0, 1.0), phases=(0.0, 0.0))
+    trial = SimpleNamespace(task=SimpleNamespace(mode=mode, command=command))
+    assert rows_of([SimpleNamespace(trial=trial)]) == expected  # type: ignore[list-item]
 
 
 def test_multisines_tell_the_response_its_noise_and_distortion() -> None:

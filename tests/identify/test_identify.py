@@ -18,7 +18,7 @@ from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments.interface import Model, suitable
 from campaign.identify import experiments_by_model
-from campaign.identify.identification import Identification, _section, identify, widest
+from campaign.identify.identification import Identification, _compared, _section, identify, widest
 from campaign.identify.material import choose
 from campaign.identify.page import _advice, next_measurement, write_identification
 from campaign.identify.tables import parameters_table
@@ -115,6 +115,26 @@ def test_what_changed_is_declared_and_what_did_not_is_not(
     ).sections[0]
     declared = [c for c in same.changes if c.adjusted is not None and c.adjusted <= 0.05]
     assert [each.quantity for each in declared] == []
+
+
+def test_what_is_of_the_rig_cancels_between_its_runs(
+    found: Identification, results: Path, run: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One torque constant of unknown truth shifts both runs alike."""
+    first = found.sections[0].identified.parameters[0]
+    parts = (Systematic("torque constant", 10.0, of_rig=True), Systematic("low-pass", 0.3))
+    estimate = Estimate("inertia", 20.0, "kg m^2", 19.8, 20.2, 0.95, systematic=parts)
+    assert found.sections[0].result is not None
+    identified = replace(
+        found.sections[0].identified, parameters=(replace(first, estimate=estimate),)
+    )
+    section = replace(
+        found.sections[0], result=replace(found.sections[0].result, identified=identified)
+    )
+    monkeypatch.setattr("campaign.identify.identification.fitted_again", lambda *_: section)
+    told = _compared(section, found.bench, choose(results, f"{run}:tuesday"), lambda _: None)
+    (change,) = told.changes
+    assert [part.source for part in change.found.difference.systematic] == ["low-pass"]
 
 
 def test_the_command_writes_a_page_its_data_and_a_bench(

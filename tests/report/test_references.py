@@ -252,6 +252,22 @@ def test_a_row_of_one_measurement_is_not_held_against_the_mean(
         assert row["found"].value == expected  # type: ignore[union-attr]
 
 
+def test_what_other_numbers_say_is_shown_and_not_judged(
+    made_up: ModuleType, tmp_path: Path
+) -> None:
+    """Two fits of the same points are no two numbers of a family."""
+    one = found("coulomb_torque", 18.4, 0.2, "N m")
+    fits = [Finding.of(one, {**CONDITIONS, "exponent": each}) for each in ("free", "2")]
+    text = "quantity,value,unit,low,high\ncoulomb_torque,16,N m,15.8,16.2\n"
+    _, document = with_file(made_up, tmp_path, text, findings=fits)
+    (compared,) = document.references.files["breakaway"]
+    assert [row["verdict"] for row in compared.table.rows] == [
+        "different",
+        "fits of the same points with the exponent held",
+    ]
+    assert compared.told.startswith("1 of 1 numbers differ")
+
+
 def test_bench_and_file_are_one_family(made_up: ModuleType, tmp_path: Path) -> None:
     """Of three pairs a p value of 0.0135 is declared, of five it is not."""
     path = tmp_path / "values.csv"

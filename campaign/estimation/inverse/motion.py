@@ -21,8 +21,6 @@ ORDER = 4
 """of the Butterworth low-pass, which runs forward and backward."""
 DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND = 8, 0.05, 0.8
 """Chebyshev low-pass of the decimation: order, ripple (dB), share of the new Nyquist frequency."""
-MOST_AT_ONCE = 20
-"""Decimation above which one polynomial of the filter is not exact: sections of it are."""
 LOW_PASS, LOW_PASS_SHARE = 100.0, 0.2
 """Hz, and share of the sample rate: the smaller is the corner, where nobody says another."""
 REGRESSION_RATE = 100.0
@@ -150,19 +148,14 @@ def decimated(columns: Array, factor: int) -> Array:
 
 def _smooth(columns: Array, factor: int) -> Array:
     """`columns`, shape (n, k), behind the low-pass of a decimation by `factor`."""
-    from scipy.signal import filtfilt, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if factor == 1:
         return columns
     _refuse_short(len(columns), 3 * DECIMATOR_ORDER)
-    if factor > MOST_AT_ONCE:
-        parts = _sections(factor)
-        gain = np.prod(parts[:, :3].sum(axis=1) / parts[:, 3:].sum(axis=1))
-        smooth = sosfiltfilt(parts, columns, axis=0, padlen=3 * DECIMATOR_ORDER)
-        return np.asarray(smooth / gain**2)
-    b, a = _decimator(factor)
-    smooth = filtfilt(b, a, columns, axis=0, padlen=3 * DECIMATOR_ORDER)
-    return np.asarray(smooth * (a.sum() / b.sum()) ** 2)
+    parts = _decimator(factor)
+    gain = np.prod(parts[:, :3].sum(axis=1) / parts[:, 3:].sum(axis=1))
+    return np.asarray(sosfiltfilt(parts, columns, axis=0, padlen=3 * DECIMATOR_ORDER) / gain**2)
 
 
 def first_kept(count: int, factor: int) -> int:
@@ -190,17 +183,12 @@ def later(samples: Array, delay: float, sample_rate: float) -> Array:
 
 
 @lru_cache(maxsize=16)
-def _decimator(factor: int) -> tuple[Array, Array]:
-    """Coefficients of the low-pass; they take longer than to filter a short motion."""
-    from scipy.signal import cheby1
+def _decimator(factor: int) -> Array:
+    """The low-pass in sections of second order, shape (n, 6).
 
-    b, a = cheby1(DECIMATOR_ORDER, DECIMATOR_RIPPLE, DECIMATOR_BAND / factor)
-    return b, a
-
-
-@lru_cache(maxsize=16)
-def _sections(factor: int) -> Array:
-    """The same in sections of second order, shape (n, 6)."""
+    One polynomial is not exact where the factor is large. Kept: making it takes longer than to
+    filter a short motion.
+    """
     from scipy.signal import cheby1
 
     ripple, band = DECIMATOR_RIPPLE, DECIMATOR_BAND / factor
