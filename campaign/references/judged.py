@@ -103,18 +103,18 @@ def _of_wrong_model(reference: Estimate, other: Estimate) -> Reason:
     return NONE
 
 
-def with_verdicts(pairs: Sequence[J], rate: float = RATE) -> tuple[J, ...]:
+def with_verdicts(pairs: Sequence[J]) -> tuple[J, ...]:
     """The pairs with their verdicts: one family, whatever they are of.
 
     No difference is declared that the pair's own interval leaves open.
     """
     tested = (pair.found.p for pair in pairs if pair.testable)
     p = iter(adjusted([each for each in tested if each is not None]))
-    return tuple(_with(pair, next(p), rate) if pair.testable else pair for pair in pairs)
+    return tuple(_with(pair, next(p)) if pair.testable else pair for pair in pairs)
 
 
-def _with(pair: J, p: float, rate: float) -> J:
-    declared = p <= rate and excludes_zero(pair.found.difference)
+def _with(pair: J, p: float) -> J:
+    declared = p <= RATE and excludes_zero(pair.found.difference)
     verdict = Verdict.DIFFERENT if declared else Verdict.NOT_SHOWN
     return replace(pair, verdict=verdict, adjusted=p)
 

@@ -92,7 +92,7 @@ def read_values(path: Path) -> tuple[ReferenceValue, ...]:
             value = _value(heads, row, f"line {line}")
             about = repr((value.estimate.name, dict(sorted(value.conditions.items())), value.test))
             if about in found:
-                raise ValueError(f"it is of the same number as {found[about].place}")
+                raise ValueError(f"it repeats {found[about].place}: quantity, conditions and test are the same")
         except ValueError as error:
             raise UsageError(f"{path}, line {line}: {error}") from None
         found[about] = value
@@ -167,5 +167,5 @@ def _number(name: str, cell: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{name} is a number, but {cell!r} stands there")
     if value and not SMALLEST <= abs(value) <= LARGEST:
-        raise ValueError(f"{name} is {cell}, which nothing measures")
+        raise ValueError(f"{name} is {cell}; sizes from {SMALLEST:g} to {LARGEST:g} are read")
     return value
