@@ -92,7 +92,9 @@ def read_values(path: Path) -> tuple[ReferenceValue, ...]:
             value = _value(heads, row, f"line {line}")
             about = repr((value.estimate.name, dict(sorted(value.conditions.items())), value.test))
             if about in found:
-                raise ValueError(f"it repeats {found[about].place}: quantity, conditions and test are the same")
+                raise ValueError(
+                    f"it repeats {found[about].place}: quantity, conditions and test are the same"
+                )
         except ValueError as error:
             raise UsageError(f"{path}, line {line}: {error}") from None
         found[about] = value
