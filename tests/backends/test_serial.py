@@ -194,7 +194,8 @@ def test_a_fault_has_its_name_and_the_next_trial_is_good(
 
 
 def test_a_trial_can_be_stopped() -> None:
-    with controller("--speed", "1") as port, backend_at(port) as backend:
+    patient = ("--heartbeat-timeout", "20")  # a busy machine is no silence
+    with controller("--speed", "1", *patient) as port, backend_at(port) as backend:
         long = trial(task(duration=60.0))
         asked = iter([False, False])
         ending, recording = execute(backend, long, lambda: next(asked, True))

@@ -70,7 +70,8 @@ def hot_port() -> Iterator[str]:
 @pytest.fixture(scope="module")
 def slow_port() -> Iterator[str]:
     """Of a controller whose seconds take a second."""
-    with controller("--speed", "1", bench="simulink") as found:
+    patient = ("--heartbeat-timeout", "20")  # a busy machine is no silence
+    with controller("--speed", "1", *patient, bench="simulink") as found:
         yield found
 
 
