@@ -19,7 +19,7 @@ closest to the truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -207,9 +207,15 @@ def fit_direction(
     return DirectionFit(named, means, level, scatter, scatters, fits, lacking)
 
 
-def direction_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:
-    """The parameters of one direction with their intervals, by name, as they may be reported."""
-    return {name: passed(one, model, fit) for name, one in fitted_estimates(fit, model).items()}
+def direction_estimates(
+    fit: DirectionFit, model: Model, shared: Callable[[Estimate], Estimate] = lambda one: one
+) -> dict[str, Estimate]:
+    """The parameters of one direction with their intervals, by name, as they may be reported.
+
+    shared: adds what all points share.
+    """
+    found = fitted_estimates(fit, model)
+    return {name: passed(shared(one), model, fit) for name, one in found.items()}
 
 
 def fitted_estimates(fit: DirectionFit, model: Model) -> dict[str, Estimate]:

@@ -134,6 +134,9 @@ Suits = Callable[[Sequence[TrialData]], tuple[Sequence[TrialData], str]]
 class Model:
     """How `campaign identify` uses an experiment's analysis, which gives `Result.identified`.
 
+    The analysis then has `TestData.model` and `TestData.validation`, and raises ValueError with a
+    message for the user where there is no result.
+
     Attributes:
         name: what `--model` says.
         summary: one line for `campaign kinds`.
@@ -141,16 +144,12 @@ class Model:
             `TestData.model`.
         suits: recorded trials that the analysis can use. Absent: those of the experiment itself
             that have the channels it requires.
-        analyse: what analyses them in place of the experiment's own analysis, which has
-            `TestData.model` and `TestData.validation`. Either raises ValueError with a message for
-            the user where there is no result.
     """
 
     name: str
     summary: str
     options: type[Options] = Options
     suits: Suits | None = None
-    analyse: Callable[[TestData], Result] | None = None
 
 
 NO_MODEL = Model("", "")
@@ -245,8 +244,6 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
     of other kinds, which a model may suit, are those of other analyses, and not used.
     """
     with speaking_of(_sides(data)):
-        if data.model is not None and experiment.model.analyse is not None:
-            return of_its_axis(experiment.model.analyse(data))
         return of_its_axis(_result_of(experiment, data))
 
 

@@ -20,7 +20,7 @@ from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import doubts
 from campaign.experiments.friction_map import fitting
 from campaign.experiments.friction_map.conclusions import repeatability_conclusions
-from campaign.experiments.friction_map.fits import fit_map
+from campaign.experiments.friction_map.curves import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.repeated import (
     MapSet,
@@ -37,7 +37,7 @@ from campaign.experiments.friction_map.runs import (
     settling_notes,
 )
 from campaign.experiments.friction_map.warnings import map_warnings
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts
@@ -70,10 +70,9 @@ def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
         place = {k: v for k, v in first.point.items() if k not in OWN}
         where = ", ".join(f"{path} = {value}" for path, value in place.items())
         name = f"{2 * number - 1}-{2 * number}"
-        bench = bench_of(first)
-        points, _ = steady(points_of(group, bench, notes), notes)
+        points, _ = steady(points_of(group, notes), notes)
         try:
-            fits = fit_map(points, bench)
+            fits = fit_map(points, group[0])
         except ValueError as error:
             notes.append(f"Sets {name} have no fit: {error}.")
             continue

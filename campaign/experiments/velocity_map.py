@@ -46,7 +46,9 @@ def _analyse(data: TestData) -> Result:
         (*(figure for part in parts for figure in part.figures), *example_figure(data)),
         tuple(findings),
         (*notes, *(note for part in parts for note in part.notes)),
-        map_conclusions(findings, speeds, Settings.of(data, PilotedMapOptions)),
+        # Of maps with too few speeds for a curve each has its own.
+        tuple(each for part in parts for each in part.conclusions)
+        or map_conclusions(findings, speeds, Settings.of(data, PilotedMapOptions)),
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from campaign.estimation.stribeck import fit_stribeck, stribeck
 from campaign.experiments import experiments
-from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.friction_map.curves import Curves, fit_map
 from campaign.experiments.friction_map.points import points_of, steady
 from campaign.physics.bench import Bench
 from campaign.physics.complete import complete, control_rate
@@ -96,10 +96,10 @@ class Truths:
             self._closest[exponent, direction] = {n: closest.values[n] for n in closest.free}
         return self._closest[exponent, direction]
 
-    def _map(self) -> MapFits:
+    def _map(self) -> Curves:
         notes: list[str] = []
-        kept, _ = steady(points_of(self._run.done, self._case.stated, notes), notes)
-        return fit_map(kept, self._case.stated)
+        kept, _ = steady(points_of(self._run.done, notes), notes)
+        return fit_map(kept, self._run.done[0])
 
     def by_stated(self, finding: Finding) -> float | None:
         """What would be found without scatter of what depends on the stated inertia; else None."""

@@ -13,11 +13,10 @@ import pytest
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import TOO_WIDE
 from campaign.estimation.velocity_map import direction_estimates, fit_direction
+from campaign.experiments.friction_map.curves import Curves, fit_map
 from campaign.experiments.friction_map.figures import falls
-from campaign.experiments.friction_map.fits import MapFits, fit_map
-from campaign.experiments.friction_map.points import MapPoint, map_points, measure
+from campaign.experiments.friction_map.points import Point, map_points, measure
 from campaign.experiments.friction_map.tables import fitted_torque
-from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
 from campaign.result import Table
 from tests.estimation.coverage import holds, rejected
@@ -73,9 +72,9 @@ def seen_by(bench: Bench, seed: int) -> list[Done]:
     ]
 
 
-def fitted(seed: int, told: bool) -> MapFits:
-    bench = platform(told)
-    return fit_map([p for item in seen_by(bench, seed) for p in map_points(item, bench)], bench)
+def fitted(seed: int, told: bool) -> Curves:
+    items = seen_by(platform(told), seed)
+    return fit_map([p for item in items for p in map_points(item)], items[0])
 
 
 def held(seeds: range, told: bool) -> dict[str, list[bool]]:
@@ -150,7 +149,7 @@ def test_archived_metrics_give_the_same_tables() -> None:
         assert len(names) == len(set(names))
         assert all(np.isfinite(each.value) for each in item.estimates)
         assert all(each.says_enough for each in item.estimates)
-    points = [p for item in archived for p in map_points(_unread(item), bench_of(item.trial))]
+    points = [p for item in archived for p in map_points(_unread(item))]
     assert len(points) == 32
     assert analyse("velocity_map", archived).tables == fresh.tables
 
@@ -226,8 +225,8 @@ def test_several_start_angles_are_averaged_and_make_one_map() -> None:
     assert len(planned) == 16
     assert {t.task.start_angle for t in planned} == {np.deg2rad(-30.0), np.deg2rad(half - 30.0)}
     items = execute(planned)
-    points = [p for item in items for p in map_points(item, platform())]
-    fits = fit_map(points, platform())
+    points = [p for item in items for p in map_points(item)]
+    fits = fit_map(points, items[0])
     assert len(fits.fits["positive"].speed) == 8
     assert len([t for t in analyse("velocity_map", items).tables if t.key == "map"]) == 1
 
@@ -235,9 +234,9 @@ def test_several_start_angles_are_averaged_and_make_one_map() -> None:
 def test_lost_samples_are_left_out_and_a_window_without_any_is_told() -> None:
     """One in ten costs a little; a trial without any has no points, and the map has 15 speeds."""
     items = seen_by(platform(), 1)
-    whole = next(map_points(items[3], platform()))
+    whole = next(map_points(items[3]))
     some, every = (np.arange(len(items[3].samples.time)) % n == 0 for n in (10, 1))
-    less = next(map_points(without(items[3], some), platform()))
+    less = next(map_points(without(items[3], some)))
     assert less.torque.value == pytest.approx(whole.torque.value, rel=1e-3)
     items[3] = without(items[3], every)
     result = analyse("velocity_map", items)
@@ -266,7 +265,7 @@ def test_the_error_of_a_point_is_that_of_its_weight() -> None:
         np.testing.assert_allclose(errors, np.hypot(windows, between), rtol=1e-3)
 
 
-def measured_speed(point: MapPoint) -> float:
+def measured_speed(point: Point) -> float:
     return abs(point.rate.value)
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
 from campaign.experiments.friction_map import model, sliding
-from campaign.experiments.friction_map.stretches import Point, Stretch, StretchOptions
+from campaign.experiments.friction_map.points import Point
+from campaign.experiments.friction_map.stretches import Stretch, StretchOptions
 from tests.experiments.asked import data_of
 from tests.physics.benches import bench
 
@@ -27,6 +28,7 @@ class OneTrial:
         number=1,
         role="measurement",
         windows=(),
+        options={},
     )
     ending = SimpleNamespace(outcome="completed")
 
@@ -45,7 +47,8 @@ def stretch(speed: float, *, slips: bool) -> Point:
     noise = 0.01 * np.random.default_rng(round(1e4 * speed)).normal(size=len(TIME))
     torque = 5.0 + 2.0 * speed + noise - (1.0 if slips else 0.0)
     wrapped = np.angle(np.exp(1j * (angle + 3.0)))
-    return Stretch(1, TIME, counted, torque, wrapped, np.nan, np.nan, 0.0).point(None)
+    (trial,) = data_of([OneTrial()]).trials
+    return Stretch(trial, TIME, counted, torque, wrapped, np.nan).point(None)
 
 
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
@@ -57,7 +60,7 @@ def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     steady = [stretch(speed, slips=False) for speed in (0.2, 0.5, 0.8, 1.2)]
     stuck = [stretch(speed, slips=True) for speed in (0.1, 0.15)]
-    assert all(point.own.unsteady in STICK_SLIP for point in stuck)
+    assert all(point.unsteady in STICK_SLIP for point in stuck)
     identification = identified(monkeypatch, [*stuck, *steady])
     (left,) = identification.identified.left_out
     assert left in sliding.UNSTEADY

@@ -9,13 +9,13 @@ import pytest
 
 from campaign.axis_kind import sides_in, speaking_of
 from campaign.estimation.steadiness import NOT_REACHED, STICK_SLIP, drifting
-from campaign.experiments.friction_map.fits import fit_map
+from campaign.experiments.friction_map.curves import fit_map
 from campaign.experiments.friction_map.fitting import velocity_map
-from campaign.experiments.friction_map.points import MapPoint, points_of, steady
+from campaign.experiments.friction_map.points import Point, points_of, steady
 from campaign.experiments.friction_map.runs import VelocityMapOptions
 from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
-from tests.experiments.laboratory import Tree, analyse, execute, finding, trials
+from tests.experiments.laboratory import Done, Tree, analyse, execute, finding, trials
 from tests.physics.benches import SIMULINK, bench
 
 LINEAR = SIMULINK.with_name("linear.toml")
@@ -106,19 +106,20 @@ def soft(proportional: str) -> Bench:
         return Bench.model_validate(tree)
 
 
-def points_on(rig: Bench) -> list[MapPoint]:
+def points_on(rig: Bench) -> tuple[list[Point], Done]:
     """Points of a map as `init` would write it; m is written as rad."""
     options = {
         "slowest": "0.00019 rad/s", "fastest": "0.036 rad/s", "points": 40, "warm_up_cycles": 0,
         "settle_angle": "0.0085 rad", "window_angle": "0.005 rad", "max_travel": "0.06 rad",
         "max_time": "60 s", "settle_time": "0.6 s", "acceleration": "0.3 rad/s^2",
     }  # fmt: skip
-    return points_of(execute(trials("velocity_map", rig, options)), rig, [])
+    items = execute(trials("velocity_map", rig, options))
+    return points_of(items, []), items[0]
 
 
-def holds(points: list[MapPoint], rig: Bench) -> list[bool]:
+def holds(points: list[Point], first: Done) -> list[bool]:
     """Whether the interval of the exponent holds 1, by direction."""
-    fits = fit_map(points, rig).estimates("free")
+    fits = fit_map(points, first).estimates("free")
     found = [fits[way]["stribeck_exponent"].combined for way in ("positive", "negative")]
     return [low is not None and high is not None and low <= 1.0 <= high for low, high in found]
 
@@ -126,7 +127,7 @@ def holds(points: list[MapPoint], rig: Bench) -> list[bool]:
 def test_points_that_stick_and_slip_do_not_bend_the_curve() -> None:
     """A rate loop that is too soft: up to about vs (4 mm/s) the carriage sticks and slips."""
     rig = soft("4 A s/m")
-    points = points_on(rig)
+    points, first = points_on(rig)
     notes: list[str] = []
     kept, left = steady(points, notes)
     slow = [point for point in points if abs(point.speed) < 3.3e-3]
@@ -135,10 +136,10 @@ def test_points_that_stick_and_slip_do_not_bend_the_curve() -> None:
     assert all(point.unsteady.text in point.rule for point in left)
     assert not any(point.unsteady for point in points if abs(point.speed) > 4.5e-3)
     assert f"{len(slow)} of 80 points are left out of the fit, for stick-slip" in notes[0]
-    assert holds(kept, rig) == [True, True]
+    assert holds(kept, first) == [True, True]
 
 
 def test_a_stiffer_rate_loop_slides_steadily() -> None:
     """What the note advises."""
     rig = soft("12 A s/m")
-    assert not any(point.unsteady for point in points_on(rig))
+    assert not any(point.unsteady for point in points_on(rig)[0])

@@ -151,12 +151,40 @@ def test_failed_trials_are_left_out_and_told() -> None:
     assert any("1 of 6 trials" in note for note in result.notes)
 
 
-def test_one_trial_gives_its_points_and_no_fit() -> None:
-    done = execute(trials("velocity_map", bench(), {**FEW, "speeds": ["10 deg/s"]}))
+def curve_at(speed: float) -> float:
+    """Equation 4.6 with the bench's combined friction; rad/s, N m."""
+    own = COMBINED
+    falls = np.exp(-((speed / own["stribeck_velocity"]) ** own["stribeck_exponent"]))
+    dry = own["coulomb_torque"] + (own["static_torque"] - own["coulomb_torque"]) * falls
+    return float(dry + own["viscous_friction"] * speed)
+
+
+def test_one_trial_gives_the_friction_at_its_speed() -> None:
+    done = execute(trials("velocity_map", bench(), {**FEW, "speeds": ["1 deg/s"]}))
     result = analyse("velocity_map", done)
+    assert [t.key for t in result.tables] == ["map"]
     assert len(table(result, "map").rows) == 2
-    assert not [t for t in result.tables if t.key == "parameters"]
-    assert any(note.startswith("No fit") and "1 points" in note for note in result.notes)
+    found = finding(result, "friction_torque", direction="negative")
+    assert found.value == pytest.approx(curve_at(deg(1.0)), rel=0.003)
+    assert any("1 steady stretches show no line" in note for note in result.notes)
+
+
+def test_four_speeds_give_a_line() -> None:
+    """Above the Stribeck velocity, without noise: the line through four points of the curve."""
+    speeds = (10, 20, 30, 40)
+    options = {**FEW, "speeds": [f"{each} deg/s" for each in speeds]}
+    result = analyse("velocity_map", execute(trials("velocity_map", bench(), options)))
+    rates = np.deg2rad(speeds)
+    slope, dry = np.polyfit(rates, [curve_at(each) for each in rates], 1)
+    for direction in ("positive", "negative"):
+        told = finding(result, "coulomb_torque", direction=direction)
+        assert told.value == pytest.approx(dry, rel=0.003)
+        assert finding(result, "viscous_friction", direction=direction).value == pytest.approx(
+            slope, rel=0.02
+        )
+    (shown,) = (each for each in result.figures if each.key == "map")
+    assert [len(panel.curves) for panel in shown.panels] == [4, 4]
+    assert str(result.conclusions[0].parts[0]).startswith("Sliding steadily in the positive")
 
 
 def test_nothing_measured_gives_nothing() -> None:

@@ -19,7 +19,7 @@ from campaign.errors import ExitCode
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.over_a_turn import over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
-from campaign.experiments.friction_map.stretches import Point
+from campaign.experiments.friction_map.points import Point
 from campaign.identify.agreement import disagreements
 from tests.identify.unseen import curve, identified, notes, told
 
@@ -156,7 +156,7 @@ def test_a_point_is_moved_with_its_interval() -> None:
     time = np.arange(400) / 100.0
     torque = 2.0 + 1e-3 * np.random.default_rng(1).standard_normal(400)
     own = steady_sliding(time, np.full(400, 0.5), torque, None, None)
-    moved = Point(1, own, doubts=(0.5,)).off_by(0).own.torque
+    moved = Point.of(own, 1, 0.0, 4.0, doubts=(0.5,)).off_by(0).torque
     assert moved.value == pytest.approx(1.5, abs=1e-3)
     assert moved.low is not None
     assert moved.high is not None

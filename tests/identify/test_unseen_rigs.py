@@ -10,7 +10,7 @@ import pytest
 from campaign.cli.identify import identify_run
 from campaign.errors import NoResultError
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.friction_map.stretches import places
+from campaign.experiments.friction_map.curves import places
 from tests.identify.unseen import (
     curve,
     identified,

@@ -32,7 +32,7 @@ from campaign.experiments.frequency_response.figures import (
     torque_figure,
 )
 from campaign.experiments.frequency_response.marks import place_names, servo_figure
-from campaign.experiments.frequency_response.model.analysis import MODEL
+from campaign.experiments.frequency_response.model.analysis import MODEL, identified
 from campaign.experiments.frequency_response.sine_commands import (
     rate_sine,
     told_amplitude,
@@ -301,6 +301,8 @@ def _point(data: TrialData) -> SinePoint:
 
 
 def _analyse(data: TestData) -> Result:
+    if data.model is not None:
+        return identified(data)
     notes = list(failures_note(data))
     paths = [path for path in swept(data, own=("frequency",)) if path != "loop"]
     sweeps: list[Sweep] = []

@@ -12,7 +12,7 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.friction_memory import memory_angle
 from campaign.estimation.map_design import curves_around, telling_speeds
 from campaign.estimation.stribeck import PARAMETERS
-from campaign.experiments.friction_map.fits import MapFits, fit_map
+from campaign.experiments.friction_map.curves import Curves, fit_map
 from campaign.experiments.friction_map.pilot import (
     REVERSAL,
     SPEEDS,
@@ -21,7 +21,7 @@ from campaign.experiments.friction_map.pilot import (
     pilot_run,
     pilot_speeds,
 )
-from campaign.experiments.friction_map.points import MapPoint, map_points, points_of, steady
+from campaign.experiments.friction_map.points import Point, map_points, points_of, steady
 from campaign.experiments.friction_map.runs import (
     DIRECTIONS,
     MEMORIES,
@@ -76,11 +76,13 @@ def following(options: PilotedMapOptions, bench: Bench, data: TestData) -> Itera
 
 def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData]) -> Choice:
     """What the pilot's recordings ask for; the rest of the plain map where they say nothing."""
-    points, _ = steady(points_of(pilot, bench, []), [])
+    points, _ = steady(points_of(pilot, []), [])
     try:
-        fits = fit_map(points, bench)
+        if not points:
+            raise ValueError("it has no steady point")
+        fits = fit_map(points, pilot[0])
         curves = _curves(fits)
-        longer = _longer(options, bench, fits, _memory(pilot, bench))
+        longer = _longer(options, bench, fits, _memory(pilot))
         speeds = _speeds(options, longer, points, curves)
     except ValueError as error:
         told = f"after a pilot that tells too little of friction: {error}"
@@ -88,7 +90,7 @@ def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData])
     return Choice(longer, speeds, _reason(options, longer, fits))
 
 
-def _plain(options: PilotedMapOptions, points: Sequence[MapPoint]) -> tuple[float, ...]:
+def _plain(options: PilotedMapOptions, points: Sequence[Point]) -> tuple[float, ...]:
     """The rest of the plain map; between the speeds at which the pilot slid steadily."""
     done = set(pilot_speeds(options))
     found = [abs(point.speed) for point in points] or [options.slowest, options.fastest]
@@ -99,7 +101,7 @@ def _plain(options: PilotedMapOptions, points: Sequence[MapPoint]) -> tuple[floa
     return tuple(float(speed) for speed in between)
 
 
-def _curves(fits: MapFits) -> list[Mapping[str, float]]:
+def _curves(fits: Curves) -> list[Mapping[str, float]]:
     """Curves that the pilot leaves possible. ValueError where neither direction shows one."""
     curves: list[Mapping[str, float]] = []
     for direction, fit in fits.fits.items():
@@ -120,14 +122,14 @@ def _relative_error(found: Estimate) -> float:
     return np.inf if found.standard_error is None else found.standard_error / found.value
 
 
-def _memory(pilot: Sequence[TrialData], bench: Bench) -> float:
+def _memory(pilot: Sequence[TrialData]) -> float:
     """Ts / sigma0 (rad), the largest that a reversal of the slowest runs shows; NaN without any."""
     slowest = sorted({speed_of(item.trial) for item in pilot})[:SLOW]
-    found = [_reversal(item, bench) for item in pilot if speed_of(item.trial) in slowest]
+    found = [_reversal(item) for item in pilot if speed_of(item.trial) in slowest]
     return max((angle for angle in found if np.isfinite(angle)), default=np.nan)
 
 
-def _reversal(item: TrialData, bench: Bench) -> float:
+def _reversal(item: TrialData) -> float:
     """Ts / sigma0 (rad) from the way back of one run; NaN where it tells none."""
     turn = windows_of(item.trial)[REVERSAL]
     cut = item.recording().window(turn.start, turn.stop)
@@ -136,14 +138,14 @@ def _reversal(item: TrialData, bench: Bench) -> float:
         angle = cut[RELATIVE_ANGLE]
         rate = rate - np.mean(rate) + (angle[-1] - angle[0]) / (cut.time[-1] - cut.time[0])
     try:
-        (settled,) = (p.torque.value for p in map_points(item, bench) if p.sign < 0)
+        (settled,) = (p.torque.value for p in map_points(item) if p.sign < 0)
     except ValueError:
         return np.nan
     return memory_angle(cut.time, rate, cut[DRIVE_TORQUE], settled)
 
 
 def _longer(
-    options: PilotedMapOptions, bench: Bench, fits: MapFits, memory: float
+    options: PilotedMapOptions, bench: Bench, fits: Curves, memory: float
 ) -> VelocityMapOptions:
     """Options whose settling and windows are long enough for the friction that was found.
 
@@ -164,7 +166,7 @@ def _longer(
 def _speeds(
     options: PilotedMapOptions,
     longer: VelocityMapOptions,
-    points: Sequence[MapPoint],
+    points: Sequence[Point],
     curves: Sequence[Mapping[str, float]],
 ) -> tuple[float, ...]:
     """The speeds that tell most, from the slowest at which the pilot slid steadily.
@@ -197,7 +199,7 @@ def _fits(speed: float, options: VelocityMapOptions, longer: VelocityMapOptions)
     return run.window >= max(HALF * plain.window, SMALLEST_WINDOW / options.sample_rate)
 
 
-def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: MapFits) -> str:
+def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves) -> str:
     found = {
         name: float(np.mean([fits.fits[way].fits["free"].values[name] for way in DIRECTIONS]))
         for name in PARAMETERS

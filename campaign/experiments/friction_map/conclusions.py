@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from campaign.estimate import Estimate
 from campaign.experiments.friction_map.runs import DIRECTIONS
@@ -125,3 +125,24 @@ def _told(findings: Sequence[Finding], **conditions: Value) -> list[Parts]:
         for name in NAMES
         for each in of(findings, name, **conditions)
     ]
+
+
+def sliding_conclusions(
+    found: Mapping[str, Mapping[str, Estimate]], who: str = ""
+) -> Iterator[Conclusion]:
+    """Of each direction; `who` begins each sentence."""
+    for way, by_name in found.items():
+        parts: list[str | Amount] = []
+        if "coulomb_torque" in by_name:
+            parts += ["Coulomb friction is ", Amount(by_name["coulomb_torque"], "N m")]
+            viscous = by_name["viscous_friction"]
+            parts += [" and viscous friction ", Amount(viscous, "N m s/rad")]
+        elif "friction" in by_name:
+            parts += ["friction at the speeds there are is ", Amount(by_name["friction"], "N m")]
+        for beginning, sliding in (("coulomb", " of fast sliding"), ("friction", "")):
+            if (ratio := by_name.get(f"{beginning}_coefficient")) is not None:
+                before = ", and " if parts else ""
+                parts += [f"{before}the coefficient of friction{sliding} is ", Amount(ratio, "")]
+        if parts:
+            start = f"sliding steadily in the {way} direction, "
+            yield Conclusion((f"{who}{start}" if who else start.capitalize(), *parts, "."))

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from campaign.channels import COMMAND, DRIVE_TORQUE, GYRO_RATE
+from campaign.estimate import Estimate
 from campaign.estimation.intervals import student
 from campaign.estimation.stribeck import UNITS, stribeck
-from campaign.estimation.velocity_map import DirectionFit, band
-from campaign.experiments.friction_map.fits import MapFits
+from campaign.estimation.velocity_map import DirectionFit, Model, band
+from campaign.experiments.friction_map.curves import FRICTION, Curves
+from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
 from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
+from campaign.experiments.shared.conclusion_parts import count
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 RATE = Axis("Rate", "rad/s", "deg/s")
@@ -31,14 +34,15 @@ FINE = 160
 """Points of a fitted curve."""
 
 
-def map_figure(fits: MapFits, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
     """Both directions: points and fits with their intervals, over rate and over its logarithm."""
     whole: list[Curve] = []
     own: dict[str, list[Curve]] = {}
     for name in reversed(DIRECTIONS):
-        fit, sign = fits.fits[name], DIRECTIONS[name]
-        whole += [_points(fits, name), _fitted(fit, name, "", sign)]
-        own[name] = [point_bars(fit, f"{name} direction", name), _law(_fitted(fit, name), name)]
+        bars = point_bars(fits.fits[name], f"{name} direction", name)
+        whole.append(_points(fits, name, partial(fitted_torque, curves=fits)))
+        whole.append(_fitted(fits, name, name, sign=DIRECTIONS[name]))
+        own[name] = [bars, _law(_fitted(fits, name, name), name)]
     marks = _least_marks(fits)
     slow = float(np.median(np.concatenate([fit.speed for fit in fits.fits.values()])))
     return Figure(
@@ -66,12 +70,12 @@ def map_figure(fits: MapFits, suffix: str, where: str, trials: tuple[int, ...] =
     )
 
 
-def _points(fits: MapFits, name: str) -> Curve:
-    """The points of a direction as they were measured, less their ripple, signed."""
-    own = sorted((p for p in fits.points if p.sign == DIRECTIONS[name]), key=lambda p: p.rate.value)
+def _points(curves: Curves, name: str, read: Callable[[Point], Estimate]) -> Curve:
+    """The points of a direction as they were measured, signed."""
+    own = [point for point in curves.points if point.sign == DIRECTIONS[name]]
+    own.sort(key=lambda point: point.rate.value)
     rate = np.array([point.rate.value for point in own])
-    torques = [fitted_torque(point, fits) for point in own]
-    return Curve.of(rate, torques, f"{name} direction", name)
+    return Curve.of(rate, [read(point) for point in own], f"{name} direction", name)
 
 
 def point_bars(fit: DirectionFit, label: str, series: str) -> Curve:
@@ -81,12 +85,25 @@ def point_bars(fit: DirectionFit, label: str, series: str) -> Curve:
     return Curve(fit.speed, fit.torque, label, series, "points", low=low, high=high)
 
 
-def _fitted(fit: DirectionFit, series: str, label: str = "", sign: float = 1.0) -> Curve:
-    """The fit with δ free, with its band; sign: -1 shows it at negative rates."""
-    fine = np.geomspace(fit.speed.min(), fit.speed.max(), FINE)
-    torque, wide = stribeck(fine, fit.fits["free"].values), band(fit, "free", fine)
-    y = sign * torque
-    return Curve(sign * fine, y, label, series, low=y - wide, high=y + wide)
+def _fitted(
+    curves: Curves,
+    name: str,
+    series: str,
+    label: str = "",
+    model: Model | None = "free",
+    sign: float = 1.0,
+) -> Curve:
+    """What was fitted to a direction, with its band; sign: -1 shows it at negative rates."""
+    own = [abs(p.rate.value) for p in curves.points if p.sign == DIRECTIONS[name]]
+    fine = np.geomspace(min(own), max(own), FINE)
+    y, low, high = (sign * each for each in curves.curve(name, fine, model))
+    return _in_order(Curve(sign * fine, y, label, series, low=low, high=high))
+
+
+def _in_order(curve: Curve) -> Curve:
+    """With the lower end of its intervals below the upper one."""
+    ends = np.sort(np.array([curve.low, curve.high]), axis=0)
+    return replace(curve, low=ends[0], high=ends[1])
 
 
 def _law(curve: Curve, direction: str) -> Curve:
@@ -108,7 +125,7 @@ def _least(fit: DirectionFit) -> tuple[float, float] | None:
     return (float(fine[at]), float(torque[at])) if 0 < at < FINE - 1 else None
 
 
-def _least_marks(fits: MapFits) -> dict[str, list[Mark]]:
+def _least_marks(fits: Curves) -> dict[str, list[Mark]]:
     """Where the friction of each direction is least, if it falls at all."""
     marks: dict[str, list[Mark]] = {name: [] for name in fits.fits}
     for name, fit in fits.fits.items():
@@ -120,7 +137,7 @@ def _least_marks(fits: MapFits) -> dict[str, list[Mark]]:
     return marks
 
 
-def _what_shows(fits: MapFits) -> str:
+def _what_shows(fits: Curves) -> str:
     """What the fits say of friction at low and at high speed: true of this map."""
     fall = [name for name, fit in fits.fits.items() if falls(fit)]
     rise = [name for name in fits.fits if _rises(fits, name)]
@@ -136,26 +153,26 @@ def _what_shows(fits: MapFits) -> str:
     return sentence(f"{effect}{_of(fall, fits)}") + second
 
 
-def _of(names: list[str], fits: MapFits) -> str:
+def _of(names: list[str], fits: Curves) -> str:
     """Which directions a sentence is about, where it is not about all."""
     return "" if len(names) == len(fits.fits) else f" in the {listed(names)} direction"
 
 
-def _rises(fits: MapFits, name: str) -> bool:
+def _rises(fits: Curves, name: str) -> bool:
     """Whether friction rises with speed, beyond what scatter leaves open and anybody sees."""
     fit = fits.fits[name]
     seen = LEVEL * float(fit.torque.max()) / float(fit.speed.max())
     return surely_above(fits.estimates("free")[name]["viscous_friction"], 0.0, seen)
 
 
-def fit_figure(fits: MapFits, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
+def fit_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = ()) -> Figure:
     """Points and fitted curves of each direction over the logarithm of speed, and residuals."""
     curves, residuals = [], []
     for name, fit in fits.fits.items():
         exponent = fit.fits["free"].values["stribeck_exponent"]
-        free = _fitted(fit, "fit", "fitted, δ free")
-        fixed = replace(free, y=stribeck(free.x, fit.fits["2"].values), low=None, high=None)
-        fixed = replace(fixed, label="fitted, δ = 2", series="alternative")
+        free = _fitted(fits, name, "fit", "fitted, δ free")
+        fixed = _fitted(fits, name, "alternative", "fitted, δ = 2", "2")
+        fixed = replace(fixed, low=None, high=None)
         shown = [point_bars(fit, f"{name} direction", name), _law(free, name), fixed]
         curves.append(
             Panel(SPEED, OWN_TORQUE, shown, f"{name.capitalize()} direction, δ = {exponent:.3g}")
@@ -207,6 +224,60 @@ def _misfit(fits: Mapping[str, DirectionFit]) -> str:
     ]
     start = "over their own deviations, the residuals with δ = 2 are"
     return sentence(f"{start} {listed(words)} those with δ free")
+
+
+def rate_figure(curves: Curves, suffix: str = "") -> Figure:
+    """One quantity over rate."""
+    what = curves.quantity.axis[0]
+    return Figure(
+        key=f"{'map' if curves.quantity is FRICTION else 'coefficient'}{suffix}",
+        title=f"{what} over rate",
+        caption=rate_caption(curves),
+        alt=f"{what} over rate in both directions: a dot for each point, and curves.",
+        panels=rate_panels(curves),
+        across=2,
+        trials=tuple(sorted({point.trial for point in curves.points})),
+    )
+
+
+def rate_caption(curves: Curves) -> str:
+    """What `rate_panels` shows."""
+    runs = any(point.commanded is not None for point in curves.points)
+    one, several = ("run", "runs") if runs else ("steady stretch", "steady stretches")
+    fitted = "Lines: what was fitted to each direction, with its 95 % band; "
+    return (
+        f"Mean {curves.quantity.axis[0].lower()} of {count(len(curves.points), one, several)} over "
+        f"the mean rate. {fitted if curves.fits or curves.lines else ''}bars: "
+        f"95 % of each {one} alone, without what differs between them."
+    )
+
+
+def rate_panels(curves: Curves) -> tuple[Panel, ...]:
+    """Points and what was fitted to them, with their signs and both directions on each other."""
+    signed: list[Curve] = []
+    against: list[Curve] = []
+    for name, sign in DIRECTIONS.items():
+        if not any(point.sign == sign for point in curves.points):
+            continue
+        signed.append(_points(curves, name, curves.read))
+        points = replace(signed[-1], **{
+            axis: sign * getattr(signed[-1], axis) for axis in ("x", "y", "low", "high")
+        })  # fmt: skip
+        against.append(_in_order(points))
+        if name in curves.fits or name in curves.lines:
+            signed.append(_fitted(curves, name, name, model=None, sign=sign))
+            against.append(_fitted(curves, name, name, model=None))
+    what, unit, display = curves.quantity.axis
+    of = "runs" if all(p.commanded is not None for p in curves.points) else "steady stretches"
+    return (
+        Panel(RATE, Axis(what, unit, display), signed, f"{what} of {of}"),
+        Panel(
+            Axis("Speed", "rad/s", "deg/s"),
+            Axis(f"{what}, in its direction", unit, display),
+            against,
+            "Both directions",
+        ),
+    )
 
 
 def example_figure(data: TestData) -> tuple[Figure, ...]:

@@ -2,45 +2,51 @@
 
 from __future__ import annotations
 
-from campaign.experiments.friction_map.figures import fit_figure, map_figure
-from campaign.experiments.friction_map.fits import MapFits, fit_map
+from collections.abc import Sequence
+
+from campaign.experiments.friction_map.conclusions import sliding_conclusions
+from campaign.experiments.friction_map.curves import Curves, fit_curves
+from campaign.experiments.friction_map.figures import fit_figure, map_figure, rate_figure
 from campaign.experiments.friction_map.pilot import settled_enough
 from campaign.experiments.friction_map.points import points_of, steady
 from campaign.experiments.friction_map.runs import OWN
+from campaign.experiments.friction_map.sliding import by_direction, parameters_of
 from campaign.experiments.friction_map.tables import (
+    curve_findings,
     map_findings,
     map_notes,
     model_table,
     parameter_table,
     point_table,
 )
-from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.captions import trials_of
 from campaign.result import Result
 
 
-def one_map(group: tuple[TrialData, ...], suffix: str = "") -> tuple[Result, MapFits | None]:
-    """The map of runs at one place of a test's matrix; no fits where it has too few points."""
+def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curves]:
+    """The map of runs at one place of a test's matrix."""
     place = {k: v for k, v in group[0].trial.point.items() if k not in OWN}
     told = {k: v for k, v in place.items() if isinstance(v, str | int | float | bool)}
     where = ", ".join(f"{k} = {v}" for k, v in place.items())
-    bench = bench_of(group[0].trial)
     notes: list[str] = []
-    points = points_of(settled_enough(group, notes), bench, notes)
-    kept, left = steady(points, notes)
-    try:
-        fits = fit_map(kept, bench, group[0])
-    except ValueError as error:
-        notes.append(f"No fit{f' for {where}' if where else ''}: {error}.")
-        table = point_table((*kept, *left), suffix, where)
-        return Result(tables=(table,), notes=tuple(notes)), None
+    kept, left = steady(points_of(settled_enough(group, notes), notes), notes)
+    fits = fit_curves(kept, group[0])
+    points = point_table((*fits.points, *left), group[0], suffix, where)
+    if not fits.is_map:
+        notes += (f"{where}: {note}" if where else note for note in fits.notes)
+        found = by_direction(parameters_of(fits)) if fits.points else {}
+        result = Result(
+            (points,),
+            (rate_figure(fits, suffix),) if found else (),
+            tuple(curve_findings(found, told)),
+            tuple(notes),
+            tuple(sliding_conclusions(found, f"{where}: " if where else "")),
+        )
+        return result, fits
     shown = trials_of(group)
     result = Result(
-        (
-            parameter_table(fits, suffix, where),
-            model_table(fits, suffix, where),
-            point_table((*fits.points, *left), suffix, where),
-        ),
+        (parameter_table(fits, suffix, where), model_table(fits, suffix, where), points),
         (map_figure(fits, suffix, where, shown), fit_figure(fits, suffix, where, shown)),
         tuple(map_findings(fits, told)),
         (*notes, *map_notes(fits, where)),

@@ -10,20 +10,18 @@ from dataclasses import replace
 
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, RELATIVE_RATE
 from campaign.estimate import Estimate
-from campaign.experiments.friction_map.conclusions import map_conclusions
+from campaign.experiments.friction_map.conclusions import map_conclusions, sliding_conclusions
+from campaign.experiments.friction_map.curves import MEANINGS, Curves
+from campaign.experiments.friction_map.figures import rate_figure
 from campaign.experiments.friction_map.map_result import one_map
-from campaign.experiments.friction_map.over_rate import FRICTION, MEANINGS
 from campaign.experiments.friction_map.runs import DIRECTIONS, REQUIRED
-from campaign.experiments.friction_map.sliding import KEYS, Named, sliding_of
-from campaign.experiments.friction_map.sliding_shown import (
-    sliding_conclusions,
-    sliding_figure,
-    stretch_table,
-)
+from campaign.experiments.friction_map.sliding import KEYS, parameters_of, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
-from campaign.experiments.interface import EMPTY, Model, TestData, TrialData
+from campaign.experiments.friction_map.tables import point_table
+from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.parameter import Identified, Parameter
+from campaign.reason import Reason
 from campaign.result import Finding, Result
 
 
@@ -48,38 +46,31 @@ def is_run(data: TrialData) -> bool:
 def identified(data: TestData) -> Result:
     """Friction over rate, by direction. Raises ValueError where there is none."""
     runs = tuple(each for each in data.completed() if is_run(each))
-    result, fits = one_map(runs) if runs else (EMPTY, None)
-    if fits is None:
-        return _of_stretches(data)
-    found = {way: fits.estimates(fit.preferred)[way] for way, fit in fits.fits.items()}
-    parameters = tuple(Named.of(FRICTION, found).parameters())
-    speeds = [point.speed for point in fits.points]
-    return replace(
-        result,
-        conclusions=map_conclusions(result.findings, speeds, Settings({})),
-        identified=Identified(parameters, settings=_settings(found, parameters)),
-    )
-
-
-def _of_stretches(data: TestData) -> Result:
-    sliding = sliding_of(data.trials, data.model)
-    if not sliding.points:
-        lost = map(str, sliding.left_out)
-        raise ValueError("; ".join(["nowhere does the axis slide steadily", *lost]))
-    if not sliding.parameters:
-        raise ValueError("; ".join(note.rstrip(".") for note in sliding.notes))
-    return Result(
-        tables=(stretch_table(sliding),),
-        figures=tuple(sliding_figure(sliding, each) for each in sliding.maps),
-        findings=tuple(Finding.of(each.estimate, {}) for each in sliding.parameters),
-        notes=sliding.notes,
-        conclusions=tuple(sliding_conclusions(sliding.found)),
-        identified=Identified(
-            sliding.parameters,
-            settings=_settings(sliding.maps[0].found, sliding.parameters),
-            left_out=sliding.left_out,
-        ),
-    )
+    curves: Curves | None
+    lost: tuple[Reason, ...] = ()
+    if runs:
+        result, curves = one_map(runs)
+        parameters = tuple(parameters_of(curves)) if curves.points else ()
+        speeds = [point.speed for point in curves.points]
+        told = result.conclusions or map_conclusions(result.findings, speeds, Settings({}))
+        result = replace(result, conclusions=told)
+    else:
+        sliding = sliding_of(data.trials, data.model)
+        parameters, lost = sliding.parameters, sliding.left_out
+        if not sliding.points:
+            raise ValueError("; ".join(["nowhere does the axis slide steadily", *map(str, lost)]))
+        result = Result(
+            tables=(point_table((*sliding.points, *sliding.left), sliding.first),),
+            figures=tuple(map(rate_figure, sliding.maps)),
+            findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
+            notes=sliding.notes,
+            conclusions=tuple(sliding_conclusions(sliding.found)),
+        )
+        curves = sliding.maps[0] if sliding.maps else None
+    if not parameters or curves is None:
+        raise ValueError("; ".join(note.rstrip(".") for note in result.notes))
+    settings = _settings(curves.found, parameters)
+    return replace(result, identified=Identified(parameters, settings=settings, left_out=lost))
 
 
 def _settings(

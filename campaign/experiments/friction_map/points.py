@@ -1,15 +1,18 @@
-"""From recordings of a velocity map to its points, and from points to fits of both directions."""
+"""Friction at one steady rate: what a point is, and the points of runs of a map."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from campaign.axis_kind import unit_here
-from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
+from campaign.channels import DRIVE_TORQUE, GYRO_RATE, NORMAL_LOAD, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
+from campaign.estimation.intervals import multiplied
 from campaign.estimation.ripple import (
     FASTEST,
     Harmonic,
@@ -20,6 +23,7 @@ from campaign.estimation.steadiness import TOO_FEW_COUNTS, drifting
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
 from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
 from campaign.experiments.interface import TrialData, bench_of, metrics
+from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
@@ -27,6 +31,10 @@ from campaign.recording import Recording
 from campaign.result import Array
 from campaign.units import shown_here
 
+RIPPLE = {
+    "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
+}  # fmt: skip
+"""Metrics of a ripple, with their units."""
 DESCRIBES = Cause("describes the window", "it describes the window")
 """Why some metrics of a window have no interval."""
 
@@ -118,14 +126,7 @@ def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterat
         "last_angle": (found.last, "rad"),
     }
     if ripple is not None:
-        plain |= {
-            "ripple_periods": (ripple.periods, ""),
-            "ripple_cosine": (ripple.cosine, "N m"),
-            "ripple_sine": (ripple.sine, "N m"),
-            "ripple_error": (ripple.error, "N m"),
-            "ripple_centre": (ripple.centre, "rad"),
-            "ripple_travel": (ripple.travel, "rad"),
-        }
+        plain |= {f"ripple_{w}": (getattr(ripple, w), unit) for w, unit in RIPPLE.items()}
     for word, (value, unit) in plain.items():
         if np.isfinite(value):
             yield Estimate.without_interval(f"{word}_{name}", value, unit, DESCRIBES())
@@ -134,53 +135,105 @@ def _metrics(name: str, found: SteadySliding, ripple: Harmonic | None) -> Iterat
             yield Estimate.without_interval(f"{word}_{name}", 1.0, "", reason)
 
 
-@dataclass(frozen=True)
-class MapPoint:
-    """One point of the map: signed, SI.
+@dataclass(frozen=True, kw_only=True)
+class Point(SteadySliding):
+    """Friction at one steady rate, of a run's window or of a stretch: signed, SI.
+
+    What `SteadySliding` has, with the systematic parts of the torque.
 
     Attributes:
-        speed: as commanded.
-        rate, torque: with the interval that the window shows; the torque with its systematic parts.
-        spread: the torque's 1 sigma in the window.
-        window, rule: its length, and what set it.
-        acceleration: residual one (rad/s^2).
-        first, last: angles between which the window lies (rad); NaN where none was recorded.
-        harmonic: the ripple that its run shows, where it is long enough.
-        repeat: which repetition it is of.
-        unsteady: why it is no steady sliding; such a point is not fitted.
-        drift: that its torque changes across the window; such a point is fitted.
-        ripple: what `without_ripple` has taken out of the torque (N m).
+        trial, repeat: which trial it is of, and which repetition of it.
+        start, stop: times between which it lies (s).
         error: deviation of the torque without its ripple (N m), that of the ripple included; NaN
             where the window shows none.
+        commanded: rate that was asked for (rad/s); None of a stretch that was found.
+        rule: what set the window.
+        harmonic: the ripple that its run shows, where it is long enough.
+        ripple: what `without_ripple` has taken out of the torque (N m).
+        normal_load: as recorded (N).
+        load: normal load times its arm (N m; N of a linear axis); NaN where nobody recorded it, or
+            a rotary axis has no radius.
+        doubts: what was taken off by the angle may be off by (N m, 1 sigma), one part after the
+            other, each shared by all points.
     """
 
-    speed: float
-    rate: Estimate
-    torque: Estimate
-    spread: float
-    window: float
-    rule: str
-    acceleration: float
-    first: float
-    last: float
-    harmonic: Harmonic | None
-    repeat: int
+    trial: int
+    start: float
+    stop: float
     error: float
-    unsteady: Reason = NONE
-    drift: Reason = NONE
+    repeat: int = 0
+    commanded: float | None = None
+    rule: str = ""
+    harmonic: Harmonic | None = None
     ripple: float = 0.0
+    normal_load: float = math.nan
+    load: float = math.nan
+    doubts: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, own: SteadySliding, trial: int, start: float, stop: float, **more: Any) -> Self:
+        """What a window says, with where it is and `more` of its attributes."""
+        error = own.torque.standard_error
+        error = math.nan if error is None else error
+        return cls(**vars(own), trial=trial, start=start, stop=stop, error=error, **more)
+
+    @property
+    def speed(self) -> float:
+        """As commanded; of a stretch its mean rate."""
+        return self.rate.value if self.commanded is None else self.commanded
 
     @property
     def sign(self) -> float:
         """+1 or -1: the direction."""
         return 1.0 if self.speed > 0 else -1.0
 
+    def off_by(self, part: int) -> Self:
+        """As it would be if one of `doubts` were so, and there were no other."""
+        torque, off = self.torque, self.doubts[part]
+        low, high = (None if end is None else end - off for end in (torque.low, torque.high))
+        moved = replace(torque, value=torque.value - off, low=low, high=high)
+        return replace(self, torque=moved, doubts=())
+
+
+def with_constants(
+    one: Estimate,
+    data: TrialData,
+    force: str,
+    moved: float,
+    *,
+    scales: bool = True,
+    loaded: bool = False,
+) -> Estimate:
+    """With what no point shows: how well constants of the torque and the load are known.
+
+    Args:
+        data: a trial, which says it.
+        force: the channel that the torque was read from.
+        moved: by how much it moves when the bench's inertia grows to twice its size.
+        scales: whether it is proportional to the torque, and
+        loaded: inversely to the normal load.
+    """
+    bench = bench_of(data.trial)
+    if scales:
+        if not data.trial.recording:  # of which the torque has a constant of its own
+            one = with_systematic(one, bench, TORQUE_CONSTANT, one.value)
+        one = with_scale(one, data, force)
+    if force == DRIVE_TORQUE:  # of an inertia that nobody knows this is a part of unknown size
+        one = with_systematic(one, bench, INERTIA, moved)
+    return with_scale(one, data, NORMAL_LOAD) if scales and loaded else one
+
+
+def coefficient_of(point: Point, data: TrialData) -> Estimate:
+    """Friction over normal load, positive against the motion; data: a trial, as above."""
+    one = replace(multiplied(point.torque, point.sign / point.load), name="coefficient", unit="")
+    return with_scale(one, data, NORMAL_LOAD)
+
 
 REMEDY = "raise the gains of the rate loop, settle_angle or max_time, or begin at a higher speed"
 MORE_COUNTS = "raise max_time, max_travel and window_angle, or begin at a higher speed"
 
 
-def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint], list[MapPoint]]:
+def steady(points: Sequence[Point], notes: list[str]) -> tuple[list[Point], list[Point]]:
     """The points at which the load slid steadily, and the others; `notes` count them by reason."""
     kept = [_with_rule(point, point.drift) for point in points if not point.unsteady]
     left = [_with_rule(point, point.unsteady) for point in points if point.unsteady]
@@ -200,17 +253,17 @@ def steady(points: Sequence[MapPoint], notes: list[str]) -> tuple[list[MapPoint]
     return kept, left
 
 
-def _with_rule(point: MapPoint, reason: Reason) -> MapPoint:
+def _with_rule(point: Point, reason: Reason) -> Point:
     """The point with a reason behind what set its window."""
     return replace(point, rule=f"{point.rule}; {reason}") if reason else point
 
 
-def _speeds(points: Sequence[MapPoint]) -> str:
+def _speeds(points: Sequence[Point]) -> str:
     told = (f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
     return f"{', '.join(told)} {unit_here('deg/s')}"
 
 
-def _unknown_inertia(points: Sequence[MapPoint], bench: Bench) -> Iterator[str]:
+def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
     """What a map leaves in its torques, and does not find, where the bench states no inertia."""
     if bench.axis.inertia is None and points:
         most = float(np.rad2deg(max(abs(point.acceleration) for point in points)))
@@ -221,57 +274,57 @@ def _unknown_inertia(points: Sequence[MapPoint], bench: Bench) -> Iterator[str]:
         )
 
 
-def points_of(items: Iterable[TrialData], bench: Bench, notes: list[str]) -> list[MapPoint]:
-    """The points of several trials on `bench`; what one lacks is added to `notes`."""
-    found: list[MapPoint] = []
+def points_of(items: Sequence[TrialData], notes: list[str]) -> list[Point]:
+    """The points of several runs of one bench; what one lacks is added to `notes`."""
+    found: list[Point] = []
     for item in items:
         try:
-            found += map_points(item, bench)
+            found += map_points(item)
         except ValueError as error:
             notes.append(f"{item.trial.label} has no points: {error}.")
-    notes += _unknown_inertia(found, bench)
+    if items:
+        notes += _unknown_inertia(found, bench_of(items[0].trial))
     return found
 
 
-def map_points(data: TrialData, bench: Bench) -> Iterator[MapPoint]:
-    """The two points of one trial on `bench`, out and back."""
-    rule = rule_of(data.trial)
-    found = metrics(data, measure)
-    windows = windows_of(data.trial)
-    speed = speed_of(data.trial)
-    for name, sign in DIRECTIONS.items():
-        if name not in windows:
+def map_points(data: TrialData) -> Iterator[Point]:
+    """The two points of one run, out and back."""
+    trial, found = data.trial, metrics(data, measure)
+    inertia = bench_of(trial).axis.inertia or 0.0
+    for name, window in windows_of(trial).items():
+        if name not in DIRECTIONS:
             continue
-        torque, acceleration = found[f"friction_torque_{name}"], found[f"acceleration_{name}"].value
-        torque = with_systematic(torque, bench, TORQUE_CONSTANT, torque.value)
-        # Of an inertia that nobody knows this is a part of unknown size.
-        torque = with_systematic(torque, bench, INERTIA, (bench.axis.inertia or 0.0) * acceleration)
-        ripple = None
-        rate, window = found[f"rate_{name}"], windows[name].stop - windows[name].start
-        if f"unsteady_{name}" in found:
-            unsteady = found[f"unsteady_{name}"].reason
-        else:  # as an archive of a program that asked no more
-            unsteady = drifting(acceleration * window, rate.half_width, rate.value)
-        if f"ripple_periods_{name}" in found:
-            words = ("periods", "cosine", "sine", "error", "centre", "travel")
-            ripple = Harmonic(*(found[f"ripple_{word}_{name}"].value for word in words))
-        yield MapPoint(
-            speed=speed * sign,
-            rate=rate,
-            torque=torque,
-            spread=found[f"spread_{name}"].value,
-            window=window,
-            rule=rule,
-            acceleration=acceleration,
-            first=_value(found, f"first_angle_{name}"),
-            last=_value(found, f"last_angle_{name}"),
-            harmonic=ripple,
-            repeat=data.trial.repeat,
-            error=np.nan if torque.standard_error is None else torque.standard_error,
-            unsteady=unsteady,
-            drift=found[f"torque_drift_{name}"].reason if f"torque_drift_{name}" in found else NONE,
+
+        def plain(word: str, of: str = name) -> float:
+            key = f"{word}_{of}"
+            return found[key].value if key in found else math.nan
+
+        def reason(word: str, of: str = name) -> Reason:
+            key = f"{word}_{of}"
+            return found[key].reason if key in found else NONE
+
+        rate, moved = found[f"rate_{name}"], plain("acceleration")
+        # An archive of a program that asked no more has no reason.
+        drifts = drifting(moved * (window.stop - window.start), rate.half_width, rate.value)
+        own = SteadySliding(
+            rate,
+            with_constants(found[f"friction_torque_{name}"], data, DRIVE_TORQUE, inertia * moved),
+            plain("spread"),
+            moved,
+            plain("effective_samples"),
+            plain("first_angle"),
+            plain("last_angle"),
+            reason("unsteady") or drifts,
+            reason("torque_drift"),
         )
-
-
-def _value(found: Mapping[str, Estimate], name: str) -> float:
-    return found[name].value if name in found else np.nan
+        harmonic = Harmonic(*(plain(f"ripple_{word}") for word in RIPPLE))
+        yield Point.of(
+            own,
+            trial.number,
+            window.start,
+            window.stop,
+            repeat=trial.repeat,
+            commanded=DIRECTIONS[name] * speed_of(trial),
+            rule=rule_of(trial),
+            harmonic=None if math.isnan(harmonic.periods) else harmonic,
+        )

@@ -11,8 +11,8 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, student
 from campaign.estimation.stribeck import SYMBOLS, UNITS
+from campaign.experiments.friction_map.curves import Curves
 from campaign.experiments.friction_map.figures import OWN_TORQUE, SPEED, point_bars
-from campaign.experiments.friction_map.fits import MapFits
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.shared.captions import amount, listed
 from campaign.result import Array, Axis, Curve, Figure, Panel
@@ -37,7 +37,7 @@ class MapSet:
 
     name: str
     where: str
-    fits: MapFits
+    fits: Curves
     found: Mapping[str, Mapping[str, Estimate]]
 
     def value(self, direction: str, parameter: str) -> float:

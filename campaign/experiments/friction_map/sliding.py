@@ -9,25 +9,21 @@ alone where loads differ.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.channels import DRIVE_TORQUE, NORMAL_LOAD
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
 from campaign.estimation.gate import admitted_together, mattering
-from campaign.estimation.intervals import shifted_by
 from campaign.estimation.over_a_turn import OverATurn
-from campaign.experiments.friction_map.over_rate import (
+from campaign.experiments.friction_map.curves import (
     COEFFICIENT,
     FRICTION,
-    Mapped,
-    Quantity,
-    mapped_over_rate,
-    with_doubts,
+    Curves,
+    fit_curves,
 )
+from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.stretches import (
-    Point,
     StretchOptions,
     force_of,
     goes_along,
@@ -36,15 +32,8 @@ from campaign.experiments.friction_map.stretches import (
     points_of,
     slower,
 )
-from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.directions import with_offset
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.systematic import (
-    INERTIA,
-    SOURCES,
-    TORQUE_CONSTANT,
-    with_systematic,
-)
 from campaign.parameter import Parameter, is_value
 from campaign.reason import Cause, Reason
 
@@ -87,7 +76,7 @@ class Sliding:
     first: TrialData
     points: tuple[Point, ...]
     left: tuple[Point, ...]
-    maps: tuple[Mapped, ...] = ()
+    maps: tuple[Curves, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     notes: tuple[str, ...] = ()
     left_out: tuple[Reason, ...] = ()
@@ -95,19 +84,24 @@ class Sliding:
     @property
     def found(self) -> dict[str, dict[str, Estimate]]:
         """Parameters by direction, then by name."""
-        told: dict[str, dict[str, Estimate]] = {}
-        for each in self.parameters:
-            name, _, way = each.estimate.name.rpartition("_")
-            told.setdefault(way, {})[name] = replace(each.estimate, name=name)
-        return told
+        return by_direction(self.parameters)
+
+
+def by_direction(parameters: Iterable[Parameter]) -> dict[str, dict[str, Estimate]]:
+    """Parameters of both directions, e.g. `coulomb_torque_positive`, by direction and then name."""
+    told: dict[str, dict[str, Estimate]] = {}
+    for each in parameters:
+        name, _, way = each.estimate.name.rpartition("_")
+        told.setdefault(way, {})[name] = replace(each.estimate, name=name)
+    return told
 
 
 def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
     """Of all trials together, which are of one bench."""
-    first, bench = trials[0], bench_of(trials[0].trial)
-    found, held = points_of(trials, bench, options.shortest, options.slowest)
-    points = tuple(point for point in found if not point.own.unsteady)
-    left = tuple(point for point in found if point.own.unsteady)
+    first = trials[0]
+    found, held = points_of(trials, options.shortest, options.slowest)
+    points = tuple(point for point in found if not point.unsteady)
+    left = tuple(point for point in found if point.unsteady)
     lost = tuple(_left_out(trials, options, found))
     if not points:
         return Sliding(first, points, left, left_out=lost)
@@ -120,14 +114,15 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
         notes.append(
             "Normal loads differ between stretches: friction over rate is told over the load only."
         )
-    maps = tuple(with_doubts(mapped_over_rate(each, points, notes), points) for each in quantities)
+    maps = tuple(fit_curves(points, first, each, force_of(first)) for each in quantities)
+    notes += (note for each in maps for note in each.notes)
     if goes_along(points):
         notes.append(
             "Friction goes with the motion nearly everywhere, and cannot: the column of the force, "
             "or that of the motion, has the other sign, as of a sensor on the part that rests. "
             "In the mapping `sign = -1` turns it round."
         )
-    parameters = tuple(each for one in maps for each in _parameters(one, maps[0], points, first))
+    parameters = tuple(each for one in maps for each in parameters_of(one, maps[0]))
     told = tuple(dict.fromkeys(notes))
     return Sliding(first, points, left, maps, parameters, told, lost)
 
@@ -141,11 +136,11 @@ def _left_out(
     if without:
         numbers = ", ".join(map(str, without[:SHOWN])) + (" ..." if len(without) > SHOWN else "")
         yield NO_STRETCH(count=len(without), total=len(trials), numbers=numbers)
-    unsteady = Counter(point.own.unsteady.code for point in found if point.own.unsteady)
+    unsteady = Counter(point.unsteady.code for point in found if point.unsteady)
     for code, stretches in unsteady.items():
         yield UNSTEADY(count=stretches, total=len(found), why=code)
     if options.slowest is None:
-        still = slower(trials, bench_of(trials[0].trial), options.shortest, found)
+        still = slower(trials, options.shortest, found)
         if still:
             yield TOO_SLOW(count=still)
 
@@ -163,78 +158,33 @@ def _over_a_turn(held: OverATurn) -> str:
     )
 
 
-@dataclass(frozen=True)
-class Named:
-    """Parameters of both directions by name, e.g. `coulomb_torque_positive`.
+def parameters_of(curves: Curves, first: Curves | None = None) -> Iterator[Parameter]:
+    """Parameters of both directions, e.g. `coulomb_torque_positive`, with their places in a bench.
 
-    `places`: the name that each has in a direction, and which direction it is.
+    first: curves of another quantity and the same points, which have their Stribeck velocity.
     """
-
-    quantity: Quantity
-    found: Mapping[str, Estimate]
-    places: Mapping[str, tuple[str, str]]
-
-    @classmethod
-    def of(cls, quantity: Quantity, found: Mapping[str, Mapping[str, Estimate]]) -> Named:
-        named, places = {}, {}
-        for way, estimates in found.items():
-            for name, one in estimates.items():
-                key = f"{quantity.called(name)}_{way}"
-                if name == "friction" and quantity is COEFFICIENT:
-                    key = f"friction_coefficient_{way}"
-                places[key] = name, way
-                named[key] = replace(one, name=key, unit=quantity.meanings[name][0])
-        return cls(quantity, named, places)
-
-    def parameters(self) -> Iterator[Parameter]:
-        """With their places in a bench file."""
-        told = dict(self.found)
-        for name in ("coulomb_torque", "static_torque"):
-            told = with_offset(told, self.quantity.called(name))
-        dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
-        both = all(one is not None and is_value(one) for one in dry)
-        for key, (name, way) in self.places.items():
-            prefix = "negative." if way == "negative" else ""
-            goes = self.quantity is FRICTION and name in KEYS and both
-            place = f"friction.load.{prefix}{name}" if goes else ""
-            meaning = f"{self.quantity.meanings[name][1]}, {way} direction."
-            yield Parameter(told[key], meaning, "", place, ADVICE[name])
-
-
-def _parameters(
-    mapped: Mapped, first: Mapped, points: Sequence[Point], data: TrialData
-) -> Iterator[Parameter]:
-    quantity = mapped.quantity
-    named = Named.of(
-        quantity,
-        {
-            way: {
-                name: one
-                for name, one in estimates.items()
-                if mapped is first or not name.startswith("stribeck")  # of the same stretches
-            }
-            for way, estimates in mapped.found.items()
-        },
-    )
-    whole = {key: scaled(one, quantity, data) for key, one in named.found.items()}
-    largest = max(abs(quantity.read(point).value) for point in points)
-    fastest = max(point.speed for point in points)
-    matters = {
-        key: mattering(name, largest, fastest)
-        for key, (name, _) in named.places.items()
-        if not name.startswith("stribeck")
-    }
-    return replace(named, found=admitted_together(whole, matters)).parameters()
-
-
-def scaled(one: Estimate, quantity: Quantity, data: TrialData) -> Estimate:
-    """With what no stretch shows: constants of the torque and of the load, and unknown inertia."""
-    if one.origin is not Origin.MEASURED or one.name.startswith("stribeck"):
-        return one
-    bench, force = bench_of(data.trial), force_of(data)
-    if bench.motor is not None and not data.trial.recording:
-        one = with_systematic(one, bench, TORQUE_CONSTANT, one.value)
-    one = with_scale(one, data, force)
-    if force == DRIVE_TORQUE and bench.axis.inertia is None:
-        one = shifted_by(one, SOURCES[INERTIA], None)
-    return with_scale(one, data, NORMAL_LOAD) if quantity is COEFFICIENT else one
+    quantity = curves.quantity
+    largest = max(abs(curves.read(point).value) for point in curves.points)
+    fastest = max(abs(point.speed) for point in curves.points)
+    places, found = {}, {}
+    matters: dict[str, float] = {}
+    for way, estimates in curves.found.items():
+        for name, one in estimates.items():
+            shape = name.startswith("stribeck")
+            if shape and first not in (None, curves):
+                continue
+            key = f"{quantity.called(name)}_{way}"
+            places[key] = name, way
+            found[key] = replace(one, name=key, unit=quantity.meanings[name][0])
+            matters |= {} if shape else {key: mattering(name, largest, fastest)}
+    told = admitted_together(found, matters)
+    for name in ("coulomb_torque", "static_torque"):
+        told = with_offset(told, quantity.called(name))
+    dry = [told.get(f"coulomb_torque_{way}") for way in DIRECTIONS]
+    both = all(one is not None and is_value(one) for one in dry)
+    for key, (name, way) in places.items():
+        prefix = "negative." if way == "negative" else ""
+        goes = quantity is FRICTION and name in KEYS and both
+        place = f"friction.load.{prefix}{name}" if goes else ""
+        meaning = f"{quantity.meanings[name][1]}, {way} direction."
+        yield Parameter(told[key], meaning, "", place, ADVICE[name])

@@ -13,10 +13,10 @@ from campaign.estimation.intervals import with_error
 from campaign.estimation.sampled import drop_interval_if_deterministic
 from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import MODELS, DirectionFit, Model, doubts
-from campaign.experiments.friction_map.fits import DIGITS, MapFits
-from campaign.experiments.friction_map.points import MapPoint, told_periods
+from campaign.experiments.friction_map.curves import DIGITS, Curves
+from campaign.experiments.friction_map.points import Point, coefficient_of, told_periods
 from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.experiments.interface import TrialData, bench_of
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.units import angle_here
@@ -26,6 +26,7 @@ FITTED: tuple[Model, ...] = ("free", "2")
 MODEL_LABELS = {"free": "δ free", "2": "δ = 2", "none": "no Stribeck effect"}
 ERROR_OF = Cause("standard error of a column", "the standard error of the column before it")
 BY_LONG_RUNS = Cause("from the ripple of long runs", "it follows from the ripple of long runs")
+MEAN_OF_STRETCH = Cause("mean of a stretch", "mean of the stretch")
 OF_SAMPLES = Cause("describes the window's samples", "it describes the window's samples")
 OF_RESIDUALS = Cause("describes the residuals", "it describes the residuals")
 CRITERION = Cause("criterion", "a criterion to compare models by")
@@ -33,7 +34,7 @@ MISFIT = 2.0
 """by which the residuals of delta = 2 exceed those of delta free, to be told."""
 
 
-def map_findings(fits: MapFits, place: Mapping[str, Value]) -> Iterator[Finding]:
+def map_findings(fits: Curves, place: Mapping[str, Value]) -> Iterator[Finding]:
     """Every parameter by direction, δ free before δ = 2."""
     for model in FITTED:
         estimates = fits.estimates(model)
@@ -43,51 +44,93 @@ def map_findings(fits: MapFits, place: Mapping[str, Value]) -> Iterator[Finding]
                 yield Finding.of(found[parameter], where)
 
 
-def point_table(points: Sequence[MapPoint], suffix: str, where: str) -> Table:
-    """The points as measured, and as they are fitted where a ripple was taken out of them."""
-    rippled = any(point.ripple for point in points)
-    more = (
-        Column("ripple", "Ripple", "N m", "N m", reason=BY_LONG_RUNS()),
-        Column("without_ripple", "Friction torque without ripple", "N m", "N m"),
-    )
+def curve_findings(
+    found: Mapping[str, Mapping[str, Estimate]], place: Mapping[str, Value]
+) -> Iterator[Finding]:
+    """Friction of each direction where there is no map: parameters by direction, then by name."""
+    for direction, by_name in found.items():
+        for name, one in by_name.items():
+            known = replace(one, name="friction_torque") if name == "friction" else one
+            yield Finding.of(known, {**place, "direction": direction})
+
+
+def point_table(
+    points: Sequence[Point], first: TrialData, suffix: str = "", where: str = ""
+) -> Table:
+    """The points of runs by speed, or stretches in order of time; those left out among them.
+
+    first: one of the trials.
+    """
+    runs = all(point.commanded is not None for point in points)
+    if runs:
+        every = sorted(points, key=lambda point: point.speed)
+    else:
+        every = sorted(points, key=lambda point: (point.trial, point.start))
+    several = len({point.trial for point in every}) > 1
+    pressed = any(np.isfinite(point.normal_load) for point in every)
+    rippled = any(point.ripple for point in every)
+    columns = {
+        Column("stretch", "Stretch", exact=True): not runs,
+        Column("trial", "Trial", exact=True): not runs and several,
+        Column("first", "From", "s", "s", exact=True): not runs,
+        Column("last", "To", "s", "s", exact=True): not runs,
+        Column("speed", "Commanded rate", "rad/s", "deg/s", exact=True): runs,
+        Column("rate", "Measured rate" if runs else "Rate", "rad/s", "deg/s"): True,
+        Column("torque", "Friction torque", "N m", "N m"): True,
+        Column("load", "Normal load", "N", "N", reason=MEAN_OF_STRETCH()): pressed,
+        Column("coefficient", "Friction coefficient"): pressed,
+        Column("spread", "Spread in the window (1σ)", "N m", "N m", reason=OF_SAMPLES()): runs,
+        Column("window", "Window", "s", "s", exact=True): runs,
+        Column("rule", "Window set by"): runs,
+        Column("ripple", "Ripple", "N m", "N m", reason=BY_LONG_RUNS()): rippled,
+        Column("without_ripple", "Friction torque without ripple", "N m", "N m"): rippled,
+        Column("left_out", "Left out"): not runs and any(point.unsteady for point in every),
+    }
+    shown = tuple(column for column, there in columns.items() if there)
+    rows = (_point_row(number, point, first) for number, point in enumerate(every, start=1))
+    kept = {column.name for column in shown}
+    of = "Points of the friction-velocity map" if runs else "Steady stretches"
     return Table(
-        key=f"map{suffix}",
-        title=f"Points of the friction-velocity map{f' ({where})' if where else ''}",
-        columns=(
-            Column("speed", "Commanded rate", "rad/s", "deg/s", exact=True),
-            Column("rate", "Measured rate", "rad/s", "deg/s"),
-            Column("torque", "Friction torque", "N m", "N m"),
-            Column("spread", "Spread in the window (1σ)", "N m", "N m", reason=OF_SAMPLES()),
-            Column("window", "Window", "s", "s", exact=True),
-            Column("rule", "Window set by"),
-            *(more if rippled else ()),
-        ),
-        rows=tuple(_point_row(point) for point in sorted(points, key=lambda p: p.speed)),
+        key=f"{'map' if runs else 'steady-stretches'}{suffix}",
+        title=f"{of}{f' ({where})' if where else ''}",
+        columns=shown,
+        rows=tuple({name: cell for name, cell in row.items() if name in kept} for row in rows),
         note="Mean drive torque over the settled window, less inertia times residual acceleration. "
         "The interval is that of the window: what friction changes from trial to trial is not in "
-        "it, and shows in the fit.",
+        "it, and shows in the fit."
+        if runs
+        else "",
     )
 
 
-def _point_row(point: MapPoint) -> dict[str, Cell]:
+def _point_row(number: int, point: Point, first: TrialData) -> dict[str, Cell]:
     torque = point.torque
     clean = replace(torque, value=torque.value - point.ripple, low=None, high=None)
     if torque.standard_error is not None and torque.freedom is not None:
         told = with_error("", clean.value, "N m", point.error, torque.freedom, torque.method)
         clean = replace(told, systematic=torque.systematic)
-    return {
+    row: dict[str, Cell] = {
+        "stretch": number,
+        "trial": point.trial,
+        "first": point.start,
+        "last": point.stop,
         "speed": point.speed,
-        "rate": drop_interval_if_deterministic(point.rate, abs(point.rate.value), DIGITS),
-        "torque": drop_interval_if_deterministic(torque, abs(torque.value), DIGITS),
         "spread": point.spread,
-        "window": point.window,
+        "window": point.stop - point.start,
         "rule": point.rule,
         "ripple": point.ripple,
-        "without_ripple": drop_interval_if_deterministic(clean, abs(clean.value), DIGITS),
+        "left_out": str(point.unsteady),
     }
+    for name, one in (("rate", point.rate), ("torque", torque), ("without_ripple", clean)):
+        row[name] = drop_interval_if_deterministic(one, abs(one.value), DIGITS)
+    if np.isfinite(point.normal_load):
+        row["load"] = point.normal_load
+    if np.isfinite(point.load):
+        row["coefficient"] = coefficient_of(point, first)
+    return row
 
 
-def parameter_table(fits: MapFits, suffix: str, where: str) -> Table:
+def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
     """Table 4.3: parameters by direction, δ free and δ = 2."""
     free, fixed = fits.estimates("free"), fits.estimates("2")
     rows: list[dict[str, Cell]] = []
@@ -127,7 +170,7 @@ def _rms(fit: DirectionFit, model: Model) -> Estimate:
     return Estimate.without_interval("residual", fit.fits[model].rms, "N m", OF_RESIDUALS())
 
 
-def model_table(fits: MapFits, suffix: str, where: str) -> Table:
+def model_table(fits: Curves, suffix: str, where: str) -> Table:
     """How well each model of the Stribeck effect describes the points of each direction."""
     rows: list[dict[str, Cell]] = []
     for direction, fit in fits.fits.items():
@@ -164,7 +207,7 @@ def model_table(fits: MapFits, suffix: str, where: str) -> Table:
     )
 
 
-def map_notes(fits: MapFits, where: str) -> Iterator[str]:
+def map_notes(fits: Curves, where: str) -> Iterator[str]:
     """What a reader should know of the fits, and what to do about it."""
     there = f" ({where})" if where else ""
     for name, fit in fits.fits.items():
@@ -194,8 +237,8 @@ def _scatter(fit: DirectionFit) -> str:
     return f"points scatter by {shares} beyond their windows{undecided}"
 
 
-def _ripple(fits: MapFits, direction: str) -> str:
-    ripple, told = fits.ripples[direction], told_periods(fits.bench)
+def _ripple(fits: Curves, direction: str) -> str:
+    ripple, told = fits.ripples[direction], told_periods(bench_of(fits.first.trial))
     points = [point for point in fits.points if point.sign == DIRECTIONS[direction]]
     if ripple is not None:
         turn = 2.0 * np.pi / ripple.periods
@@ -206,7 +249,9 @@ def _ripple(fits: MapFits, direction: str) -> str:
             f"{100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} runs, was taken "
             f"out of all points; {short} windows are shorter than its period"
         )
-    least = angle_here(min(abs(point.speed) * point.window for point in points), ".2g")
+    least = angle_here(
+        min(abs(point.speed) * (point.stop - point.start) for point in points), ".2g"
+    )
     return (
         "no ripple over position was found in runs long enough to show one; if friction has one, "
         f"windows that are shorter than its period (the shortest is {least}) see it at "
@@ -214,11 +259,11 @@ def _ripple(fits: MapFits, direction: str) -> str:
     )
 
 
-def fitted_torque(point: MapPoint, fits: MapFits) -> Estimate:
+def fitted_torque(point: Point, curves: Curves) -> Estimate:
     """A point's torque without ripple, with its whole deviation: window and between points."""
-    fit = fits.fits["positive" if point.sign > 0 else "negative"]
+    fit = curves.fits["positive" if point.sign > 0 else "negative"]
     value = point.torque.value - point.ripple
     between = max(each.deviation(abs(point.speed), abs(value)) for each in fit.scatters)
     error = float(np.hypot(np.nan_to_num(point.error), between))
     told = with_error("friction_torque", value, "N m", error, fit.freedom, "window and scatter")
-    return with_systematic(told, fits.bench, TORQUE_CONSTANT, value)
+    return curves.with_constants(told)

@@ -11,9 +11,10 @@ from campaign.estimate import Estimate
 from campaign.estimation.friction_line import mean_of_stretches
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import difference, multiplied, shifted_by
-from campaign.experiments.friction_map.over_rate import ANGLE, COEFFICIENT, FRICTION
+from campaign.experiments.friction_map.curves import ANGLE, COEFFICIENT, FRICTION
+from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.friction_map.sliding import Sliding, scaled, sliding_of
+from campaign.experiments.friction_map.sliding import Sliding, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import conditions
@@ -71,12 +72,13 @@ def account_of(
 
 
 def _mean_coefficient(sliding: Sliding) -> Estimate | None:
-    values = [p.sign * p.coefficient.value for p in sliding.points if np.isfinite(p.load)]
+    curves = next((each for each in sliding.maps if each.quantity is COEFFICIENT), None)
+    loaded = [p for p in sliding.points if np.isfinite(p.load)]
+    values = [coefficient_of(p, sliding.first).value for p in loaded]
     if not values:
         return None
-    return admitted(
-        scaled(mean_of_stretches(OF_LOAD, np.array(values), ""), COEFFICIENT, sliding.first)
-    )
+    mean = mean_of_stretches(OF_LOAD, np.array(values), "")
+    return admitted(mean if curves is None else curves.with_constants(mean))
 
 
 def _coulomb_fitted(sliding: Sliding) -> dict[str, Estimate]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from campaign.experiments.friction_map.conclusions import sliding_conclusions
 from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.friction_map.sliding_shown import sliding_conclusions
 from campaign.experiments.motion.account import Motion, is_surely_something
 from campaign.experiments.shared.conclusion_parts import (
     Part,

@@ -21,8 +21,8 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.estimate import Estimate
-from campaign.experiments.friction_map.sliding_shown import stretch_table
 from campaign.experiments.friction_map.stretches import StretchOptions, force_of
+from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.motion.account import account_of
 from campaign.experiments.motion.conclusions import motion_conclusions
@@ -122,7 +122,8 @@ def _analyse(data: TestData) -> Result:
         if motion.sliding.maps:
             figures.append(friction_figure(motion, suffix))
         if motion.sliding.points or motion.sliding.left:
-            tables.append(stretch_table(motion.sliding, suffix, motion.data.trial.label))
+            every = (*motion.sliding.points, *motion.sliding.left)
+            tables.append(point_table(every, motion.data, suffix, motion.data.trial.label))
     if any(motion.coulomb for motion in motions):
         tables.insert(1, line_table(motions))
     return Result(

@@ -12,11 +12,8 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
-from campaign.experiments.friction_map.sliding_shown import (
-    coefficient_of,
-    rate_caption,
-    rate_panels,
-)
+from campaign.experiments.friction_map.figures import rate_caption, rate_panels
+from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.motion.account import Motion
 from campaign.experiments.shared.captions import amount, sentence
 from campaign.experiments.shared.conclusion_parts import count
@@ -30,7 +27,7 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     recording = motion.data.recording()
     time = recording.time
     panels = []
-    marks = [Mark("", x=each.first, until=each.last) for each in motion.sliding.points]
+    marks = [Mark("", x=each.start, until=each.stop) for each in motion.sliding.points]
     if RELATIVE_ANGLE in recording.channels:
         angle = [Curve(time, recording[RELATIVE_ANGLE], "measured", "measured")]
         if REFERENCE in recording.channels:
@@ -72,11 +69,11 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
 def friction_figure(motion: Motion, suffix: str) -> Figure:
     """Friction of the steady stretches over their rate, both directions, with what was fitted."""
     sliding = motion.sliding
-    panels = [panel for each in sliding.maps for panel in rate_panels(sliding, each)]
+    panels = [panel for each in sliding.maps for panel in rate_panels(each)]
     distances = zip(_distances(motion), sliding.points, strict=True)
     loaded = [(at, point) for at, point in distances if np.isfinite(point.load)]
     if loaded:
-        found = [coefficient_of(sliding, point) for _, point in loaded]
+        found = [coefficient_of(point, sliding.first) for _, point in loaded]
         at = np.array([distance for distance, _ in loaded])
         panels.append(
             Panel(
@@ -89,7 +86,7 @@ def friction_figure(motion: Motion, suffix: str) -> Figure:
     return Figure(
         key=f"friction{suffix}",
         title=f"Friction over rate of {motion.data.trial.label}",
-        caption=rate_caption(sliding, sliding.maps[0]),
+        caption=rate_caption(sliding.maps[0]),
         alt="Friction torque over rate: a dot for each steady stretch, in both directions, and "
         "what was fitted to those of each.",
         panels=tuple(panels),
@@ -105,5 +102,5 @@ def _distances(motion: Motion) -> list[float]:
     slid = np.concatenate(
         [[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(recording.time))]
     )
-    middles = [0.5 * (each.first + each.last) for each in motion.sliding.points]
+    middles = [0.5 * (each.start + each.stop) for each in motion.sliding.points]
     return [float(np.interp(at, recording.time, slid)) for at in middles]

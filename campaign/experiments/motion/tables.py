@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
-from campaign.experiments.friction_map.over_rate import FEWEST_SPEEDS
+from campaign.experiments.friction_map.curves import FEWEST_SPEEDS
 from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.friction_map.tables import curve_findings
 from campaign.experiments.motion.account import Motion
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table
@@ -78,7 +78,7 @@ def line_table(motions: Sequence[Motion]) -> Table:
         ),
         tuple(rows),
         note="Of a straight line through the steady stretches of a direction, or of a Stribeck "
-        f"curve where there are more than {FEWEST_SPEEDS} speeds; intervals are of their scatter. "
+        f"curve where there are {FEWEST_SPEEDS} speeds or more; intervals are of their scatter. "
         "Between and beyond the speeds there are, friction may be another.",
     )
 
@@ -86,10 +86,7 @@ def line_table(motions: Sequence[Motion]) -> Table:
 def motion_findings(motion: Motion) -> Iterator[Finding]:
     """Friction of each direction, under the recording's conditions."""
     place = {**motion.place, "recording": motion.data.trial.number}
-    for direction, found in motion.sliding.found.items():
-        for name, one in found.items():
-            known = replace(one, name="friction_torque") if name == "friction" else one
-            yield Finding.of(known, {**place, "direction": direction})
+    yield from curve_findings(motion.sliding.found, place)
     for estimate in (motion.constant, motion.coefficient):
         if estimate is not None:
             yield Finding.of(estimate, place)

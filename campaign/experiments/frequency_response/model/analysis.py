@@ -109,7 +109,8 @@ class FrequencyResponseOptions(Options):
     """Where the load's sensor is: on the inertia that the torque drives, or behind the spring."""
 
 
-def _analyse(data: TestData) -> Result:
+def identified(data: TestData) -> Result:
+    """Modes, margins and inertias. Raises ValueError where no trial gives a response."""
     options: FrequencyResponseOptions = data.model
     how = Reading(options.excited, options.estimator, options.resolution, options.period)
     measured, remarks = sources(data.trials, data.bench, how)
@@ -346,5 +347,4 @@ MODEL = Model(
     summary="Response of torque to rate: modes, margins, distortion, two masses on a spring",
     options=FrequencyResponseOptions,
     suits=usable,
-    analyse=_analyse,
 )
