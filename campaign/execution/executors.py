@@ -34,6 +34,7 @@ from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
+from campaign.policy import Keeping
 from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
 from campaign.trial import Trial
 
@@ -152,6 +153,7 @@ class _WorkerSetup:
     backend: Backend
     folder: Path
     supervision: Supervision
+    keeping: Keeping
     is_measured: bool
     is_timed: bool
 
@@ -183,6 +185,7 @@ class ProcessExecutor:
             conditions.backend,
             writer.folder.absolute(),
             replace(conditions.supervision, subscribers=(), timing=UNTIMED),
+            conditions.keeping,
             is_measured=conditions.measure is not None,
             is_timed=self._timing is not UNTIMED,
         )
@@ -332,7 +335,12 @@ def _execute_batch(batch: Sequence[Trial], attempts: Mapping[int, int]) -> _Batc
     writer = FolderWriter(_setup.folder, attempts, timing)
     supervision = replace(_setup.supervision, timing=timing)
     conditions = Conditions(
-        _setup.backend, writer, lambda: bool(stopped.value), supervision, _measure
+        _setup.backend,
+        writer,
+        lambda: bool(stopped.value),
+        supervision,
+        _measure,
+        _setup.keeping,
     )
     ended: list[tuple[int, Executed, tuple[Entry, ...]]] = []
 

@@ -27,7 +27,7 @@ from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
-from campaign.policy import Policy
+from campaign.policy import Keeping, Policy
 from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
 from campaign.trial import Trial
@@ -76,10 +76,11 @@ def run_plan(
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = Ended(kept=writer.folder)
-    stages = stages or no_stages()
+    stages, policy = stages or no_stages(), policy or Policy()
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(
+        trials,
         waiting,
         backend,
         writer,
@@ -87,12 +88,13 @@ def run_plan(
         ledger,
         ended,
         stop,
-        policy or Policy(),
+        policy,
         attendance,
         stages,
         live=supervision.live,
     )
-    conditions = Conditions(backend, writer, sequence.halted, supervision, measure)
+    keeping = Keeping.of(policy.keep, trials)
+    conditions = Conditions(backend, writer, sequence.halted, supervision, measure, keeping)
     executor = (
         process_executor(workers, conditions, writer)
         if in_processes

@@ -107,7 +107,7 @@ def load_protocol(
         sources={name: each.text for name, each in collected.sources.items()},
         overrides=tuple(overrides),
         calibration=calibration,
-        policy=Policy(faults=top.faults, rest=top.rest),
+        policy=Policy(faults=top.faults, rest=top.rest, keep=top.keep),
         check=check,
         truth_sources=loader.truths.texts,
         columns=top.columns,

@@ -163,7 +163,7 @@ class MemoryArchive:
     def folder(self) -> Path:
         return Path("run.partial")
 
-    def begin(self, trial: Trial) -> MemoryTrial:
+    def begin(self, trial: Trial, keeping: object = None) -> MemoryTrial:
         return MemoryTrial(self, trial)
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:

@@ -377,7 +377,8 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
 def _figures(
     ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
 ) -> Iterator[Figure]:
-    shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
+    drawn = (k for k, data in enumerate(ramps.trials) if not data.not_kept)
+    shown = next((k for k in drawn if "bristle_stiffness" in ramps.found[k]), None)
     if shown is not None:
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
         curve, place = curve_of(data, torque), ramps.places[shown]
@@ -395,6 +396,7 @@ EXPERIMENT = Experiment(
     fit=fitting_ramps.breakaway,
     warnings=_warnings,
     measure=_measure,
+    needs_samples=False,
     recorded=_found,
     windows=("rest", "ramp"),
     requires={
