@@ -29,6 +29,7 @@ class OneTrial:
         windows=(),
     )
     ending = SimpleNamespace(outcome="completed")
+    not_kept = ""
 
     @staticmethod
     def channel_names() -> frozenset[str]:
