@@ -84,6 +84,19 @@ def test_extremes_are_executed_again_and_keep_their_samples(runs: dict[str, Path
         assert all(each.not_kept and each.digests() == trial.digests() for each in earlier)
 
 
+def test_metrics_are_a_row_for_each_trial(runs: dict[str, Path]):
+    whole, part = (campaign.open(runs[keep]).metrics() for keep in ("all", "none"))
+    apart = ["started", "ended"]
+    assert part.drop(columns=apart).equals(whole.drop(columns=apart))
+    assert part.attrs["units"]["stabilization_error"] == "rad"
+    (first, *_) = open_run(runs["none"]).trials
+    for each in first.estimates:
+        row = part.loc[first.trial.number, [each.name, f"{each.name}_low", f"{each.name}_high"]]
+        assert row.fillna(-1.0).to_list() == [
+            -1.0 if number is None else number for number in (each.value, *each.combined)
+        ]
+
+
 def test_a_page_says_that_samples_were_not_kept(runs: dict[str, Path], tmp_path: Path):
     run = runs["none"]
     typed(tmp_path, "report", str(run), "--output", str(tmp_path / "page"))
