@@ -82,6 +82,14 @@ TemplatesOption = Annotated[
         show_default=False,
     ),
 ]
+FormatOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Besides the page: markdown, latex, pdf; may be given again.",
+    ),
+]
 WorkersOption = Annotated[
     int | None, workers_option("Trials executed at once, where the backend can")
 ]

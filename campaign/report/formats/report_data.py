@@ -377,6 +377,30 @@ class Incidents(_Part):
     tables: tuple[Table, ...]
 
 
+class Section(_Part):
+    """A section of a page that is no report."""
+
+    anchor: str
+    heading: str
+    sentences: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+class ArticleData(_Part):
+    """A comparison, trends or an identification; figures and tables are those of a report."""
+
+    format: int = FORMAT
+    kind: str
+    program: str
+    command: str
+    title: str
+    facts: tuple[tuple[Said, ...], ...]
+    sections: tuple[Section, ...]
+    content: dict[str, JsonValue]
+    """What only this kind of page has."""
+
+
 class ReportData(_Part):
     """A whole report."""
 
