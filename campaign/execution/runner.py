@@ -17,7 +17,7 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
-from campaign.execution.executors import process_executor, thread_executor
+from campaign.execution.executors import OpenExecutor, thread_executor
 from campaign.execution.operator_prompts import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
@@ -50,7 +50,7 @@ def run_plan(
     measure: Measure | None = None,
     finished: Mapping[int, Outcome] = _NOTHING,
     stages: Stages | None = None,
-    in_processes: bool = False,
+    executor: OpenExecutor | None = None,
 ) -> RunOutcome:
     """Execute `trials` in order on a connected backend and seal the archive.
 
@@ -65,8 +65,7 @@ def run_plan(
         measure: what a recording says by itself, to be archived with it; absent: nothing is.
         finished: trials of the plan that are not to be executed again, by number.
         stages: what may follow from the trials.
-        in_processes: whether workers are processes; for a picklable backend and the experiments of
-            this installation.
+        executor: what executes batches; absent: so many threads of this process.
 
     Raises:
         NotSafeError: in place of any of the others, when the bench was not seen safe either.
@@ -95,16 +94,14 @@ def run_plan(
     )
     keeping = Keeping.of(policy.keep, trials)
     conditions = Conditions(backend, writer, sequence.halted, supervision, measure, keeping)
-    executor = (
-        process_executor(workers, conditions, writer)
-        if in_processes
-        else thread_executor(workers, conditions)
+    opened = (
+        thread_executor(workers, conditions) if executor is None else executor(conditions, writer)
     )
     with unsafe_first(ended):
         with (
             supervision.timing.span(Work.WAITING),
             safe_afterwards(backend, ended),
-            executor as at_work,
+            opened as at_work,
         ):
             sequence.execute(at_work)
         sequence.outside.look()  # it may have come after the last trial

@@ -70,6 +70,14 @@ class FolderWriter:
                     part.unlink(missing_ok=True)
             raise lost_trial(files[0][0], error, count=len(files)) from None
 
+    def take_files(self) -> dict[str, bytes]:
+        """The content of the trials that were finished, by file; nothing stays in the folder."""
+        files, self._files = self._files, []
+        found = {final.name: part.read_bytes() for part, final in files}
+        for part, _ in files:
+            part.unlink()
+        return found
+
     def take_entries(self) -> tuple[Entry, ...]:
         """The journal entries since the last call."""
         taken = tuple(self._entries)
