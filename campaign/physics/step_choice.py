@@ -159,7 +159,8 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
     continuous = bench.controller.sample_rate is None and task.mode in ("rate", "torque")
     compensator = make_compensator(bench, task.compensation) if continuous else Compensator()
     models = [(f"compensation.{task.compensation}", each) for each, _ in compensator.friction]
-    own = _contacts([(f"friction.{name}", each) for name, each in bench.friction.items()], bench)
+    plant = [(f"friction.{name}", each) for name, each in bench.friction.items()]
+    own = _contacts(plant, bench)
     compensating = _contacts(models, bench)
     contacts = own or compensating
     dry = [name for name, each in bench.friction.items() if is_dry(each)]
@@ -171,7 +172,7 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
         fastest = _fastest(stuck_poles(bench, task, compensator))
         share = FED if fed and dry else JUMPS
         yield _Limit(share / fastest, f"jumps of dry friction at compensation.{task.compensation}")
-    yield from _own_times(models + list(bench.friction.items()))
+    yield from _own_times(plant + models)
     if not contacts:
         return
     inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
