@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.decisions import extremes
+from campaign.experiments.preparing.unusable import doubt
 from campaign.policy import Keeping
 from campaign.reason import Cause
 from campaign.recording import Ending, Outcome
@@ -82,6 +84,22 @@ def test_extremes_are_executed_again_and_keep_their_samples(runs: dict[str, Path
         earlier = run.earlier_attempts.get(trial.trial.number, ())
         assert len(earlier) == (trial.trial.number in kept)
         assert all(each.not_kept and each.digests() == trial.digests() for each in earlier)
+
+
+def test_what_has_no_samples_is_not_measured_anew(runs: dict[str, Path]):
+    whole = campaign.open(runs["all"]).results.findings
+    part = campaign.open(runs["none"], measure_anew=True).results
+    assert part.findings.equals(whole)
+    assert part.problems == {}
+
+
+def test_a_trial_with_neither_samples_nor_metrics_is_left_out_with_the_reason(runs):
+    trial = open_run(runs["none"]).trials[0]
+    assert doubt(trial) is None
+    found = doubt(replace(trial, estimates=()))
+    assert found is not None
+    assert found.fatal
+    assert found.reason.code == "samples not kept"
 
 
 def test_metrics_are_a_row_for_each_trial(runs: dict[str, Path]):
