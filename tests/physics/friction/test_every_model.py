@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
+from campaign.physics.complete import complete
 from campaign.physics.lanes import Lane
 from campaign.physics.simulate import simulate_together
+from campaign.physics.step_choice import longest_step
 from campaign.physics.step_function import AN_INSTANT, Motion, single_step
 from campaign.signals import Polyline, Sine
 from tests.physics.benches import run, task
@@ -174,3 +176,11 @@ def test_a_load_that_is_held_does_not_drift_where_the_model_says_so() -> None:
     assert drift(shaken("elasto-plastic", elastic_share=0.3)) > 1e-5
     assert drift(shaken("lugre")) > 1e-5
     assert drift(shaken("dahl")) > 1e-5
+
+
+def test_a_step_is_at_most_a_quarter_of_the_time_that_a_model_states() -> None:
+    found = longest_step(complete(on("armstrong", memory_lag=4e-4), "a test"), task())
+    assert found.needed == pytest.approx(1e-4)
+    assert found.because == "the fastest time of friction.load"
+    slow = longest_step(complete(on("armstrong", memory_lag=0.05), "a test"), task())
+    assert "fastest" not in slow.because
