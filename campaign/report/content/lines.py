@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from campaign.estimation.stabilization_error import OF_ONE_TRIAL
+from campaign.estimate import OF_ONE_TRIAL
 from campaign.published.headline import is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
@@ -72,11 +72,13 @@ def shown_line(line: Line) -> ShownLine:
 
 
 def _of_one_trial(line: Line) -> str:
-    """What is not in its interval; a sentence leaves such an interval of a ratio out."""
+    """What is not in its interval, or why it has none."""
     found = line.found
-    if found is None or not found.has_interval or found.reason not in OF_ONE_TRIAL:
+    if found is None or found.reason not in OF_ONE_TRIAL:
         return ""
-    return "the interval is of one trial: how trials scatter is not in it"
+    if found.has_interval:
+        return "one trial: the interval is of the calibration; how trials scatter is not in it"
+    return "no interval: one trial, and no calibration of its bench"
 
 
 @dataclass(frozen=True)
