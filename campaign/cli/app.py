@@ -280,10 +280,33 @@ def calibrate(
             help="Refit without each frequency in turn, to see how well it is predicted.",
         ),
     ] = True,
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit/--no-fit",
+            help="Without: the bench stays as it is, and intervals and covariance are worked out.",
+        ),
+    ] = True,
+    propagate: Annotated[
+        str,
+        typer.Option(
+            "--propagate",
+            metavar="PROTOCOL",
+            help="Carry the covariance to the published cells of this protocol, not of its own.",
+        ),
+    ] = "",
 ) -> None:
     """Fit a simulated bench to published cells; the result's path is the last line of output."""
     from campaign.cli.calibrate import calibrate_protocol
 
     raise typer.Exit(
-        calibrate_protocol(protocol, results, output, workers=workers, leave_out=leave_out)
+        calibrate_protocol(
+            protocol,
+            results,
+            output,
+            workers=workers,
+            leave_out=leave_out,
+            fit=fit,
+            propagated=propagate,
+        )
     )

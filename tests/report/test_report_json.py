@@ -190,6 +190,8 @@ def of_number(number: dict[str, Any], factor: float = 1.0) -> list[float | None]
 
 
 def every_table(told: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    if told["scoreboard"]["closeness"]:
+        yield told["scoreboard"]["closeness"]
     for test in told["tests"]:
         yield from test["tables"]
         if test["truth"]:

@@ -17,7 +17,7 @@ from campaign.access.sentences import sentence
 from campaign.archive.reading.damage_words import in_words
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
-from campaign.published.headline import headline
+from campaign.published.headline import LIMITS, headline
 from campaign.published.scoreboard import Line
 from campaign.report.content import lines, tables
 from campaign.report.content.document import Document
@@ -339,11 +339,16 @@ def _scoreboard(layout: Layout) -> data.Scoreboard:
     return data.Scoreboard(
         agreement=tables.agreement(board),
         counts=tuple(
-            data.Count(status=str(each.status), compared=each.compared, good=each.good)
+            data.Count(
+                status=str(each.status),
+                compared=each.compared,
+                good=each.good,
+                numbers=each.numbers,
+                within_percent=dict(zip(map(str, LIMITS), each.within, strict=True)),
+            )
             for each in counted.counts
         ),
-        median_deviation_percent=counted.median_deviation,
-        worst_deviation_percent=counted.worst_deviation,
+        closeness=None if layout.closeness is None else _table(layout.closeness),
         not_reached=len(counted.not_reached),
         not_found=len(counted.not_found),
         not_run=len(counted.not_run),
