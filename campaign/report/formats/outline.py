@@ -46,7 +46,7 @@ def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
         yield Paragraph(tables.agreement(document.scoreboard))
         yield from (shown for shown in (layout.picture, layout.strips) if shown is not None)
         if layout.closeness is not None:
-            yield _grid(layout.closeness)
+            yield layout.closeness
         yield Paragraph(f"Every published number is in {layout.scoreboard_download.file}.")
     for section in layout.sections:
         yield from _section(section, layout.telling)
