@@ -387,6 +387,8 @@ def _distributed() -> Any:
         raise UsageError(
             "--executor needs dask.distributed: pip install 'campaign[dask]'"
         ) from None
+    for name in ("distributed", "distributed.client", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what a user must know is said here
     return distributed
 
 

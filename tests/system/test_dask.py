@@ -68,10 +68,15 @@ class Site:
         return self._begin("worker", self.address.replace("dask", "tcp"), *arguments)
 
     def await_workers(self, count: int) -> None:
-        from distributed import Client
-
-        with Client(self.address.replace("dask", "tcp"), set_as_default=False) as client:
-            client.wait_for_workers(count, timeout=60)
+        # Another process: a client leaves its loop and sockets to the garbage collector.
+        does = (
+            "import sys; from distributed import Client\n"
+            "Client(sys.argv[1]).wait_for_workers(int(sys.argv[2]), timeout=60)"
+        )
+        at = self.address.replace("dask", "tcp")
+        subprocess.run(
+            [sys.executable, "-c", does, at, str(count)], check=True, stderr=subprocess.DEVNULL
+        )
 
     def end(self) -> None:
         for process in self.begun:
