@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal, Self
 
-from campaign.reason import NONE, Reason
+from campaign.reason import NONE, Cause, Reason
 
 ROUNDING = 1e-9
 """Share of a number by which it may lie outside of its interval: unit conversions round."""
 
+OF_ONE_TRIAL = Cause(
+    "of one trial",
+    "the interval is of that one trial; what differs from trial to trial is not in it, and "
+    "three trials alike would show it",
+)
 Kind = Literal["number", "share", "count", "quantile", "at least", "at most"]
 
 

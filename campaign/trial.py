@@ -192,6 +192,11 @@ class Trial(Options):
         text = f'{{"bench":{tree_text(self.bench)},{canonical_json(what)[1:]}'  # keys are sorted
         return hashlib.sha256(text.encode()).hexdigest()
 
+    @property
+    def apart_from_seed(self) -> tuple[str, str, Task]:
+        """What determines the samples of a simulation but its seed: equal for repeats."""
+        return tree_text(self.bench), self.truth, self.task
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with some fields changed, which works its fingerprint out anew."""
         copy = super().model_copy(update=update, deep=deep)

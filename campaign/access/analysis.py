@@ -17,6 +17,7 @@ from campaign.errors import ArchiveError, UsageError, explain_in_debug
 from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
 from campaign.experiments.preparing.unusable import notes_on
 from campaign.physics.bench import Bench
+from campaign.published.calibrated import NOTHING, CalibrationPart, calibration_part
 from campaign.published.evidence import Evidence, evidence_of
 from campaign.published.provenance import NOTHING_ALTERED, Provenance, provenance_of
 from campaign.published.values import Published, published_values
@@ -48,6 +49,7 @@ class AnalysedTest:
         damaged: what is damaged of its trials; those that cannot be read are not among `trials`.
         source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
         provenance: whether its trials ran on the bench that was described.
+        calibration: what that of the bench leaves open of its numbers.
     """
 
     name: str
@@ -64,6 +66,7 @@ class AnalysedTest:
     damaged: tuple[Damage, ...] = ()
     source: str = ""
     provenance: Provenance = NOTHING_ALTERED
+    calibration: CalibrationPart = NOTHING
 
     @property
     def sides(self) -> Sides:
@@ -105,7 +108,8 @@ class AnalysedTest:
             source=self.source,
             provenance=self.provenance,
         )
-        return replace(found, failed=bool(self.problem or self.damaged))
+        failed = bool(self.problem or self.damaged)
+        return replace(found, failed=failed, calibration=self.calibration)
 
 
 @dataclass(frozen=True)
@@ -231,6 +235,8 @@ def _analysed(
     reproduces, numbers = test.get("reproduces"), frozenset(found.trials)
     trials = tuple(each for each in run.trials_of(name) if each.trial.number in numbers)
     experiment, _ = _experiment(kind, experiments)
+    bench = _bench(trials)
+    stated = None if bench is None else bench.known.fingerprint
     damaged = tuple(damage for damage in of_test(run, name) if damage.trial)
     source = source_of(run)
     return AnalysedTest(
@@ -244,7 +250,7 @@ def _analysed(
         options=_options(test),
         trials=trials,
         experiment=experiment,
-        bench=_bench(trials),
+        bench=bench,
         result=found.result,
         problem=found.problem,
         damaged=tuple(dict.fromkeys((*damaged, *found.damaged))),
@@ -256,6 +262,7 @@ def _analysed(
             changed=_gone_on(run, name),
             failed={t.trial.number for t in trials if t.ending.outcome is not Outcome.COMPLETED},
         ),
+        calibration=calibration_part(run.header.sources, stated.bench if stated else ""),
     )
 
 

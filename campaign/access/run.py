@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from campaign.access.results import Results, results_view
-from campaign.access.tables import trials_table
+from campaign.access.tables import metrics_by_trial, trials_table
 from campaign.access.test import TestView
 from campaign.access.trial import TrialView
 from campaign.archive import RunHeader, RunReader, RunStatus
@@ -91,6 +91,13 @@ class RunView:
         A trial that cannot be read has no row; `attrs["damaged"]` names it.
         """
         return trials_table(self.archive.trials, self.damaged)
+
+    def metrics(self) -> pd.DataFrame:
+        """One row per executed trial: as `trials`, then what was measured in its recording (SI).
+
+        `attrs["units"]` has the units. A test's `metrics` tell more: reasons, methods, origins.
+        """
+        return metrics_by_trial(self.archive.trials, self.damaged)
 
     @cached_property
     def results(self) -> Results:

@@ -51,6 +51,32 @@ def trials_table(trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()
     return table
 
 
+def metrics_by_trial(
+    trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()
+) -> pd.DataFrame:
+    """The table of trials with a column for each metric (SI), and its interval as `_low`, `_high`.
+
+    NaN where a trial has no such metric, or no interval of it. `attrs["units"]` has the units.
+    """
+    import pandas as pd
+
+    trials = tuple(trials)
+    table = trials_table(trials, damaged)
+    units: dict[str, str] = {}
+    found: dict[str, dict[int, float | None]] = {}
+    for archived in trials:
+        for each in archived.estimates:
+            units[each.name] = each.unit
+            low, high = each.combined
+            told = {each.name: each.value, f"{each.name}_low": low, f"{each.name}_high": high}
+            for name, value in told.items():
+                found.setdefault(name, {})[archived.trial.number] = value
+    columns = pd.DataFrame({n: pd.Series(v, dtype=float) for n, v in found.items()}, table.index)
+    wide = pd.concat([table, columns], axis=1)
+    wide.attrs = {**table.attrs, "units": units}
+    return wide
+
+
 def _row(archived: ArchivedTrial) -> dict[str, object]:
     trial, ending = archived.trial, archived.ending
     said = (

@@ -74,6 +74,7 @@ class SimBackend:
         self._benches: dict[str, CompleteBench] = {}
         self._truths: dict[str, Tree] = {}
         self._simulated: dict[tuple[str, str], CompleteBench] = {}
+        self._accepted: set[Hashable] = set()
         self._known: dict[str, _Known] = {}
         self._groups: dict[Hashable, Hashable] = {}
         self.timing: Timing = UNTIMED
@@ -101,7 +102,14 @@ class SimBackend:
         self._truths.update(truths)
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why this backend cannot execute `trial`, or None."""
+        """Why this backend cannot execute `trial`, or None.
+
+        Of trials that differ in their seed alone the first is looked at: draws of friction change
+        the step by a few percent, and only one that needs the finest could be refused for them.
+        """
+        kind = trial.apart_from_seed
+        if kind in self._accepted:
+            return None
         if trial.truth and trial.truth not in self._truths:
             return f"its truth {trial.truth[:12]} is not here; it is archived with the run"
         try:
@@ -114,6 +122,9 @@ class SimBackend:
             self._look_at(trial)
         except (ArithmeticError, ValueError) as error:
             return str(error)
+        if len(self._accepted) >= MOST_KNOWN:
+            self._accepted.clear()
+        self._accepted.add(kind)
         return None
 
     def channels(self, trial: Trial) -> frozenset[str]:

@@ -26,8 +26,20 @@ HEADER = """\
 """
 
 
-def result_text(outcome: CalibrationOutcome, bench_name: str) -> str:
-    """The result; `bench_name` is the file that the calibrated bench goes to."""
+ASSUMPTION = (
+    "cells deviate independently, each by its standard deviation times the scatter; linear at the "
+    "optimum; the structure of the bench counts as right"
+)
+"""What the covariance takes as true."""
+
+
+def result_text(outcome: CalibrationOutcome, bench_name: str, bench: str = "") -> str:
+    """The result.
+
+    Args:
+        bench_name: the file that the calibrated bench goes to.
+        bench: its text, which states the fingerprint.
+    """
     problem, options = outcome.problem, outcome.problem.options
     lines = [HEADER.format(protocol=problem.protocol.path.name)]
     lines += _pairs(
@@ -37,7 +49,7 @@ def result_text(outcome: CalibrationOutcome, bench_name: str) -> str:
             "calibrated_bench": bench_name,
             "finished": not outcome.interrupted,
             "loss": options.loss,
-            "starts": options.starts,
+            "starts": options.starts if outcome.was_fitted else 0,
             "seed": options.seed,
             "evaluations": outcome.evaluations,
             "cells": shortest(problem.targets, problem.published),
@@ -52,9 +64,11 @@ def result_text(outcome: CalibrationOutcome, bench_name: str) -> str:
     for index in range(len(problem.space.parameters)):
         lines += ["", "[[parameter]]", *_pairs(dict(_parameter(outcome, index)))]
     lines += _correlation(outcome)
+    lines += _covariance(outcome)
     for target in problem.targets:
         lines += ["", "[[cell]]", *_pairs(dict(_cell(outcome, target)))]
     lines += _left_out(outcome)
+    lines += _propagation(outcome, bench)
     text = "\n".join(lines) + "\n"
     tomllib.loads(text)
     return text
@@ -166,6 +180,33 @@ def _correlation(outcome: CalibrationOutcome) -> list[str]:
     lines = ["", "[correlation]", *_pairs({"parameters": names})]
     lines += ["strong = [", *(f"    {_toml([a, b, round(r, 3)])}," for a, b, r in pairs), "]"]
     return [*lines, "matrix = [", *(f"    {_toml(row)}," for row in matrix), "]"]
+
+
+def _covariance(outcome: CalibrationOutcome) -> list[str]:
+    certainty = outcome.uncertainty
+    matrix = None if certainty is None else certainty.covariance
+    if certainty is None or matrix is None:
+        return []
+    names = [parameter.name for parameter in outcome.problem.space.parameters]
+    rows = [f"    {_toml([_short(float(c)) for c in row])}," for row in matrix]
+    told = {"assumption": ASSUMPTION, "freedom": certainty.freedom, "parameters": names}
+    return ["", "[covariance]", *_pairs(told), "matrix = [", *rows, "]"]
+
+
+def _propagation(outcome: CalibrationOutcome, bench: str) -> list[str]:
+    """What `published.calibrated` reads: written last, as most of it is for a program."""
+    found = outcome.propagation
+    if found is None:
+        return []
+    stated = tomllib.loads(bench).get("known", {}).get("fingerprint", {})
+    told = {
+        "protocol": found.protocol,
+        "fingerprint": stated.get("bench", ""),
+        "freedom": found.freedom,
+        "lost": found.lost,
+    }
+    lines = ["", "[propagation]", *_pairs(told), "", "[propagation.standard_uncertainty]"]
+    return [*lines, *(f"{_quoted(k)} = {_short(v)!r}" for k, v in found.uncertainty.items())]
 
 
 def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, Any]]:

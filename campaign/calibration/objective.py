@@ -44,6 +44,7 @@ class FinishedTrial:
     trial: Trial
     record: Recording
     estimates: tuple[Estimate, ...] = ()
+    not_kept: str = ""
 
     @property
     def ending(self) -> Ending:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from campaign.calibration.leave_out import LeftOut, leave_one_out
 from campaign.calibration.objective import Evaluation, Simulation
 from campaign.calibration.problem import CalibrationProblem
+from campaign.calibration.propagation import Propagation, propagate, tests_of
 from campaign.estimation.linear_uncertainty import Uncertainty
 from campaign.estimation.multi_start import Display, Settings, Start, search
 from campaign.estimation.objective import Objective
 from campaign.experiments.interface import Experiment
+from campaign.protocol import Protocol
 from campaign.protocol.calibration import CalibrationOptions
 
 Array = NDArray[np.float64]
@@ -31,6 +33,8 @@ class CalibrationOutcome:
         starts: those that came to their end, in order.
         uncertainty: None when the calibration was interrupted.
         left_out: empty when it was not asked for or cannot be had.
+        propagation: None when it was interrupted, or an unknown is not determined.
+        was_fitted: false where the bench was taken as it is.
         evaluations: of the bench, derivatives included.
         interrupted: whether somebody stopped it; the best point so far is kept.
     """
@@ -46,6 +50,8 @@ class CalibrationOutcome:
     left_out: tuple[LeftOut, ...]
     evaluations: int
     interrupted: bool
+    propagation: Propagation | None = None
+    was_fitted: bool = True
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -60,8 +66,14 @@ def calibrate(
     workers: int,
     display: Display,
     leave_out: bool = True,
+    fit: bool = True,
+    propagated: Protocol | None = None,
 ) -> CalibrationOutcome:
     """Fit the problem's parameters. A KeyboardInterrupt ends it with the best point so far.
+
+    Args:
+        fit: else the bench stays as it is, and only what is known of it is worked out.
+        propagated: whose tests the uncertainty is carried to; the problem's own ones when None.
 
     Raises UsageError, or ProtocolError, when the tests do not find what the cells are.
     """
@@ -74,14 +86,31 @@ def calibrate(
         step=problem.options.difference_step,
     )
     settings = _settings(problem.options)
+    if not fit:
+        settings = replace(settings, starts=0)
     found = search(objective, settings, display)
     left: list[LeftOut] = []
+    carried: Propagation | None = None
     interrupted = found.interrupted
-    if leave_out and problem.options.leave_out and not interrupted:
-        try:
+    try:
+        if fit and leave_out and problem.options.leave_out and not interrupted:
             left = leave_one_out(problem, simulation, objective, settings, display, found.shares)
-        except KeyboardInterrupt:
-            interrupted = True
+        if found.uncertainty is not None:
+            source = propagated or problem.protocol
+            tests = tests_of(problem, source.tests) if propagated else problem.tests
+            carried = propagate(
+                problem,
+                tests,
+                source.path.name,
+                found.shares,
+                found.uncertainty,
+                experiments,
+                cost=found.cost,
+                workers=workers,
+                display=display,
+            )
+    except KeyboardInterrupt:
+        interrupted = True
     return CalibrationOutcome(
         problem=problem,
         shares=found.shares,
@@ -94,6 +123,8 @@ def calibrate(
         left_out=tuple(left),
         evaluations=objective.evaluations,
         interrupted=interrupted,
+        propagation=carried,
+        was_fitted=fit,
     )
 
 

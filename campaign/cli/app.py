@@ -17,6 +17,7 @@ from campaign.cli.parameters import (
     RESULTS,
     BackendOption,
     ClearStopOption,
+    ExecutorOption,
     FromOption,
     HandoverOption,
     JsonOption,
@@ -29,6 +30,7 @@ from campaign.cli.parameters import (
     RunArgument,
     SetOption,
     SignOption,
+    TlsOption,
     TruthOption,
     WorkersOption,
     YesOption,
@@ -99,6 +101,8 @@ def run(
     only: OnlyOption = None,
     changes: SetOption = None,
     workers: WorkersOption = None,
+    executor: ExecutorOption = "",
+    tls: TlsOption = None,
     report: ReportOption = False,
     port: PortOption = None,
     source: FromOption = None,
@@ -134,6 +138,7 @@ def run(
 
     stopwatch = Stopwatch() if profile else None
     with (stopwatch or UNTIMED).span(Work.IMPORTING):
+        from campaign.cli.cluster import Where
         from campaign.cli.prepare import Request, short_settings
         from campaign.cli.run import Remarks, run_protocol
         from campaign.cli.step_check import SETTING
@@ -147,6 +152,7 @@ def run(
             request,
             results,
             workers=workers,
+            where=Where(executor, tls),
             report=report,
             yes=yes,
             clear_stop=clear_stop,
@@ -169,6 +175,8 @@ def resume(
         ),
     ] = False,
     workers: WorkersOption = None,
+    executor: ExecutorOption = "",
+    tls: TlsOption = None,
     report: ReportOption = False,
     port: PortOption = None,
     yes: YesOption = False,
@@ -176,6 +184,7 @@ def resume(
     sign: SignOption = None,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
+    from campaign.cli.cluster import Where
     from campaign.cli.resume import resume_run
 
     raise typer.Exit(
@@ -184,6 +193,7 @@ def resume(
             results,
             accept_changes=accept_changes,
             workers=workers,
+            where=Where(executor, tls),
             report=report,
             port=port,
             yes=yes,
@@ -270,10 +280,33 @@ def calibrate(
             help="Refit without each frequency in turn, to see how well it is predicted.",
         ),
     ] = True,
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit/--no-fit",
+            help="Without: the bench stays as it is, and intervals and covariance are worked out.",
+        ),
+    ] = True,
+    propagate: Annotated[
+        str,
+        typer.Option(
+            "--propagate",
+            metavar="PROTOCOL",
+            help="Carry the covariance to the published cells of this protocol, not of its own.",
+        ),
+    ] = "",
 ) -> None:
     """Fit a simulated bench to published cells; the result's path is the last line of output."""
     from campaign.cli.calibrate import calibrate_protocol
 
     raise typer.Exit(
-        calibrate_protocol(protocol, results, output, workers=workers, leave_out=leave_out)
+        calibrate_protocol(
+            protocol,
+            results,
+            output,
+            workers=workers,
+            leave_out=leave_out,
+            fit=fit,
+            propagated=propagate,
+        )
     )

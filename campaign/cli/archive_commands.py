@@ -11,6 +11,7 @@ from campaign.cli.app import app
 from campaign.cli.output import print_line
 from campaign.cli.parameters import (
     RESULTS,
+    FormatOption,
     JsonOption,
     NewestRunArgument,
     OpenOption,
@@ -50,14 +51,7 @@ def report(
             show_default=False,
         ),
     ] = None,
-    formats: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--format",
-            metavar="NAME",
-            help="Besides the page: markdown, latex, pdf; may be given again.",
-        ),
-    ] = None,
+    formats: FormatOption = None,
     trials: Annotated[
         str,
         typer.Option(
@@ -139,12 +133,16 @@ def compare(
             "constant` of a motor that was exchanged; may be given again.",
         ),
     ] = None,
+    templates: TemplatesOption = None,
+    formats: FormatOption = None,
     open_it: OpenOption = False,
 ) -> None:
     """Say which numbers of runs differ from those of the first, and how sure that is."""
     from campaign.cli.compare import compare_archives
 
-    page, code = compare_archives(runs, results, output, exchanged or (), open_it=open_it)
+    page, code = compare_archives(
+        runs, results, output, exchanged or (), templates, formats or (), open_it=open_it
+    )
     print_line(str(page))
     raise typer.Exit(code)
 

@@ -35,11 +35,22 @@ SHOWN_PROBLEMS = 5  # of the simulation; the result has them all
 
 @unwinding()
 def calibrate_protocol(
-    name: str, results: Path, output: Path | None, *, workers: int | None, leave_out: bool
+    name: str,
+    results: Path,
+    output: Path | None,
+    *,
+    workers: int | None,
+    leave_out: bool,
+    fit: bool = True,
+    propagated: str = "",
 ) -> ExitCode:
     """Fit, and write the result and the bench; the result's path is the last line of output."""
     path = find_protocol(name)
     protocol = load_protocol(path, experiments(), shipped=protocols_folder())
+    other = None
+    if propagated:
+        found = find_protocol(propagated)
+        other = load_protocol(found, experiments(), shipped=protocols_folder())
     check_benches(protocol, tuple(PURPOSES), "a calibration, which simulates,")
     problem = make_problem(protocol, _published(protocol))
     for warning in problem.warnings:
@@ -57,10 +68,13 @@ def calibrate_protocol(
             workers=workers or os.cpu_count() or 1,
             display=display,
             leave_out=leave_out,
+            fit=fit,
+            propagated=other,
         )
     known = known_entries(outcome, fitted, document)
-    _write(bench, bench_text(source, space, outcome.values, known))
-    _write(result, result_text(outcome, bench.name))
+    calibrated = bench_text(source, space, outcome.values, known)
+    _write(bench, calibrated)
+    _write(result, result_text(outcome, bench.name, calibrated))
     _say(outcome)
     print_note(f"bench: {bench}")
     print_line(str(result))

@@ -27,6 +27,7 @@ from campaign.errors import ExitCode, worst_exit_code
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.references.judged import Verdict
+from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit
 
@@ -48,14 +49,18 @@ def compare_archives(
     results: Path,
     output: Path | None,
     exchanged: Sequence[str],
+    templates: Path | None = None,
+    formats: Sequence[str] = (),
     *,
     open_it: bool,
 ) -> tuple[Path, ExitCode]:
     """Compare the runs that `names` mean with the first; the page, and whether all was read."""
+    also = chosen_formats(formats)
     paths = [find_run(results, name) for name in names]
     runs = [open_run(path) for path in paths]
     comparison = compare_runs(runs, experiments(), exchanged)
-    page = write_comparison(comparison, output or _beside(paths), templates_folder())
+    folder = output or _beside(paths)
+    page = write_comparison(comparison, folder, templates_folder(), templates, also)
     for against in comparison.against:
         _tell(against, comparison)
     for side in comparison.sides:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from campaign.backends.interface import Backend, ExecutesTogether, KnowsCost
 from campaign.protocol import Plan
+from campaign.trial import Trial
 
 MILLISECOND = 1e-3
 
@@ -36,10 +37,12 @@ def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
     """By test; empty for a backend that does not compute."""
     if not isinstance(backend, KnowsCost):
         return {}
-    alone = _alone(backend, plan)
+    like = _like(plan)
+    alone = _alone(backend, like)
+    known = {trial.number: backend.cost(trial) for trial in like.values()}
     found = {}
     for test in plan.tests:
-        each = [backend.cost(plan.trials[number - 1]) for number in test.numbers]
+        each = [known[like[number].number] for number in test.numbers]
         shortest = min(each, key=lambda cost: cost.step)
         steps = sum(cost.steps for cost in each)
         found[test.name] = Cost(
@@ -53,14 +56,20 @@ def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
     return found
 
 
-def _alone(backend: Backend, plan: Plan) -> frozenset[int]:
+def _like(plan: Plan) -> dict[int, Trial]:
+    """By number, the first trial that differs in its seed alone: its cost stands for all."""
+    first: dict[Hashable, Trial] = {}
+    return {t.number: first.setdefault(t.apart_from_seed, t) for t in plan.trials}
+
+
+def _alone(backend: Backend, like: Mapping[int, Trial]) -> frozenset[int]:
     """Numbers of the trials that have too few companions."""
     if not isinstance(backend, ExecutesTogether):
         return frozenset()
-    groups: dict[int, Hashable] = {trial.number: backend.group(trial) for trial in plan.trials}
-    count = Counter(groups.values())
+    group = {trial.number: backend.group(trial) for trial in like.values()}
+    count = Counter(group[trial.number] for trial in like.values())
     few = backend.fewest_together
-    return frozenset(number for number, group in groups.items() if count[group] < few)
+    return frozenset(n for n, trial in like.items() if count[group[trial.number]] < few)
 
 
 def cost_lines(cost: Cost) -> Iterator[str]:

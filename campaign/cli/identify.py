@@ -24,6 +24,7 @@ from campaign.identify.material import Chosen, choose
 from campaign.identify.page import PAGE, next_measurement, write_identification
 from campaign.identify.tables import changes_table, told
 from campaign.interrupts import unwinding
+from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit, words
@@ -42,12 +43,15 @@ def identify_run(
     bench: Path | None = None,
     page: Path | None = None,
     settings: Sequence[str] = (),
+    templates: Path | None = None,
+    formats: Sequence[str] = (),
     open_it: bool = False,
 ) -> tuple[Path, ExitCode]:
     """Identify, and write the page and, where it is asked for, the bench; the page's path.
 
     Raises NoResultError where no method identified anything, before anything is written.
     """
+    also = chosen_formats(formats)
     chosen = choose(results, run)
     unseen = choose(results, validate) if validate else None
     compared = choose(results, compare) if compare else None
@@ -82,7 +86,9 @@ def identify_run(
     if bench is not None and not nothing_to_write(found):
         text = bench_text(found, command)
     written = bench.name if bench is not None and text is not None else ""
-    made = write_identification(found, output, templates_folder(), command, written)
+    made = write_identification(
+        found, output, templates_folder(), command, written, templates, also
+    )
     if bench is not None and text is not None:
         _write_bench(bench, text)  # first: whoever reads what is printed may end early
     _say(found)

@@ -20,6 +20,7 @@ from campaign.options import OptionInfo, describe
 from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionModel
 from campaign.plugins import Kinds, stray_entries
 from campaign.protocol.stages import FIRST
 from campaign.report.formats import formats
@@ -72,6 +73,9 @@ def show_kind(name: str) -> None:
         kind = room[name]
         options = getattr(kind, "options", None)  # an export format has none
         _show(room.room, name, f"{kind.summary}{_whose(room, name)}", options)
+        if isinstance(kind, FrictionModel) and kind.no_compensation:
+            print_line()
+            print_line(f"It cannot compensate: {kind.no_compensation}.")
         if isinstance(kind, Experiment):
             if kind.fit is not None:
                 print_line()

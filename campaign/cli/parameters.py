@@ -82,8 +82,35 @@ TemplatesOption = Annotated[
         show_default=False,
     ),
 ]
+FormatOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Besides the page: markdown, latex, pdf; may be given again.",
+    ),
+]
 WorkersOption = Annotated[
     int | None, workers_option("Trials executed at once, where the backend can")
+]
+ExecutorOption = Annotated[
+    str,
+    typer.Option(
+        "--executor",
+        metavar="WHERE",
+        help="Execute simulated trials on a Dask cluster: dask (of this machine), or "
+        "dask://HOST:PORT of a scheduler.",
+        show_default=False,
+    ),
+]
+TlsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--executor-tls",
+        metavar="DIR",
+        help="Folder with ca.pem, cert.pem and key.pem for a scheduler on another machine.",
+        show_default=False,
+    ),
 ]
 ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
 YesOption = Annotated[

@@ -142,8 +142,15 @@ def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
         yield f"and {len(steps) - NOTES} more steps by hand; --json has them all"
 
 
+KEPT = {
+    "none": "none, metrics only",
+    "failed": "those of failed trials",
+    "extremes": "those of failed trials, and of the smallest and largest metrics of each test",
+}
+
+
 def policy_lines(policy: Policy) -> Iterator[str]:
-    """What the protocol wants done besides its trials, a line for faults and one for rests."""
+    """What the protocol wants done besides its trials, a line for each thing."""
     if policy.faults:
         responses = (f"{name}: {_response(one)}" for name, one in policy.faults.items())
         others = () if "default" in policy.faults else ("else: skip",)
@@ -151,6 +158,8 @@ def policy_lines(policy: Policy) -> Iterator[str]:
     if policy.rest is not None:
         pause, every = clock(policy.rest.pause), clock(policy.rest.every)
         yield f"rests: {pause} after each {every} of bench time"
+    if policy.keep != "all":
+        yield f"samples kept: {KEPT.get(str(policy.keep), f'{policy.keep} trials of each test')}"
 
 
 def _response(response: Response) -> str:

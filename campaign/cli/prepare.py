@@ -85,7 +85,32 @@ def prepare(request: Request) -> Prepared:
         plan = make_plan(
             protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
         )
+    _check_keep(plan, kind)
     return Prepared(path, plan, kind, options)
+
+
+def _check_keep(plan: Plan, kind: BackendKind) -> None:
+    """Raise UsageError where samples that are not kept would be missed."""
+    keep = plan.policy.keep
+    if keep == "all":
+        return
+    if kind.source is not Source.SIMULATION:
+        raise UsageError(
+            f"keep = {keep!r}: only a simulated trial can be executed again with the same samples; "
+            f"with the backend {kind.name!r} leave 'keep' out"
+        )
+    for trial in {trial.test: trial for trial in plan.trials}.values():
+        experiment = experiments().get(trial.kind)
+        if experiment is None or experiment.needs_samples:
+            raise UsageError(
+                f"keep = {keep!r}: {trial.kind!r} (test {trial.test!r}) is analysed from samples, "
+                "not from metrics alone; leave 'keep' out, or that test (--only)"
+            )
+    if plan.stages:
+        raise UsageError(
+            f"keep = {keep!r}: trials of {plan.stages[0].test!r} follow from samples of others; "
+            "leave 'keep' out"
+        )
 
 
 def _with_mapping(options: Options, protocol: Protocol) -> Options:

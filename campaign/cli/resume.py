@@ -13,12 +13,13 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
+from campaign.cli.cluster import HERE, Where
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
-from campaign.cli.session import Session, choose_workers, conduct, print_warning
+from campaign.cli.session import Session, conduct, print_warning
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode, UsageError, worst_exit_code
@@ -71,6 +72,7 @@ def resume_run(
     yes: bool,
     clear_stop: int | None = None,
     sign: Path | None = None,
+    where: Where = HERE,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.
 
@@ -89,7 +91,7 @@ def resume_run(
         finished = not_repeated(run)
         trials = (*remade.trials, *followed(run, remade.trials, finished))
         left = [trial for trial in trials if trial.number not in finished]
-        workers = choose_workers(remade.kind, len(left), workers)
+        workers = where.check(remade.kind, left, workers)
         if sign is not None:
             rehearse_signing(sign)
         backend = open_backend(remade.kind, remade.options, left, remade.truths)
@@ -113,22 +115,24 @@ def resume_run(
             print_warning(f"{run.name}: was signed; it changes, so its signature is set aside")
         return writer
 
-    session = Session(
-        remade.kind,
-        backend,
-        trials,
-        remade.policy,
-        workers,
-        path.with_name(f"{run.name}{PARTIAL}"),
-        yes,
-        clear_stop,
-        finished,
-        checks_step=is_checked(remade.options),
-        stages=remade.stages,
-        asked=run.stages,
-        guardian=guardian,
-    )
-    code = conduct(session, open_archive, report=report, sign=sign)
+    with where.opened(backend, left, workers) as (at_once, executor):
+        session = Session(
+            remade.kind,
+            backend,
+            trials,
+            remade.policy,
+            at_once,
+            path.with_name(f"{run.name}{PARTIAL}"),
+            yes,
+            clear_stop,
+            finished,
+            checks_step=is_checked(remade.options),
+            stages=remade.stages,
+            asked=run.stages,
+            guardian=guardian,
+            executor=executor,
+        )
+        code = conduct(session, open_archive, report=report, sign=sign)
     return worst_exit_code([code, read])
 
 

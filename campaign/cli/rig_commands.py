@@ -11,9 +11,11 @@ from campaign.cli.archive_commands import app
 from campaign.cli.output import print_line
 from campaign.cli.parameters import (
     RESULTS,
+    FormatOption,
     OpenOption,
     ResultsOption,
     SetOption,
+    TemplatesOption,
     output_option,
 )
 
@@ -72,6 +74,8 @@ def identify(
         ),
     ] = None,
     changes: SetOption = None,
+    templates: TemplatesOption = None,
+    formats: FormatOption = None,
     open_it: OpenOption = False,
 ) -> None:
     """Identify a rig from its recordings: parameters, intervals, and what they rest on."""
@@ -86,6 +90,8 @@ def identify(
         bench=output,
         page=page,
         settings=changes or (),
+        templates=templates,
+        formats=formats or (),
         open_it=open_it,
     )
     print_line(str(made))
@@ -136,13 +142,23 @@ def trend(
         Path | None,
         output_option("DIR", "Where to write it; beside the last run when absent."),
     ] = None,
+    templates: TemplatesOption = None,
+    formats: FormatOption = None,
     open_it: OpenOption = False,
 ) -> None:
     """Say which numbers of a rig drift or jump over its runs, or follow the temperature."""
     from campaign.cli.trend import trend_of_archives
 
     page, code = trend_of_archives(
-        runs, results, output, over, model or (), exchanged or (), open_it=open_it
+        runs,
+        results,
+        output,
+        over,
+        model or (),
+        exchanged or (),
+        templates,
+        formats or (),
+        open_it=open_it,
     )
     print_line(str(page))
     raise typer.Exit(code)

@@ -9,11 +9,12 @@ from pathlib import Path
 from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion, say_by_hand
+from campaign.cli.cluster import HERE, Where
 from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Prepared, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
-from campaign.cli.session import Session, choose_workers, conduct
+from campaign.cli.session import Session, conduct
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
 from campaign.errors import ExitCode
@@ -48,6 +49,7 @@ def run_protocol(
     clear_stop: int | None = None,
     remarks: Remarks | None = None,
     sign: Path | None = None,
+    where: Where = HERE,
     stopwatch: Stopwatch | None = None,
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output.
@@ -64,7 +66,7 @@ def run_protocol(
             check_limits(plan)
             check_loops(plan)
             print_warnings(plan)
-            workers = choose_workers(prepared.kind, len(plan.trials), workers)
+            workers = where.check(prepared.kind, plan.trials, workers)
             if sign is not None:
                 rehearse_signing(sign)
             backend = prepared.open_backend()
@@ -75,7 +77,10 @@ def run_protocol(
         say_by_hand(prepared.options)
     allow_motion(prepared.kind, plan.trials, plan.tests, yes=yes)
     began = datetime.now(UTC)
-    with reserved_name(results, prepared.path.stem, began) as lock:
+    with (
+        where.opened(backend, plan.trials, workers) as (at_once, executor),
+        reserved_name(results, prepared.path.stem, began) as lock,
+    ):
 
         def open_archive() -> RunWriter:
             header = run_header(prepared, request, lock.name, began, remarks or Remarks())
@@ -86,7 +91,7 @@ def run_protocol(
             backend,
             plan.trials,
             plan.policy,
-            workers,
+            at_once,
             results / f"{lock.name}{PARTIAL}",
             yes,
             clear_stop,
@@ -94,10 +99,11 @@ def run_protocol(
             timing=timing,
             stages=plan.stages,
             guardian=guardian,
+            executor=executor,
         )
         code = conduct(session, open_archive, report=report, sign=sign)
     if stopwatch is not None:
-        print_profile(stopwatch, workers)
+        print_profile(stopwatch, at_once)
     return code
 
 

@@ -29,7 +29,12 @@ from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
-from campaign.execution.executors import FEWEST_FOR_PROCESSES, PRELOADED
+from campaign.execution.executors import (
+    FEWEST_FOR_PROCESSES,
+    PRELOADED,
+    OpenExecutor,
+    process_executor,
+)
 from campaign.execution.measuring import Measuring
 from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
@@ -71,6 +76,7 @@ class Session:
         stages: what may follow from the trials.
         asked: those of the stages that were asked before, as the journal tells.
         guardian: of a program that moves a bench.
+        executor: what executes the trials; this machine's own threads or processes when None.
     """
 
     kind: BackendKind
@@ -88,6 +94,7 @@ class Session:
     stages: tuple[PlannedStage, ...] = ()
     asked: tuple[TrialsFollowed, ...] = ()
     guardian: GuardianPipes | None = None
+    executor: OpenExecutor | None = None
 
     @property
     def source(self) -> RunReader | None:
@@ -205,6 +212,9 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
     measuring = Measuring(experiments(), session.timing)
+    executor, left = session.executor, sum(1 for _ in session.left)
+    if executor is None and in_processes(session.kind, session.workers, left):
+        executor = partial(process_executor, count=session.workers)
     with progress_display(error_console()) as display:
         return run_plan(
             session.trials,
@@ -218,7 +228,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
             measure=measuring,
             finished=session.finished,
-            in_processes=in_processes(session.kind, session.workers, sum(1 for _ in session.left)),
+            executor=executor,
             stages=Stages(
                 session.stages,
                 session.trials,

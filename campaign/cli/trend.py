@@ -15,6 +15,7 @@ from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
 from campaign.identify import experiments_by_model
 from campaign.interrupts import unwinding
+from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
 from campaign.trending.page import write_trends
 from campaign.trending.tables import detectable_words, headline, not_judged, sentences
@@ -40,6 +41,8 @@ def trend_of_archives(
     over: str,
     models: Sequence[str],
     exchanged: Sequence[str] = (),
+    templates: Path | None = None,
+    formats: Sequence[str] = (),
     *,
     open_it: bool,
 ) -> tuple[Path, ExitCode]:
@@ -47,6 +50,7 @@ def trend_of_archives(
 
     exchanged: `SOURCE@RUN`, a systematic part and the first run with another piece.
     """
+    also = chosen_formats(formats)
     pieces = [_exchange(results, each) for each in exchanged]
     paths = [find_run(results, name) for name in names]
     runs = [open_run(path) for path in paths]
@@ -54,7 +58,12 @@ def trend_of_archives(
     last = trends.members[-1].run.path
     folder = output or last.with_name(f"{last.stem[:STEM]}-trend-over-{_slug(over)}")
     page = write_trends(
-        trends, folder, templates_folder(), _command(names, over, models, exchanged)
+        trends,
+        folder,
+        templates_folder(),
+        _command(names, over, models, exchanged),
+        templates,
+        also,
     )
     _tell(trends)
     for member in trends.members:

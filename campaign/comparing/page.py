@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from campaign.axis_kind import speaking_of, words_here
-from campaign.comparing.comparison import Against, Comparison
+from campaign.comparing.comparison import Against, Comparison, Side
 from campaign.comparing.judging import Pair
 from campaign.comparing.overlays import Letters, overlays
 from campaign.comparing.pairing import PairedTest
@@ -26,159 +26,192 @@ from campaign.comparing.tables import (
 )
 from campaign.estimation.family import RATE
 from campaign.references.judged import Verdict
+from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import refuse_other, write_page
+from campaign.report.formats.interface import Format
+from campaign.report.page.article import Article, Part, damage_told, problems_part
 from campaign.report.page.changes import changes_figure
-from campaign.report.page.folder import Download, Folder, ShownFigure, ShownTable
+from campaign.report.page.folder import Folder, ShownFigure
 from campaign.report.page.making import Making
-from campaign.report.page.packaged import fill_packaged
-from campaign.report.palette import variables
-from campaign.result import Figure, Table
+from campaign.report.page.pieces import Files, Folded, Items, Paragraph, Piece
+from campaign.result import Figure
 
-PAGE = "comparison.html"
+NAME = "comparison"
 UNTOLD = ("test", "quantity", "conditions", "p")
 """Columns that a test's own tables leave to the table of all pairs."""
 HEADLINES = 12
 """Most declared differences that are told on top of the page."""
 
 
-@dataclass(frozen=True)
-class ShownTest:
-    """One test of the reference beside its partner.
-
-    Attributes:
-        title: of the reference's test, with the other's name where that differs.
-        judged, rest: pairs that were judged, and those that were not; None without any.
-        not_judged: why, with how many.
-        cancelled: sources of systematic parts that cancel.
-        notes: figures that cannot be laid over each other.
-    """
-
-    anchor: str
-    title: str
-    judged: ShownTable | None
-    rest: ShownTable | None
-    not_judged: tuple[str, ...]
-    cancelled: tuple[str, ...]
-    figures: tuple[ShownFigure, ...]
-    notes: tuple[str, ...]
+def write_comparison(
+    comparison: Comparison,
+    output: Path,
+    packaged_templates: Path,
+    templates: Path | None = None,
+    formats: Sequence[Format] = (),
+) -> Path:
+    """Write the comparison into the folder `output`; the page's path. As `write_article`."""
+    make = partial(article_of, comparison)
+    return write_article(NAME, make, output, packaged_templates, templates, formats)
 
 
-@dataclass(frozen=True)
-class ShownAgainst:
-    """One run against the reference, drawn and numbered."""
-
-    against: Against
-    anchor: str
-    sentences: tuple[str, ...]
-    headlines: tuple[str, ...]
-    more: int
-    bare: tuple[str, ...]
-    picture: ShownFigure | None
-    download: Download
-    tests: tuple[ShownTest, ...]
-    alone: ShownTable | None
-    changes: ShownTable
-
-
-def write_comparison(comparison: Comparison, output: Path, packaged_templates: Path) -> Path:
-    """Write `comparison.html`, `tables/` and `figures/` into the folder `output`; the page's path.
-
-    The same archives give the same bytes. Raises UsageError when `output` is anything but a
-    comparison that was written here, or cannot be written.
-    """
-    refuse_other(output, PAGE)
-    html, files = render(comparison, packaged_templates)
-    return write_page(output, PAGE, {PAGE: html, **files})
-
-
-def render(comparison: Comparison, packaged_templates: Path) -> tuple[str, dict[str, str]]:
-    """The page's text, and the other files by name; nothing is written."""
+def article_of(comparison: Comparison) -> Article:
+    """What the comparison says."""
     making = Making()
     making.problems += [problem for side in comparison.sides for problem in side.problems]
     several = len(comparison.against) > 1
-    shown = [_against(each, comparison, making, several=several) for each in comparison.against]
-    context = {
-        "comparison": comparison,
-        "shown": shown,
-        "rate": f"{100 * RATE:g} %",
-        "problems": making.problems,
-        "colours": variables(),
-    }
-    return fill_packaged("compare.html", context, packaged_templates), making.folder.files
+    parts = [
+        part
+        for each in comparison.against
+        for part in _against(each, comparison, making, several=several)
+    ]
+    told = [damage_told(each.letter, each.damaged) for each in comparison.sides if each.damaged]
+    others = "; each of the others is compared with it" if several else ""
+    return Article(
+        name=NAME,
+        kind="Comparison",
+        command=shlex.join(["campaign", "compare", *(s.run.name for s in comparison.sides)]),
+        title=comparison.title,
+        lede=f"{comparison.sides[0].letter} is the reference{others}. Differences are the other "
+        "less the reference.",
+        facts=tuple((side.letter, tuple(_facts(side))) for side in comparison.sides),
+        parts=(
+            *problems_part("this comparison", [*told, *making.problems]),
+            *parts,
+            Part("how", "How it was judged", tuple(map(Paragraph, _how(comparison)))),
+        ),
+        folder=making.folder,
+    )
+
+
+def _facts(side: Side) -> Iterator[tuple[str, str]]:
+    header = side.run.header
+    yield "Run", side.run.name
+    yield "Title", side.title
+    yield "Started", header.created
+    yield "Status", str(side.run.status)
+    yield "Samples from", header.source or header.backend or "not stated"
+    yield "Program", header.versions.get("campaign", "not stated")
+    if header.operator:
+        yield "Operator", header.operator
+
+
+def _how(comparison: Comparison) -> Iterator[str]:
+    yield (
+        "Numbers go together that are the same quantity under the same conditions, of tests of the "
+        "same kind. Their difference has the standard error of two independent numbers, with the "
+        "degrees of freedom of Welch and Satterthwaite; half-widths of lopsided intervals add in "
+        "squares. The change in percent is in the interval exactly where the difference is."
+    )
+    yield (
+        f"All {comparison.tested} p values of this page are one family: of what is declared "
+        f"different, at most {100 * RATE:g} % is expected to be false (Benjamini and Hochberg). "
+        "Each interval is one of 95 % by itself; of the changes that are declared, the largest "
+        "tend to look larger than they are."
+    )
+    yield (
+        "A number of a single trial is not judged: its interval does not have the scatter between "
+        "trials in it. Errors that both runs share cancel, and errors of unknown size are in no "
+        "interval. A difference says nothing of its cause."
+    )
 
 
 def _against(
     against: Against, comparison: Comparison, making: Making, *, several: bool
-) -> ShownAgainst:
+) -> Iterator[Part]:
     letters = Letters(against.reference.letter, against.other.letter)
     both = (letters.reference, letters.other)
-    prefix = f"{letters.other.lower()}-" if several else ""
+    named = f"{letters.reference} and {letters.other}"
+    other = letters.other.lower()
+    prefix = f"{other}-" if several else ""
     folder = making.folder
+    picture = making.attempt(
+        "the picture of all changes",
+        lambda: changes_figure(with_names(against.pairs), folder, f"{prefix}changes"),
+    )
     table = pair_table("pairs", "All pairs", against.pairs, both)
-    declared = against.of(Verdict.DIFFERENT)
-    return ShownAgainst(
-        against=against,
-        anchor=f"against-{letters.other.lower()}",
-        sentences=tuple(sentences(against, comparison.tested)),
-        headlines=tuple(headline(pair) for pair in declared[:HEADLINES]),
-        more=max(0, len(declared) - HEADLINES),
-        bare=tuple(headline(pair) for pair in bare_differing(against)[:HEADLINES]),
-        picture=making.attempt(
-            "the picture of all changes",
-            lambda: changes_figure(with_names(against.pairs), folder, f"{prefix}changes"),
+    download = folder.table(table_csv(shorter(table, "finding")), f"{prefix}pairs")
+    yield Part(
+        f"against-{other}",
+        f"{named}: what differs",
+        (
+            Paragraph(" ".join(sentences(against, comparison.tested)), "lead"),
+            *_headlines(against),
+            *([] if picture is None else [picture]),
+            Files((("All pairs, with p values and reasons:", download),)),
         ),
-        download=folder.table(table_csv(shorter(table, "finding")), f"{prefix}pairs"),
-        tests=tuple(_tests(against, letters, prefix, making)),
-        alone=_optional(alone_table(against), f"{prefix}only-in-one", folder),
-        changes=folder.shown_table(
-            changes_table(against.changes, both), (), f"{prefix}circumstances"
+        contents=named,
+    )
+    yield from _tests(against, letters, prefix, making)
+    alone, changed = alone_table(against), changes_table(against.changes, both)
+    circumstances = folder.shown_table(changed, (), f"{prefix}circumstances")
+    yield Part(
+        f"besides-{other}",
+        f"{named}: what differs besides",
+        (
+            circumstances if against.changes else Paragraph("Nothing that the archives know of."),
+            *([] if alone is None else [folder.shown_table(alone, (), f"{prefix}only-in-one")]),
         ),
     )
 
 
-def _optional(table: Table | None, name: str, folder: Folder) -> ShownTable | None:
-    return None if table is None else folder.shown_table(table, (), name)
+def _headlines(against: Against) -> Iterator[Piece]:
+    declared = [headline(pair) for pair in against.of(Verdict.DIFFERENT)]
+    if len(declared) > HEADLINES:
+        declared[HEADLINES:] = [f"and {len(declared) - HEADLINES} more, in the tables"]
+    if declared:
+        yield Items(tuple(declared))
+    if bare := bare_differing(against)[:HEADLINES]:
+        told = "Simulated, without an interval, and not equal (nothing is declared of them):"
+        yield Paragraph(told)
+        yield Items(tuple(map(headline, bare)))
 
 
-def _tests(against: Against, letters: Letters, prefix: str, making: Making) -> Iterator[ShownTest]:
+def _tests(against: Against, letters: Letters, prefix: str, making: Making) -> Iterator[Part]:
     for place, tested in enumerate(against.pairing.tests, start=1):
         pairs = [pair for pair in against.pairs if pair.test is tested.reference]
         if not pairs:
             continue
-        name, title = tested.reference.name, tested.reference.title
-        if tested.other.name != name:
+        title = tested.reference.title
+        if tested.other.name != tested.reference.name:
             title += f" ({letters.other}: {tested.other.title})"
-        order = list(Verdict)
-        judged = [pair for pair in pairs if pair.verdict is not Verdict.NOT_JUDGED]
-        judged.sort(key=lambda pair: order.index(pair.verdict))
-        rest = [pair for pair in pairs if pair.verdict is Verdict.NOT_JUDGED]
-        both = (letters.reference, letters.other)
-        tables = (
-            shorter(pair_table("judged", "Found in both runs", judged, both), *UNTOLD, "reason"),
-            shorter(pair_table("not-judged", "Not judged", rest, both), *UNTOLD, "verdict"),
-        )
-        shown = [
-            making.folder.shown_table(table, (), f"{prefix}{name}-{table.key}")
-            if table.rows
-            else None
-            for table in tables
-        ]
-        figures, notes = _figures(tested, pairs, letters, f"{prefix}{name}", making)
-        with speaking_of(tested.reference.sides):
-            cancelled = sorted(map(words_here, against.shared.get(name, ())))
-        yield ShownTest(
-            anchor=f"{letters.other.lower()}-test-{place}",
-            title=title,
-            judged=shown[0],
-            rest=shown[1],
-            not_judged=tuple(not_judged(rest)),
-            cancelled=tuple(cancelled),
-            figures=figures,
-            notes=notes,
-        )
+        pieces = tuple(_test(tested, pairs, against, letters, prefix, making))
+        yield Part(f"{letters.other.lower()}-test-{place}", title, pieces, role="test")
+
+
+def _test(
+    tested: PairedTest,
+    pairs: Sequence[Pair],
+    against: Against,
+    letters: Letters,
+    prefix: str,
+    making: Making,
+) -> Iterator[Piece]:
+    name, folder = f"{prefix}{tested.reference.name}", making.folder
+    order = list(Verdict)
+    judged = [pair for pair in pairs if pair.verdict is not Verdict.NOT_JUDGED]
+    judged.sort(key=lambda pair: order.index(pair.verdict))
+    rest = [pair for pair in pairs if pair.verdict is Verdict.NOT_JUDGED]
+    both = (letters.reference, letters.other)
+    table = shorter(pair_table("judged", "Found in both runs", judged, both), *UNTOLD, "reason")
+    if table.rows:
+        yield folder.shown_table(table, (), f"{name}-judged")
+    table = shorter(pair_table("not-judged", "Not judged", rest, both), *UNTOLD, "verdict")
+    if table.rows:
+        why = Items(tuple(not_judged(rest)))
+        shown = folder.shown_table(table, (), f"{name}-not-judged")
+        yield Folded(f"Found in both runs and not judged ({len(rest)})", (why, shown))
+    with speaking_of(tested.reference.sides):
+        shared = against.shared.get(tested.reference.name, ())
+        cancelled = ", ".join(sorted(map(words_here, shared)))
+    if cancelled:
+        common = "Both runs have these errors in common, so that they are in no difference"
+        yield Paragraph(f"{common}: {cancelled}.", "note")
+    figures, notes = _figures(tested, pairs, letters, name, making)
+    yield from figures
+    yield from (Paragraph(note, "note") for note in notes)
 
 
 def _figures(

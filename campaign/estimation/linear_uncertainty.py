@@ -71,6 +71,17 @@ class Uncertainty:
     scatter: float
     freedom: int
 
+    @property
+    def covariance(self) -> Array | None:
+        """Of the shares, shape (k, k), scaled by `scatter`; None where one is not determined.
+
+        A parameter at its bound counts as known there.
+        """
+        if self.freedom <= 0 or any(self.open):
+            return None
+        sigma = np.nan_to_num(self.half_width) / student(self.freedom)
+        return np.asarray(np.nan_to_num(self.correlation) * np.outer(sigma, sigma))
+
 
 def uncertainty(
     jacobian: Array, residuals: Array, shares: Array, loss: Loss, *, stated: bool = True

@@ -36,7 +36,8 @@ class Settings:
     """How a search is done.
 
     Attributes:
-        starts: how many fits; the first from where the unknowns start, the others at random.
+        starts: how many fits; the first from where the unknowns start, the others at random. With
+            0 nothing is fitted, and the point where the unknowns start is linearised.
         seed: of the random starts.
         loss: how a residual counts.
         tolerance: relative change of cost or shares below which a fit has converged.
@@ -186,7 +187,7 @@ def search(objective: Objective, settings: Settings, display: Display = no_displ
     certainty: Uncertainty | None = None
     interrupted = False
     try:
-        begins = make_starts(begin, settings.starts, settings.seed)
+        begins = make_starts(begin, settings.starts, settings.seed) if settings.starts else []
         for number, each in enumerate(begins, 1):
             phase = f"start {number} of {len(begins)}"
             starts.append(fit_from(objective, each, settings, phase, display, lowest))

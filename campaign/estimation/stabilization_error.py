@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimate import Estimate
+from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.estimation.intervals import (
     exponential,
     of_positive_repeats,
@@ -37,11 +37,6 @@ IDENTICAL = 1e-12
 """The same for two values, which may be alike by chance, and for trials of one seed."""
 NO_SCATTER = Cause(
     "not scattering", "it repeats to the fifth digit: nothing scatters on this bench"
-)
-OF_ONE_TRIAL = Cause(
-    "of one trial",
-    "the interval is of that one trial; what differs from trial to trial is not in it, and "
-    "three trials alike would show it",
 )
 SHORT = Cause("record too short", "less than one cycle was recorded")
 TOO_FEW_FOR_BLOCKS = Cause("too few samples for blocks", "too few samples for {blocks} blocks")

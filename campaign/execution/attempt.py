@@ -15,6 +15,7 @@ from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
 from campaign.execution.writer import Begins, TrialWriter
+from campaign.policy import KEEP_ALL, Keeping
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.stopwatch import Work
 from campaign.trial import Trial
@@ -45,6 +46,7 @@ class Conditions:
     Attributes:
         halted: whether the run is to end.
         measure: what a recording says by itself; None: nobody looks.
+        keeping: whose samples are archived.
     """
 
     backend: Backend
@@ -52,6 +54,7 @@ class Conditions:
     halted: Callable[[], bool]
     supervision: Supervision
     measure: Measure | None = None
+    keeping: Keeping = KEEP_ALL
 
 
 def execute_once(trial: Trial, conditions: Conditions) -> Executed:
@@ -131,7 +134,8 @@ class _Attempt:
     @classmethod
     def begin(cls, trial: Trial, conditions: Conditions) -> _Attempt:
         """Open the trial's file."""
-        file, stop = conditions.writer.begin(trial), TrialStop(conditions.halted)
+        file = conditions.writer.begin(trial, conditions.keeping)
+        stop = TrialStop(conditions.halted)
         recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
         return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
 

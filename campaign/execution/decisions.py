@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from campaign.estimate import Estimate
 from campaign.policy import Policy, Rest
 from campaign.recording import Ending
 from campaign.trial import Trial
@@ -70,6 +72,19 @@ class Rests:
     def taken(self) -> None:
         """The bench has rested."""
         self._since = 0.0
+
+
+def extremes(trials: Iterable[Trial], metrics: Mapping[int, Sequence[Estimate]]) -> dict[int, str]:
+    """Trials with the smallest or the largest value of a metric of their test, and of which."""
+    found: dict[tuple[str, str], dict[int, float]] = {}
+    for trial in trials:
+        for each in metrics.get(trial.number, ()):
+            found.setdefault((trial.test, each.name), {})[trial.number] = each.value
+    told: dict[int, list[str]] = {}
+    for (_, name), values in found.items():
+        for choose, which in ((min, "smallest"), (max, "largest")):
+            told.setdefault(choose(values, key=values.__getitem__), []).append(f"{which} {name}")
+    return {number: ", ".join(which) for number, which in told.items()}
 
 
 def _times(count: int, one: str, many: str) -> str:

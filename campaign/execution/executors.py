@@ -15,16 +15,15 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Protocol
+from typing import Protocol, Self
 
 from campaign import processes
 from campaign.archive.layout.journal import Entry
-from campaign.archive.reading.measured import Measure
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.backends.interface import Backend, Timed
 from campaign.errors import ArchiveError
@@ -34,6 +33,7 @@ from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
+from campaign.policy import Keeping
 from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
 from campaign.trial import Trial
 
@@ -70,6 +70,10 @@ class BatchExecutor(Protocol):
 
     def look(self) -> None:
         """Called while nothing is heard of any batch."""
+
+
+OpenExecutor = Callable[[Conditions, PlanWriter], AbstractContextManager[BatchExecutor]]
+"""Begins to execute batches under these conditions, for the writer of the run."""
 
 
 class WorkerLostError(Exception):
@@ -146,29 +150,86 @@ def execute(
 
 
 @dataclass(frozen=True)
-class _WorkerSetup:
-    """What a worker process receives when it starts."""
+class WorkerSetup:
+    """What another process needs to execute batches."""
 
     backend: Backend
-    folder: Path
     supervision: Supervision
+    keeping: Keeping
     is_measured: bool
     is_timed: bool
 
+    @classmethod
+    def of(cls, conditions: Conditions) -> Self:
+        """The same conditions, without what only this process has."""
+        supervision = conditions.supervision
+        return cls(
+            conditions.backend,
+            replace(supervision, subscribers=(), timing=UNTIMED),
+            conditions.keeping,
+            is_measured=conditions.measure is not None,
+            is_timed=supervision.timing is not UNTIMED,
+        )
+
 
 @dataclass(frozen=True)
-class _BatchResult:
-    """What a worker process returns of a batch.
+class BatchResult:
+    """What another process returns of a batch.
 
     Attributes:
         ended: of each archived trial: number, how it ended, journal entries.
         error: what the archive raised; later trials of the batch are missing then.
         spent: time by kind of work; empty when not measured.
+        files: content of trial files by name, of a process that has not the folder of the run.
     """
 
     ended: tuple[tuple[int, Executed, tuple[Entry, ...]], ...]
     error: BaseException | None
     spent: Mapping[Work, Spent]
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+class BatchWorker:
+    """Executes batches in another process than the one that has the run's journal."""
+
+    def __init__(self, setup: WorkerSetup, stopped: Callable[[], bool]) -> None:
+        self._setup, self._stopped = setup, stopped
+        self._stopwatch = Stopwatch() if setup.is_timed else None
+        self._timing = timing = self._stopwatch or UNTIMED
+        self._measure = Measuring(experiments(), timing) if setup.is_measured else None
+        if isinstance(setup.backend, Timed):
+            setup.backend.timing = timing
+
+    def execute(
+        self, batch: Sequence[Trial], attempts: Mapping[int, int], folder: Path, *, remote: bool
+    ) -> BatchResult:
+        """Execute a batch; trial files stay in `folder`, or are returned to a `remote` parent."""
+        writer = FolderWriter(folder, attempts, self._timing)
+        supervision = replace(self._setup.supervision, timing=self._timing)
+        backend, keeping = self._setup.backend, self._setup.keeping
+        conditions = Conditions(backend, writer, self._stopped, supervision, self._measure, keeping)
+        ended: list[tuple[int, Executed, tuple[Entry, ...]]] = []
+
+        def on_end(trial: Trial, executed: Executed) -> None:
+            if executed.bug is not None:
+                executed = replace(executed, bug=_picklable(executed.bug))
+            ended.append((trial.number, executed, writer.take_entries()))
+
+        error: BaseException | None = None
+        files: Mapping[str, bytes] = {}
+        try:
+            execute(batch, conditions, on_end)
+        except BaseException as raised:  # noqa: BLE001 - trials that ended before are reported
+            error = _picklable(raised)
+        try:
+            if remote:
+                files = writer.take_files()
+            else:
+                writer.publish()
+        except ArchiveError as raised:
+            ended, error = [], error or raised
+        spent = self._stopwatch.take() if self._stopwatch else {}
+        return BatchResult(tuple(ended), error, spent, files)
 
 
 class ProcessExecutor:
@@ -179,13 +240,7 @@ class ProcessExecutor:
         self._count = count
         self._writer = writer
         self._timing = conditions.supervision.timing
-        setup = _WorkerSetup(
-            conditions.backend,
-            writer.folder.absolute(),
-            replace(conditions.supervision, subscribers=(), timing=UNTIMED),
-            is_measured=conditions.measure is not None,
-            is_timed=self._timing is not UNTIMED,
-        )
+        setup = WorkerSetup.of(conditions), writer.folder.absolute()
         self._setup = pickle.dumps(setup, pickle.HIGHEST_PROTOCOL)
         self._context = processes.process_context(PRELOADED)
         # No Event: a worker that dies while it asks would keep the lock of one for ever.
@@ -255,7 +310,7 @@ class ProcessExecutor:
         batch: Sequence[Trial],
         on_end: OnEnd,
         future: Future[None],
-        result: Future[_BatchResult],
+        result: Future[BatchResult],
     ) -> None:
         """Called in a thread of the pool."""
         try:
@@ -292,7 +347,7 @@ class ProcessExecutor:
 
 @contextmanager
 def process_executor(
-    count: int, conditions: Conditions, writer: PlanWriter
+    conditions: Conditions, writer: PlanWriter, *, count: int
 ) -> Iterator[ProcessExecutor]:
     """An executor with `count` processes, which start with the first batch."""
     executor = ProcessExecutor(count, conditions, writer)
@@ -306,51 +361,22 @@ def process_executor(
 
 # State of a worker process
 
-_setup: _WorkerSetup | None = None
-_stopped: ctypes.c_bool | None = None
-_measure: Measure | None = None
-_stopwatch: Stopwatch | None = None
+_worker: BatchWorker | None = None
+_folder: Path | None = None
 
 
 def _initialize(pickled: bytes, stopped: ctypes.c_bool) -> None:
-    global _setup, _stopped, _measure, _stopwatch
+    global _worker, _folder
     processes.initialize_worker()
-    setup: _WorkerSetup = pickle.loads(pickled)  # noqa: S301 - from the parent process
-    _setup, _stopped = setup, stopped
-    _stopwatch = Stopwatch() if setup.is_timed else None
-    timing = _stopwatch or UNTIMED
-    _measure = Measuring(experiments(), timing) if setup.is_measured else None
-    if isinstance(setup.backend, Timed):
-        setup.backend.timing = timing
+    setup, _folder = pickle.loads(pickled)  # noqa: S301 - from the parent process
+    _worker = BatchWorker(setup, lambda: bool(stopped.value))
 
 
-def _execute_batch(batch: Sequence[Trial], attempts: Mapping[int, int]) -> _BatchResult:
+def _execute_batch(batch: Sequence[Trial], attempts: Mapping[int, int]) -> BatchResult:
     """Execute a batch in a worker process."""
-    if _setup is None or _stopped is None:
+    if _worker is None or _folder is None:
         raise RuntimeError("the worker process was not initialized")
-    stopped, timing = _stopped, _stopwatch or UNTIMED
-    writer = FolderWriter(_setup.folder, attempts, timing)
-    supervision = replace(_setup.supervision, timing=timing)
-    conditions = Conditions(
-        _setup.backend, writer, lambda: bool(stopped.value), supervision, _measure
-    )
-    ended: list[tuple[int, Executed, tuple[Entry, ...]]] = []
-
-    def on_end(trial: Trial, executed: Executed) -> None:
-        if executed.bug is not None:
-            executed = replace(executed, bug=_picklable(executed.bug))
-        ended.append((trial.number, executed, writer.take_entries()))
-
-    error: BaseException | None = None
-    try:
-        execute(batch, conditions, on_end)
-    except BaseException as raised:  # noqa: BLE001 - trials that ended before are reported
-        error = _picklable(raised)
-    try:
-        writer.publish()
-    except ArchiveError as raised:
-        ended, error = [], error or raised
-    return _BatchResult(tuple(ended), error, _stopwatch.take() if _stopwatch else {})
+    return _worker.execute(batch, attempts, _folder, remote=False)
 
 
 def _picklable(error: BaseException) -> BaseException:

@@ -141,10 +141,11 @@ def main(command: list[str]) -> int:
         if now - looked > 3 * TURN:
             guardian.slept(now)
         looked = now
+        # Signals first: what the program told before one of them is then among what is read next.
+        sent = [number for number in _read(heard) if number != signal.SIGCHLD]
         moved, signals = guardian.moves, guardian.feed(_read(told), now)
         if moved and not guardian.moves:
             os.close(back)  # the end of what is handed on
-        sent = [number for number in _read(heard) if number != signal.SIGCHLD]
         if guardian.moves:
             signals += b"".join(guardian.hear(OURS + number, now) for number in sent)
             with suppress(OSError):

@@ -132,6 +132,14 @@ class Ledger:
         self._worth_left -= self._worth(trial)
         self._tell((trial, ending))
 
+    def take_back(self, trial: Trial) -> None:
+        """A trial that completed is executed once more, and counts when it has ended again."""
+        self._outcomes[Outcome.COMPLETED] -= 1
+        self._bench_time -= trial.task.duration
+        self._bench_time_left += trial.task.duration
+        self._worth_done -= self._worth(trial)
+        self._worth_left += self._worth(trial)
+
     def repeat(self, trial: Trial, ending: Ending) -> None:
         """An attempt has ended, and the trial will be executed again."""
         self._running.pop(trial.number, None)

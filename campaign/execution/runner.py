@@ -17,7 +17,7 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.reading.measured import Measure
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
-from campaign.execution.executors import process_executor, thread_executor
+from campaign.execution.executors import OpenExecutor, thread_executor
 from campaign.execution.operator_prompts import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
@@ -27,7 +27,7 @@ from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
-from campaign.policy import Policy
+from campaign.policy import Keeping, Policy
 from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
 from campaign.trial import Trial
@@ -50,7 +50,7 @@ def run_plan(
     measure: Measure | None = None,
     finished: Mapping[int, Outcome] = _NOTHING,
     stages: Stages | None = None,
-    in_processes: bool = False,
+    executor: OpenExecutor | None = None,
 ) -> RunOutcome:
     """Execute `trials` in order on a connected backend and seal the archive.
 
@@ -65,8 +65,7 @@ def run_plan(
         measure: what a recording says by itself, to be archived with it; absent: nothing is.
         finished: trials of the plan that are not to be executed again, by number.
         stages: what may follow from the trials.
-        in_processes: whether workers are processes; for a picklable backend and the experiments of
-            this installation.
+        executor: what executes batches; absent: so many threads of this process.
 
     Raises:
         NotSafeError: in place of any of the others, when the bench was not seen safe either.
@@ -76,10 +75,11 @@ def run_plan(
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = Ended(kept=writer.folder)
-    stages = stages or no_stages()
+    stages, policy = stages or no_stages(), policy or Policy()
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
     sequence = TrialSequence(
+        trials,
         waiting,
         backend,
         writer,
@@ -87,22 +87,21 @@ def run_plan(
         ledger,
         ended,
         stop,
-        policy or Policy(),
+        policy,
         attendance,
         stages,
         live=supervision.live,
     )
-    conditions = Conditions(backend, writer, sequence.halted, supervision, measure)
-    executor = (
-        process_executor(workers, conditions, writer)
-        if in_processes
-        else thread_executor(workers, conditions)
+    keeping = Keeping.of(policy.keep, trials)
+    conditions = Conditions(backend, writer, sequence.halted, supervision, measure, keeping)
+    opened = (
+        thread_executor(workers, conditions) if executor is None else executor(conditions, writer)
     )
     with unsafe_first(ended):
         with (
             supervision.timing.span(Work.WAITING),
             safe_afterwards(backend, ended),
-            executor as at_work,
+            opened as at_work,
         ):
             sequence.execute(at_work)
         sequence.outside.look()  # it may have come after the last trial

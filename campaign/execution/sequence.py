@@ -6,7 +6,7 @@ Decisions are made in one thread, between trials; only the trials themselves are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, wait
 from queue import Empty, SimpleQueue
 
@@ -14,7 +14,7 @@ from campaign.archive.layout.journal import Entry
 from campaign.backends.interface import Backend
 from campaign.execution.attempt import Executed
 from campaign.execution.batches import Batches
-from campaign.execution.decisions import Responses, Rests
+from campaign.execution.decisions import Responses, Rests, extremes
 from campaign.execution.executors import BatchExecutor, WorkerLostError
 from campaign.execution.operator_prompts import Attendance, SetUp
 from campaign.execution.outside import OutsideWatch
@@ -46,6 +46,7 @@ class TrialSequence:
     def __init__(
         self,
         trials: Sequence[Trial],
+        waiting: Iterable[Trial],
         backend: Backend,
         writer: PlanWriter,
         workers: int,
@@ -59,7 +60,7 @@ class TrialSequence:
         live: bool,
     ) -> None:
         self._stages = stages
-        self._batches = Batches(trials, backend, workers, live=live)
+        self._batches = Batches(waiting, backend, workers, live=live)
         self._running: dict[Future[None], Sequence[Trial]] = {}
         self._under_way: dict[int, Trial] = {}
         self._news: SimpleQueue[_Ended | Future[None]] = SimpleQueue()  # trials that ended, batches
@@ -70,6 +71,9 @@ class TrialSequence:
         self._stop = stop
         self.outside = OutsideWatch(backend, stop, self._stopped_outside)
         self._attendance = attendance
+        self._policy = policy
+        self._trials = trials
+        self._kept_extremes = False
         self._responses = Responses(policy)
         self._rests = Rests(policy.rest)
         self._set_up = SetUp(attendance.operator, writer)
@@ -141,6 +145,7 @@ class TrialSequence:
     def _next(self) -> Sequence[Trial]:
         """The trials to begin now; empty when there are none, or not before others have ended."""
         self._follow()
+        self._keep_extremes()
         trial = self._batches.first
         if trial is None or self._is_over():
             return ()
@@ -167,6 +172,20 @@ class TrialSequence:
             self._ledger.add(trials)
             for remark in remarks:
                 self._ledger.remark(remark)
+
+    def _keep_extremes(self) -> None:
+        """Once all have ended: the trials of extreme metrics are executed again, for samples."""
+        waits = self._batches.first is not None or self._running or self._is_over()
+        if self._policy.keep != "extremes" or waits or self._kept_extremes:
+            return
+        self._kept_extremes = True
+        found = extremes(self._trials, self._writer.metrics())
+        again = [trial for trial in self._trials if trial.number in found]
+        again = [trial for trial in again if self._writer.attempt(trial) == 2]
+        for trial in again:
+            self._writer.decision("keep samples", found[trial.number], trial.number)
+            self._ledger.take_back(trial)
+        self._batches.insert(again)
 
     def _is_over(self) -> bool:
         """As `halted`, between trials, when the bench can be asked as well."""

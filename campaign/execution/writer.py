@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import Entry
 from campaign.archive.reading.measured import Measure
+from campaign.estimate import Estimate
+from campaign.policy import KEEP_ALL, Keeping
 from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState
 from campaign.trial import Trial
 
@@ -37,7 +40,7 @@ class TrialWriter(Protocol):
 class Begins(Protocol):
     """Opens a file for each attempt at a trial."""
 
-    def begin(self, trial: Trial) -> TrialWriter:
+    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
         """Open the next attempt at a trial for its samples."""
 
 
@@ -50,6 +53,9 @@ class PlanWriter(Begins, Protocol):
 
     def attempt(self, trial: Trial) -> int:
         """Which one that is, from 1."""
+
+    def metrics(self) -> Mapping[int, Sequence[Estimate]]:
+        """What was measured in the last finished attempt at each trial, by number."""
 
     def note(self, *entries: Entry) -> None:
         """Keep what processes tell of trials that they have written. Raises ArchiveError."""

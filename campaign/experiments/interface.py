@@ -51,6 +51,10 @@ class TrialData(Protocol):
     def estimates(self) -> Sequence[Estimate]:
         """What `Experiment.measure` found when it was executed; nothing if nobody looked then."""
 
+    @property
+    def not_kept(self) -> str:
+        """Why it has no samples though it recorded some; empty when it has."""
+
 
 def no_progress(text: str) -> None:
     """Reports progress to nobody."""
@@ -95,6 +99,11 @@ class TestData:
             for data in self.trials
             if data.ending.outcome == "completed" and data.trial.role == "measurement"
         )
+
+
+def with_samples(trials: Iterable[TrialData]) -> list[TrialData]:
+    """Those whose samples are archived: time histories are drawn of them."""
+    return [data for data in trials if not data.not_kept]
 
 
 @dataclass(frozen=True)
@@ -171,6 +180,8 @@ class Experiment:
             are archived with the trial, and `metrics` gives them to `analyse`. Raises ValueError
             with a message for the user when the recording holds none. Whatever it raises costs
             that trial only: the others are analysed, and a note says which one is left out.
+        needs_samples: whether `analyse` finds less in metrics alone. Where it does not, and draws
+            time histories of `with_samples` only, a protocol may leave samples out (`keep`).
         fit: options that a test does not write, as they suit its bench. Handed the options with
             their plain defaults (`model_fields_set` has those written) and the bench; what it does
             not name keeps its default.
@@ -204,6 +215,7 @@ class Experiment:
     trials: Callable[[Any, Bench], Iterable[TrialRequest]]
     analyse: Callable[[TestData], Result]
     measure: Callable[[TrialData], Sequence[Estimate]] | None = None
+    needs_samples: bool = True
     fit: Callable[[Any, Bench], Mapping[str, Chosen]] | None = None
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
@@ -275,7 +287,9 @@ def _result_of(experiment: Experiment, data: TestData) -> Result:
         own = data.model is None or item.trial.kind == experiment.name
         if own and item.trial.can_use and item.ending.outcome == "completed":
             lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
-    without = (f"Without {name}: no {lost_without(experiment, name)}." for name in lacking)
+    without = [f"Without {name}: no {lost_without(experiment, name)}." for name in lacking]
+    if gone := sum(bool(item.not_kept) for item in data.trials):
+        without.append(f"Samples of {gone} of {len(data.trials)} trials were not kept.")
     notes = (*result.notes, *notes_on(doubts, len(data.trials)), *without)
     return replace(result, notes=notes, doubts=doubts)
 
@@ -425,6 +439,7 @@ class _Instead:
         self.ending = data.ending
         self.recording = data.recording
         self.channel_names = data.channel_names
+        self.not_kept = data.not_kept
         self.estimates = data.estimates if estimates is None else estimates
 
 

@@ -217,6 +217,7 @@ EXPERIMENT = Experiment(
     trials=map_trials,
     analyse=_analyse,
     measure=measure,
+    needs_samples=False,
     fit=fitting.velocity_map,
     warnings=map_warnings,
     requires=REQUIRED,

@@ -59,6 +59,7 @@ EXPERIMENT = Experiment(
     trials=trials,
     analyse=_analyse,
     measure=measure,
+    needs_samples=False,
     fit=fitting.velocity_map,
     warnings=map_warnings,
     requires=REQUIRED,

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from campaign import __version__
 from campaign.access.estimates import row_of
-from campaign.access.plain_json import json_text
 from campaign.access.sentences import remarks, sentence
 from campaign.axis_kind import speaking_of, words_here
-from campaign.estimate import Estimate
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
 from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
+from campaign.report.article import write_article
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw, series_of
-from campaign.report.output import refuse_other, write_page
-from campaign.report.page.folder import ShownFigure, ShownTable
+from campaign.report.formats.interface import Format
+from campaign.report.page.article import Article, Part, problems_part
+from campaign.report.page.folder import ShownFigure
 from campaign.report.page.making import Making
-from campaign.report.page.packaged import fill_packaged
-from campaign.report.palette import Look, looks_of_page, variables
+from campaign.report.page.pieces import Items, Paragraph, Piece
+from campaign.report.palette import Look, looks_of_page
 from campaign.result import Figure, Result
 from campaign.text import words
 
@@ -43,21 +43,8 @@ CURES = {
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
 """What makes a systematic part smaller, by its source."""
-PAGE, DATA = "identification.html", "identification.json"
-
-
-@dataclass(frozen=True)
-class ShownSection:
-    """One method on the page."""
-
-    anchor: str
-    section: Section
-    warnings: tuple[str, ...]
-    conclusions: tuple[str, ...]
-    remarks: tuple[str, ...]
-    figures: tuple[ShownFigure, ...]
-    tables: tuple[ShownTable, ...]
-    changes: ShownTable | None
+NAME = "identification"
+PAGE = f"{NAME}.html"
 
 
 @dataclass
@@ -67,38 +54,83 @@ class _Making(Making):
 
 
 def write_identification(
-    found: Identification, output: Path, packaged_templates: Path, command: str, bench: str = ""
+    found: Identification,
+    output: Path,
+    packaged_templates: Path,
+    command: str,
+    bench: str = "",
+    templates: Path | None = None,
+    formats: Sequence[Format] = (),
 ) -> Path:
-    """Write the page, its data, tables and figures into the folder `output`; the page's path.
+    """Write the identification into the folder `output`; the page's path. As `write_article`.
 
-    bench: name of the bench file that was written; "" for none. The same archives give the same
-    bytes. Raises UsageError when `output` is something else than an identification.
+    bench: name of the bench file that was written; "" for none.
     """
-    refuse_other(output, PAGE)
+    make = partial(article_of, found, command, bench)
+    return write_article(NAME, make, output, packaged_templates, templates, formats)
+
+
+def article_of(found: Identification, command: str, bench: str = "") -> Article:
+    """What the identification says."""
     making = _Making(looks=_looks(found))
+    chosen, header = found.chosen, found.chosen.run.header
     with speaking_of(found.bench.sides):
-        parameters = parameters_table(found.sections)
-        first = making.folder.shown_table(parameters, (), "parameters")  # as on the page
-        shown = [
-            _section(each, each.result, found, making)
-            for each in found.sections
-            if each.result is not None
-        ]
-        context = {
-            "found": found,
-            "parameters": first,
-            "shown": shown,
-            "refused": [each for each in found.sections if each.result is None],
-            "next": next_measurement(found),
-            "problems": making.problems,
-            "command": command,
-            "bench_file": bench,
-            "version": __version__,
-            "colours": variables(),
-        }
-        html = fill_packaged("identify.html", context, packaged_templates)
-    files = {PAGE: html, DATA: as_json(found, command), **making.folder.files}
-    return write_page(output, PAGE, files)
+        parts = tuple(_parts(found, making))
+    lede = f"Parameters of the rig from {chosen.name}"
+    if found.validation:
+        lede += f", held against {found.validation.name}, to which nothing was fitted"
+    if found.compared:
+        lede += f", and compared with {found.compared.name}"
+    facts = (
+        ("Run", chosen.name),
+        ("Title", header.title),
+        ("Samples from", header.source or header.backend or "not stated"),
+        ("Digest", chosen.run.identity),
+        ("Program", f"campaign {__version__}"),
+        *([("Bench file", bench)] if bench else []),
+    )
+    return Article(
+        name=NAME,
+        kind="Identification",
+        command=command,
+        title=f"{found.bench.name}, {found.bench.axis.name}",
+        lede=f"{lede}.",
+        facts=(("", facts),),
+        parts=(*problems_part("this page", making.problems), *parts),
+        folder=making.folder,
+        content=content_of(found),
+    )
+
+
+def _parts(found: Identification, making: _Making) -> Iterator[Part]:
+    shown = [(each, each.result) for each in found.sections if each.result is not None]
+    yield Part("found", "What was found", tuple(_found(found, shown, making)))
+    for section, result in shown:
+        summary = section.model.summary
+        anchor = f"method-{section.model.name.replace('_', '-')}"
+        pieces = tuple(_section(section, result, found, making))
+        yield Part(anchor, f"{summary[:1].upper()}{summary[1:]}", pieces, role="test")
+    refused = [each for each in found.sections if each.result is None]
+    if refused:
+        told = (f"{e.model.name} ({e.model.summary}): {e.problem.rstrip('.')}." for e in refused)
+        yield Part("refused", "What these recordings do not tell", (Items(tuple(told)),))
+
+
+def _found(
+    found: Identification, shown: Sequence[tuple[Section, Result]], making: _Making
+) -> Iterator[Piece]:
+    for section, result in shown:
+        for each in section.identified.warnings:
+            yield Paragraph(f"{section.model.name}: {each.text}.", "warning")
+        yield from (Paragraph(sentence(each), "lead") for each in result.conclusions)
+        yield from (Paragraph(text, "note") for text in remarks(result.conclusions))
+    if shown:
+        table = making.folder.shown_table(parameters_table(found.sections), (), "parameters")
+        yield replace(table, stacked=True)
+    else:
+        yield Paragraph("Nothing: no method could use these recordings.", "lead")
+    if advice := next_measurement(found):
+        yield Paragraph(f"To measure next: {advice}")
 
 
 def next_measurement(found: Identification) -> str:
@@ -133,28 +165,20 @@ def _advice(parameter: Parameter) -> str:
 
 def _section(
     section: Section, result: Result, found: Identification, making: _Making
-) -> ShownSection:
-    name = section.model.name
-    folder = making.folder
-    figures = [
-        making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
-        for figure in result.figures
-    ]
-    tables = [folder.shown_table(each, (), f"{name}-{each.key}") for each in result.tables]
-    changes = None
+) -> Iterator[Piece]:
+    name, folder = section.model.name, making.folder
+    if section.problem:
+        yield Paragraph(f"Not compared: {section.problem}.", "note")
     if section.changes and found.compared is not None:
-        table = changes_table(found.chosen.name, found.compared.name, section)
-        changes = folder.shown_table(table, (), table.key)
-    return ShownSection(
-        anchor=f"method-{name.replace('_', '-')}",
-        section=section,
-        warnings=tuple(f"{name}: {each.text}" for each in section.identified.warnings),
-        conclusions=tuple(sentence(each) for each in result.conclusions),
-        remarks=tuple(remarks(result.conclusions)),
-        figures=tuple(filter(None, figures)),
-        tables=tuple(tables),
-        changes=changes,
-    )
+        changes = changes_table(found.chosen.name, found.compared.name, section)
+        yield folder.shown_table(changes, (), changes.key)
+    for figure in result.figures:
+        drawn = making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
+        if drawn is not None:
+            yield drawn
+    yield from (folder.shown_table(each, (), f"{name}-{each.key}") for each in result.tables)
+    if result.notes:
+        yield Items(result.notes)
 
 
 def _looks(found: Identification) -> Mapping[str, Look]:
@@ -171,12 +195,9 @@ def _drawn(figure: Figure, name: str, making: _Making) -> ShownFigure:
     return making.folder.figure(figure, drawn, (), f"{name}-{figure.key}", trials=figure.trials)
 
 
-def as_json(found: Identification, command: str) -> str:
+def content_of(found: Identification) -> dict[str, Any]:
     """Every parameter with its interval and origin, and what it came from, for machines."""
-    tree = {
-        "schema": 1,
-        "program": f"campaign {__version__}",
-        "command": command,
+    return {
         "run": found.chosen.name,
         "digest": found.chosen.run.identity,
         "validation": found.validation.name if found.validation else None,
@@ -185,7 +206,6 @@ def as_json(found: Identification, command: str) -> str:
         "methods": [_method_tree(each) for each in found.sections],
         "next": next_measurement(found),
     }
-    return json_text(tree)
 
 
 def _method_tree(section: Section) -> dict[str, Any]:
@@ -206,14 +226,6 @@ def _method_tree(section: Section) -> dict[str, Any]:
         "correlations": [
             [*pair, share] for pair, share in section.identified.correlations.items()
         ],
-        "tables": {
-            table.key: [
-                {name: row_of(cell) if isinstance(cell, Estimate) else cell
-                 for name, cell in row.items()}
-                for row in table.rows
-            ]
-            for table in section.result.tables
-        },
         "notes": list(section.result.notes),
         "warnings": [
             {"code": each.code, "text": each.text, "values": dict(each.values)}

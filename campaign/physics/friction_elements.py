@@ -87,9 +87,12 @@ class Interface:
 
     @classmethod
     def of(
-        cls, options: FrictionOptions, gain: float, bench: CompleteBench, solved: bool
+        cls, options: FrictionOptions, gain: float, bench: CompleteBench, solved: bool, step: float
     ) -> Interface:
-        """`solved`: by the engine, if the model is dry; else its step function says all."""
+        """`solved`: by the engine, if the model is dry; else its step function says all.
+
+        step: s, over which it is asked.
+        """
         model = friction_models()[options.model]  # type: ignore[attr-defined]
         torque, rate = at_load(options, bench)
         ripple = options.ripple
@@ -100,7 +103,7 @@ class Interface:
         return cls(
             step=model.step if model.step_for is None else model.step_for(options),
             parameters=parameters,
-            state_size=model.state_size(options),
+            state_size=model.state_size(options, step),
             torque=torque * gain,
             rate=rate,
             viscous=gain * viscous_at_load(options, bench),

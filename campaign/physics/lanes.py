@@ -99,6 +99,7 @@ class Lane:
         compensator = make_compensator(stated, task.compensation)
         loop = _loop(bench, task, compensator, grid, stated)
         moves = task.mode != "prescribed"
+        solved, asked_over = moves and not grid.per_control, grid.step * max(1, grid.per_control)
         return cls(
             bench=bench,
             stated=stated,
@@ -108,9 +109,9 @@ class Lane:
             compensator=compensator,
             loop=loop,
             inputs=_inputs(task, grid),
-            friction=_plant(bench, moves=moves),
+            friction=_plant(bench, grid.step, moves=moves),
             compensation=tuple(
-                Interface.of(each, gain, bench, moves and not grid.per_control and jumps(each))
+                Interface.of(each, gain, bench, solved and jumps(each), asked_over)
                 for each, gain in compensator.friction
             ),
         )
@@ -186,7 +187,7 @@ class Lanes:
         """A single prescribed motion before its first step, with other friction."""
         (trial,) = self.trials
         bench = as_it_is(trial.bench.with_friction(friction), trial.seed)
-        lane = replace(trial, bench=bench, friction=_plant(bench, moves=False))
+        lane = replace(trial, bench=bench, friction=_plant(bench, trial.grid.step, moves=False))
         return replace(
             self,
             trials=(lane,),
@@ -241,9 +242,9 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
     )
 
 
-def _plant(bench: CompleteBench, *, moves: bool) -> tuple[Interface, ...]:
+def _plant(bench: CompleteBench, step: float, *, moves: bool) -> tuple[Interface, ...]:
     """Its friction; `moves`: there is a plant, so that the engine solves for what is dry."""
-    return tuple(Interface.of(each, 1.0, bench, moves) for each in bench.friction.values())
+    return tuple(Interface.of(each, 1.0, bench, moves, step) for each in bench.friction.values())
 
 
 def _loop(

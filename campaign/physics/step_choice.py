@@ -32,9 +32,10 @@ fits the benches below better than either. Each limit is a constant times a time
     JUMPS tau_p                   where the friction or its compensation jumps, and the loop answers
     FED tau_p                     where both do: what is left is the difference of two jumps
     DRY                           where friction is dry
+    OWN times `fastest`           of each model that states a time of its own
 
-The last three are for dry friction, bristles or not: what compensates it passes its jumps on to the
-fast poles, which a step meets by their mean and first moment alone. Against the event-switched
+JUMPS, FED and DRY are for dry friction, bristles or not: what compensates it passes its jumps on to
+the fast poles, which a step meets by their mean and first moment alone. Against the event-switched
 reference (benchmarks/dry_friction.py) the largest error of a channel of the thesis' loop is then
 2.7e-4; at 1 ms it was 1.5e-3, and 2.7e-3 behind the observer. Against the engine itself at 1/128
 ms, over nine curves in modes rate and torque and over five static compensations, exact and not,
@@ -79,7 +80,7 @@ LONGEST = 1e-3
 HALVINGS = 10
 """Steps are LONGEST / 2^k, k = 0 .. HALVINGS."""
 DAMPING, REVERSAL, HELD, RESTING, RINGING = 0.2, 0.05, 0.03, 0.05, 0.2
-JUMPS, FED = 1.5, 0.09
+JUMPS, FED, OWN = 1.5, 0.09, 0.25
 DRY = LONGEST / 4.0
 """s."""
 BARELY_SHAKEN = 0.1
@@ -158,7 +159,8 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
     continuous = bench.controller.sample_rate is None and task.mode in ("rate", "torque")
     compensator = make_compensator(bench, task.compensation) if continuous else Compensator()
     models = [(f"compensation.{task.compensation}", each) for each, _ in compensator.friction]
-    own = _contacts([(f"friction.{name}", each) for name, each in bench.friction.items()], bench)
+    plant = [(f"friction.{name}", each) for name, each in bench.friction.items()]
+    own = _contacts(plant, bench)
     compensating = _contacts(models, bench)
     contacts = own or compensating
     dry = [name for name, each in bench.friction.items() if is_dry(each)]
@@ -170,6 +172,7 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
         fastest = _fastest(stuck_poles(bench, task, compensator))
         share = FED if fed and dry else JUMPS
         yield _Limit(share / fastest, f"jumps of dry friction at compensation.{task.compensation}")
+    yield from _own_times(plant + models)
     if not contacts:
         return
     inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
@@ -203,6 +206,13 @@ def _limits(bench: CompleteBench, task: Task) -> Iterator[_Limit]:
         yield _Limit(RESTING * resting, f"bristle stiffness of {stiffest}")
     ringing = _ringing(poles, task.duration)
     yield _Limit(RINGING * ringing, f"ringing on the bristles of {stiffest}")
+
+
+def _own_times(friction: list[tuple[str, FrictionOptions]]) -> Iterator[_Limit]:
+    for place, options in friction:
+        model = friction_models()[options.model]  # type: ignore[attr-defined]
+        if model.fastest is not None and (fastest := model.fastest(options)) > 0.0:
+            yield _Limit(OWN * fastest, f"the fastest time of {place}")
 
 
 def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench) -> list[_Contact]:

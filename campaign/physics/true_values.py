@@ -89,7 +89,9 @@ def stribeck_parameters(bench: Bench, sign: float) -> dict[str, float]:
         sums["static_torque"] += torque * own["static_torque"]
         sums["viscous_friction"] += torque * rate * own["viscous_friction"]
         if own["static_torque"] != own["coulomb_torque"]:
-            shapes.append((own["stribeck_velocity"] / rate, own["stribeck_exponent"]))
+            # NaN, which equals nothing: of another curve than Stribeck's.
+            velocity = own.get("stribeck_velocity", math.nan)
+            shapes.append((velocity / rate, own.get("stribeck_exponent", math.nan)))
     if not bench.friction:
         return {}
     if shapes and all(_same(shape, shapes[0]) for shape in shapes):

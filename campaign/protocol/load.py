@@ -53,6 +53,7 @@ from campaign.protocol.schema import (
     split_entry,
 )
 from campaign.protocol.truth_file import Truths
+from campaign.published.calibrated import FOLDER, file_name
 from campaign.text import nearest
 
 
@@ -107,7 +108,7 @@ def load_protocol(
         sources={name: each.text for name, each in collected.sources.items()},
         overrides=tuple(overrides),
         calibration=calibration,
-        policy=Policy(faults=top.faults, rest=top.rest),
+        policy=Policy(faults=top.faults, rest=top.rest, keep=top.keep),
         check=check,
         truth_sources=loader.truths.texts,
         columns=top.columns,
@@ -283,7 +284,19 @@ class _Loader:
             self._report(*source)
             return None
         self.collected.sources[name] = source
+        if kind == "bench":
+            self._keep_calibration(source)
         return source
+
+    def _keep_calibration(self, bench: Source) -> None:
+        """Keeps the result of the bench's calibration among the sources, where one is beside it."""
+        file, name = bench.file.parent / FOLDER / bench.file.name, file_name(bench.name)
+        if not file.is_file():
+            return
+        try:
+            self.collected.sources[name] = Source(file, name, read_text(file), {})
+        except UnreadableError as error:
+            self._report(Problem(file, 1, 1, str(error)))
 
     def _toml_files(self, folder: Path) -> list[str]:
         """Those there that may be benches: a protocol that was read is none."""

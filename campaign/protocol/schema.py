@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field
 
 from campaign.options import Options, spelled
 from campaign.physics.bench import Bench
-from campaign.policy import Occasion, Policy, Response, Rest
+from campaign.policy import Keep, Occasion, Policy, Response, Rest
 from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
@@ -170,6 +170,8 @@ class ProtocolFile(Options):
     """What to do about a trial that did not run to its end: occasion to response."""
     rest: Rest | None = None
     """Pauses in which the bench cools down."""
+    keep: Keep = "all"
+    """Trials whose samples are archived: "all", "none", "failed", "extremes" or N of each test."""
     check: CheckEntry | None = None
     """A trial that is repeated to see that the bench is still the same."""
     columns: dict[str, dict[str, Any]] = {}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from campaign.physics.bench import Bench
+from campaign.published.calibrated import NOTHING, CalibrationPart
 from campaign.published.patterns import covers
 from campaign.published.provenance import NOTHING_ALTERED, Provenance
 from campaign.published.values import THESIS, Cell, Published, thesis
@@ -28,6 +29,7 @@ class Evidence:
             costs: its analysis failed, or trials are damaged.
         source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
         provenance: whether its trials ran on the bench that was described, and which failed.
+        calibration: what that of the bench leaves open of its numbers.
     """
 
     test: str
@@ -41,6 +43,13 @@ class Evidence:
     failed: bool = False
     source: str = ""
     provenance: Provenance = NOTHING_ALTERED
+    calibration: CalibrationPart = NOTHING
+
+    def is_described(self, finding: Finding) -> bool:
+        """Whether a finding is of the bench that was described, so that its calibration counts."""
+        conditions = {**self.known, **finding.conditions}
+        altered = self.provenance.why_altered(conditions)
+        return not altered and self.provenance.is_described(conditions)
 
 
 def evidence_of(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from statistics import median
 
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
@@ -25,17 +24,28 @@ MOST_FITTED_FIRST = (
 )
 NOBODY_FITTED = (Status.PREDICTED, Status.SIMULATED)
 """What a bench says of itself, whatever the document says."""
+LIMITS = (2, 5, 10, 20)
+"""Percent of the published value."""
+ROUNDING = 1e-9
+"""Share by which a deviation of just a limit may exceed it."""
 OF_THE_DOCUMENT = (Status.INCONSISTENT, Status.NOT_REPRODUCIBLE)
 """What the document itself lets nobody reproduce: shown, and not counted."""
 
 
 @dataclass(frozen=True)
 class Count:
-    """How many published values of one status were compared, and how many of them hold."""
+    """How many published values of one status were compared, and how many of them hold.
+
+    Attributes:
+        numbers: those of which a deviation in percent means something.
+        within: how many of these deviate by no more than each of `LIMITS`.
+    """
 
     status: Status
     compared: int
     good: int
+    numbers: int
+    within: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -46,14 +56,12 @@ class Headline:
         printed: how often a number is printed, and `repeats` how many of these repeat another.
         excluded: how many values, by status, the document itself lets nobody reproduce.
         counts: by status, the most fitted first; those that occur.
-        deviations: sizes in percent, increasing, of those that nobody fitted.
         missed: claims that were missed.
         not_reached: values of which only a bound was found.
         not_found: values that were tried in vain, and `not_run` those that were not tried.
     """
 
     counts: tuple[Count, ...]
-    deviations: tuple[float, ...]
     missed: tuple[Line, ...]
     not_reached: tuple[Line, ...]
     not_found: tuple[Line, ...]
@@ -66,36 +74,19 @@ class Headline:
     def compared(self) -> int:
         return sum(count.compared for count in self.counts)
 
-    @property
-    def median_deviation(self) -> float | None:
-        """Percent; None when nothing was compared that nobody fitted."""
-        return median(self.deviations) if self.deviations else None
-
-    @property
-    def worst_deviation(self) -> float | None:
-        return self.deviations[-1] if self.deviations else None
-
 
 def headline(scoreboard: Scoreboard) -> Headline:
     """Count every published value once, with the line that counts for it."""
     values = once(scoreboard.lines)
     lines = [line for line in values if line.status not in OF_THE_DOCUMENT]
     compared = [line for line in lines if is_compared(line)]
-    counts = []
-    for status in MOST_FITTED_FIRST:
-        of_status = [line for line in compared if line.status is status]
-        good = sum(line.verdict in GOOD for line in of_status)
-        if of_status:
-            counts.append(Count(status, len(of_status), good))
-    free = (line for line in compared if line.status in NOBODY_FITTED)
-    deviations = sorted(abs(line.deviation) for line in free if line.deviation is not None)
+    by_status = ((s, [line for line in compared if line.status is s]) for s in MOST_FITTED_FIRST)
 
     def with_verdict(verdict: Verdict) -> tuple[Line, ...]:
         return tuple(line for line in lines if line.verdict is verdict)
 
     return Headline(
-        tuple(counts),
-        tuple(deviations),
+        tuple(_count(status, own) for status, own in by_status if own),
         with_verdict(Verdict.MISSED),
         with_verdict(Verdict.NOT_REACHED),
         with_verdict(Verdict.NOT_FOUND),
@@ -108,6 +99,13 @@ def headline(scoreboard: Scoreboard) -> Headline:
             if (count := sum(line.status is status for line in values))
         ),
     )
+
+
+def _count(status: Status, lines: Sequence[Line]) -> Count:
+    sizes = [abs(line.deviation) for line in lines if line.deviation is not None]
+    within = tuple(sum(size <= limit * (1 + ROUNDING) for size in sizes) for limit in LIMITS)
+    good = sum(line.verdict in GOOD for line in lines)
+    return Count(status, len(lines), good, len(sizes), within)
 
 
 def is_compared(line: Line) -> bool:

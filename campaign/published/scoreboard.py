@@ -248,7 +248,11 @@ def _line(
         finding = together(findings, test.provenance.seeds) if several else findings[0]
         if not math.isfinite(finding.value):
             return None
-        value = reproduced(finding, cell.unit)
+        part, lost = None, False
+        if test.is_described(finding):
+            part = test.calibration.half_width(cell.path)
+            lost = cell.path in test.calibration.lost
+        value = reproduced(finding, cell.unit, part, lost=lost)
         draws = tuple(reproduced(each, cell.unit).value for each in findings) if several else ()
     except ValueError:  # a plug-in's odd unit
         finding = findings[0]

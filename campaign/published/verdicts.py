@@ -6,14 +6,17 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from campaign.estimate import Kind, Origin
+from campaign.estimate import OF_ONE_TRIAL, Kind, Origin
 from campaign.published.values import Cell
-from campaign.reason import NONE, Reason
+from campaign.reason import NONE, Cause, Reason
 from campaign.result import Finding
 from campaign.units import convert
 
 NARROW = 0.10
 """Half-width, as a share of the published value, up to which an interval decides something."""
+LOST = Cause(
+    "lost by calibration", "within what the calibration leaves open of its bench it is not found"
+)
 CLAIMS = ("at most", "at least")
 """Relations of published cells that say on which side of a number a value lies."""
 
@@ -41,12 +44,15 @@ class Reproduced:
     """A number that was found, in the unit of the published one.
 
     Attributes:
-        low, high: its 95 % interval, systematic parts included; None where it is open or unknown.
-            Of a bound only the side that it bounds.
+        low, high: its 95 % interval, systematic parts and what the calibration leaves open of its
+            bench included; None where it is open or unknown. Of a bound only the side that it
+            bounds. What scatters within one trial is no interval by itself.
         kind: `at least` and `at most` are bounds: `value` is where what was tried ends, `low` or
             `high` the same less what the bench's constants may be off by.
         origin: where it comes from; one that is `not determined` decides nothing.
         reason: why it has no interval, or what is not in the one that it has.
+        calibration_alone: whether the analysis gives no interval, and this one is of the
+            calibration.
     """
 
     value: float
@@ -55,6 +61,7 @@ class Reproduced:
     kind: Kind = "number"
     origin: Origin = Origin.MEASURED
     reason: Reason = NONE
+    calibration_alone: bool = False
 
     @property
     def is_determined(self) -> bool:
@@ -77,14 +84,33 @@ class Reproduced:
         return self.kind in ("at least", "at most")
 
 
-def reproduced(finding: Finding, unit: str) -> Reproduced:
-    """A finding in `unit`; ValueError when it measures something else."""
+def reproduced(
+    finding: Finding, unit: str, calibration: float | None = None, *, lost: bool = False
+) -> Reproduced:
+    """A finding in `unit`; ValueError when it measures something else.
+
+    Args:
+        calibration: half-width of the 95 % interval that the calibration of the bench leaves, in
+            `unit`; half-widths add in squares. None where nobody has worked it out.
+        lost: whether the calibration does not even say that it can be found.
+    """
     known = finding.known
     value = float(convert(finding.value, finding.unit, unit))
     low, high = (
         None if end is None else float(convert(end, finding.unit, unit)) for end in known.combined
     )
-    return Reproduced(value, low, high, known.kind, known.origin, known.reason)
+    if lost:
+        return Reproduced(value, None, None, known.kind, Origin.NOT_DETERMINED, LOST())
+    if known.kind in ("at least", "at most"):
+        return Reproduced(value, low, high, known.kind, known.origin, known.reason)
+    alone = calibration is not None and low is None and high is None
+    if calibration is not None:
+        low, high = (value, value) if alone else (low, high)
+        low = None if low is None else value - math.hypot(value - low, calibration)
+        high = None if high is None else value + math.hypot(high - value, calibration)
+    elif known.reason in OF_ONE_TRIAL:
+        low = high = None
+    return Reproduced(value, low, high, known.kind, known.origin, known.reason, alone)
 
 
 def judge(cell: Cell, found: Reproduced) -> Verdict:
@@ -98,8 +124,8 @@ def judge(cell: Cell, found: Reproduced) -> Verdict:
     low, high = found.ends
     narrow = 0.5 * (high - low) <= NARROW * abs(cell.value)
     if rounds_to_print(cell, found.value):
-        # The middle of draws that lie far apart may agree by luck, or by whoever chose them.
-        by_luck = found.kind == "quantile" and found.has_interval and not narrow
+        # What may lie far off, too, agrees by luck, or by whoever chose it.
+        by_luck = found.has_interval and not narrow
         return Verdict.UNDECIDED if by_luck else Verdict.AGREES
     if not found.has_interval or cell.relation == "rank":
         return Verdict.DIFFERS

@@ -21,6 +21,7 @@ from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
 from campaign.report.formats.as_json import report_json
 from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.outline import outline
 from campaign.report.made_before import Formats, all_formats, made_before, remember
 from campaign.report.output import replaced_folder, write_files
 from campaign.report.page.damage_notice import Notice, told_on_page
@@ -28,6 +29,7 @@ from campaign.report.page.drawings import Drawable, Key
 from campaign.report.page.folder import Folder
 from campaign.report.page.interactive import interactive
 from campaign.report.page.layout import Layout, drawn_here, lay_out
+from campaign.report.page.names import slug
 from campaign.report.page.policy import policy
 from campaign.report.page.templates import Templates
 from campaign.report.page.trial_links import trial_links
@@ -121,14 +123,18 @@ def build_report(
     pages = {"report.html": html, "report.json": report_json(report.layout), **folder.files}
     with replaced_folder(output) as new:
         write_files(new, chain(pages.items(), own_pages))
-        added = _write_formats(kinds, Written(report.layout, report.notice, new))
+        added = _write_formats(kinds, report, new)
         files = _files(new)
         remember(new, run, added, trials)
     return replace(report, files=tuple(sorted(files)), left_out=tuple(kinds.left_out))
 
 
-def _write_formats(kinds: Formats, written: Written) -> dict[str, set[str]]:
+def _write_formats(kinds: Formats, report: Report, folder: Path) -> dict[str, set[str]]:
     """The files that each format has added, by its name."""
+    layout, run = report.layout, report.layout.document.run
+    pieces = tuple(outline(layout, report.notice)) if kinds.all else ()
+    bibtex, pdfs = citation_of(run).bibtex, layout.folder.pdfs
+    written = Written("report", slug(run.header.name), pieces, folder, pdfs, bibtex)
     added: dict[str, set[str]] = {}
     for each in kinds.all:
         there = _files(written.folder)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,16 +20,6 @@ name. Whatever else is in the folder, or was changed there, is somebody's own.
 """
 EDITED = ".edited"
 """What the name of a file ends with that somebody had changed, once there is a new one."""
-
-
-def write_page(output: Path, page: str, files: Mapping[str, str]) -> Path:
-    """Write the files of a page of its own kind into the folder `output`; the page's path.
-
-    Raises UsageError when `output` is no folder of ours, or cannot be written.
-    """
-    with replaced_folder(output) as new:
-        write_files(new, files.items())
-    return output / page
 
 
 def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:

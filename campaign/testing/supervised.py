@@ -15,6 +15,7 @@ from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision
 from campaign.physics.limit_watch import WATCHED
+from campaign.policy import KEEP_ALL, Keeping
 from campaign.recording import (
     Array,
     ChannelInfo,
@@ -195,7 +196,7 @@ class _Memory:
     file: MemoryRecorder = field(default_factory=MemoryRecorder)
     folder: Path = Path("memory")
 
-    def begin(self, trial: Trial) -> _File:
+    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> _File:
         file = _File(self)
         self.file = file
         return file

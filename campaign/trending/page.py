@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from campaign import __version__
 from campaign.access.estimates import row_of
-from campaign.access.plain_json import json_text
 from campaign.axis_kind import speaking_of, words_here
 from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.estimation.trends.family import POWER
+from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawn import Drawn
 from campaign.report.drawing.figures import draw
-from campaign.report.output import refuse_other, write_page
-from campaign.report.page.folder import ShownFigure
+from campaign.report.formats.interface import Format
+from campaign.report.page.article import Article, Part, damage_told, problems_part
+from campaign.report.page.folder import Folder, ShownFigure
 from campaign.report.page.making import Making
-from campaign.report.page.packaged import fill_packaged
-from campaign.report.palette import variables
+from campaign.report.page.pieces import Files, Items, Paragraph, Piece
 from campaign.result import Figure
 from campaign.trending.figures import declared_figure, small_multiples
 from campaign.trending.tables import (
@@ -38,63 +39,141 @@ from campaign.trending.tables import (
 )
 from campaign.trending.trends import WITHIN, Followed, Trends, Verdict
 
-PAGE, DATA = "trend.html", "trend.json"
+NAME = "trend"
 HEADLINES = 20
 """Most declared numbers that are told on top, and drawn."""
 
 
-def write_trends(trends: Trends, output: Path, packaged_templates: Path, command: str) -> Path:
-    """Write the page, its data, tables and figures into the folder `output`; the page's path.
+def write_trends(
+    trends: Trends,
+    output: Path,
+    packaged_templates: Path,
+    command: str,
+    templates: Path | None = None,
+    formats: Sequence[Format] = (),
+) -> Path:
+    """Write the trends into the folder `output`; the page's path. As `write_article`."""
+    make = partial(article_of, trends, command)
+    return write_article(NAME, make, output, packaged_templates, templates, formats)
 
-    The same archives give the same bytes. Raises UsageError when `output` is something else than
-    trends.
-    """
-    refuse_other(output, PAGE)
-    html, files = render(trends, packaged_templates, command)
-    return write_page(output, PAGE, {PAGE: html, DATA: as_json(trends, command), **files})
 
-
-def render(trends: Trends, packaged_templates: Path, command: str) -> tuple[str, dict[str, str]]:
-    """The page's text, and the other files by name; nothing is written."""
+def article_of(trends: Trends, command: str) -> Article:
+    """What the trends say."""
     making = Making()
-    folder = making.folder
     making.problems += [problem for member in trends.members for problem in member.problems]
     making.problems += [problem for fitted in trends.fitted for problem in fitted.problems]
+    parts = tuple(_parts(trends, making))
+    told = [damage_told(each.name, each.damaged) for each in trends.members if each.damaged]
+    first, last = trends.members[0], trends.members[-1]
+    header = first.run.header
+    return Article(
+        name=NAME,
+        kind="Trends",
+        command=command,
+        title=title_of(trends),
+        lede="Do the rig's numbers drift, have they jumped, do they follow something? From "
+        f"{first.name} to {last.name}.",
+        facts=(
+            (
+                "",
+                (
+                    ("First run", header.created),
+                    ("Last run", last.run.header.created),
+                    ("Samples from", header.source or header.backend or "not stated"),
+                    ("Program", f"campaign {__version__}"),
+                ),
+            ),
+        ),
+        parts=(*problems_part("these runs", [*told, *making.problems]), *parts),
+        folder=making.folder,
+        content=content_of(trends),
+    )
+
+
+def _parts(trends: Trends, making: Making) -> Iterator[Part]:
+    folder = making.folder
     declared = trends.declared[:HEADLINES]
     shown = [_declared(each, trends, making, n) for n, each in enumerate(declared, start=1)]
+    headlines = [headline for headline, _ in shown]
+    if more := max(0, len(trends.declared) - HEADLINES):
+        headlines.append(f"and {more} more, in the table")
+    yield Part(
+        "changes",
+        "What changes",
+        (
+            Paragraph(" ".join(sentences(trends)), "lead"),
+            *([Items(tuple(headlines))] if headlines else []),
+            *(piece for _, pieces in shown for piece in pieces),
+        ),
+    )
     multiples = small_multiples(trends.of(Verdict.NOT_SHOWN), trends.covariate)
     small = None if multiples is None else _drawn(multiples, making)
-    every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
-    judged = [each for each in trends.followed if each.change is not None]
-    on_page = page_table(judged, trends.covariate)
+    if small is not None:
+        yield Part("rest", "What shows no trend", (small,))
+    yield Part("numbers", "All numbers", tuple(_numbers(trends, folder)))
+    runs = folder.shown_table(runs_table(trends), (), "runs")
     circumstances = circumstances_table(trends)
+    same = "Besides what they found, neighbouring runs differ in nothing that the archives know of."
+    yield Part(
+        "runs",
+        "The runs",
+        (
+            runs,
+            folder.shown_table(circumstances, (), "circumstances")
+            if circumstances.rows
+            else Paragraph(same),
+        ),
+    )
+    yield Part("how", "How it was judged", tuple(map(Paragraph, _how(trends))))
+
+
+def _numbers(trends: Trends, folder: Folder) -> Iterator[Piece]:
+    judged = [each for each in trends.followed if each.change is not None]
+    if judged:
+        yield folder.shown_table(page_table(judged, trends.covariate), (), "judged")
+    if why := tuple(not_judged(trends)):
+        yield Paragraph("Not judged, and why:")
+        yield Items(why)
+    every = followed_table("followed", "All numbers", trends.followed, trends.covariate)
+    files = (
+        (
+            "All numbers with all p values, scatter and notes:",
+            folder.table(table_csv(every), "followed"),
+        ),
+        ("All points:", folder.table(table_csv(points_table(trends)), "points")),
+    )
+    yield Files(files)
+
+
+def _how(trends: Trends) -> Iterator[str]:
+    yield (
+        "Numbers go together that are the same quantity under the same conditions, of tests of the "
+        "same kind. Each point counts with its own interval and with the scatter between runs, "
+        "which may be correlated from run to run; how large it is and how strongly correlated is "
+        "integrated over, up to a correlation of 0.9, and not estimated and then believed. "
+        "Intervals are of 95 % and hold that; of few runs they are wide."
+    )
     with speaking_of(trends.members[0].sides):
         cancelled = {words_here(source) for each in trends.followed for source in each.cancelled}
-    context = {
-        "trends": trends,
-        "title": title_of(trends),
-        "shown": shown,
-        "more": max(0, len(trends.declared) - HEADLINES),
-        "small": [small] if small else [],
-        "sentences": tuple(sentences(trends)),
-        "judged": folder.shown_table(on_page, (), "judged") if judged else None,
-        "all": folder.table(table_csv(every), "followed"),
-        "points": folder.table(table_csv(points_table(trends)), "points"),
-        "not_judged": tuple(not_judged(trends)),
-        "runs": folder.shown_table(runs_table(trends), (), "runs"),
-        "circumstances": folder.shown_table(circumstances, (), "circumstances")
-        if circumstances.rows
-        else None,
-        "damaged": [member for member in trends.members if member.damaged],
-        "cancelled": sorted(cancelled),
-        "problems": making.problems,
-        "rate": f"{100 * RATE:g} %",
-        "power": f"{100 * POWER:g} %",
-        "command": command,
-        "version": __version__,
-        "colours": variables(),
-    }
-    return fill_packaged("trend.html", context, packaged_templates), folder.files
+    if cancelled:
+        yield (
+            "All runs rest on the same value of these, which moves all points alike and is in no "
+            f"trend: {', '.join(sorted(cancelled))}."
+        )
+    if trends.covariate.ordered:
+        yield (
+            "A jump needs five runs, two on each side of it. Its p value is that of the likeliest "
+            "place times the number of places. A line and a jump are told apart where one fits at "
+            "least three times as well as the other. A drift looks like a jump to a test for "
+            "jumps, and the other way round: both are in the family."
+        )
+    yield (
+        f"All {trends.tested} p values are one family: of what is declared, at most {100 * RATE:g} "
+        "% is expected to be false (Benjamini and Hochberg). “Seen from” is the smallest effect "
+        f"that would have been declared here with a probability of {100 * POWER:g} %, at the "
+        "scatter that these runs have. Of what is only just declared, sizes tend to look larger "
+        "than they are. A trend says nothing of its cause."
+    )
 
 
 def title_of(trends: Trends) -> str:
@@ -104,24 +183,18 @@ def title_of(trends: Trends) -> str:
     return f"{rig}: {len(trends.members)} runs over {trends.covariate.name}"
 
 
-@dataclass(frozen=True)
-class ShownNumber:
-    """A declared number on the page."""
-
-    headline: str
-    caution: str
-    beside: tuple[str, ...]
-    figures: tuple[ShownFigure, ...]
-
-
-def _declared(each: Followed, trends: Trends, making: Making, place: int) -> ShownNumber:
+def _declared(
+    each: Followed, trends: Trends, making: Making, place: int
+) -> tuple[str, tuple[Piece, ...]]:
+    """A declared number: its headline, and what is shown of it."""
     told = headline(each, trends)
-    figure = declared_figure(each, trends, told, place)
+    drawn = _drawn(declared_figure(each, trends, told, place), making)
     notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
-    beside = (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps))
-    drawn = tuple(filter(None, [_drawn(figure, making)]))
-    caution = WITHIN if WITHIN in each.notes else ""
-    return ShownNumber(told, caution, tuple(filter(None, beside)), drawn)
+    beside = filter(None, (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps)))
+    caution = f"; {WITHIN}" if WITHIN in each.notes else ""
+    pieces: list[Piece] = [] if drawn is None else [drawn]
+    pieces += [Paragraph(text, "note") for text in beside]
+    return f"{told}{caution}.", tuple(pieces)
 
 
 def _drawn(figure: Figure, making: Making) -> ShownFigure | None:
@@ -131,13 +204,10 @@ def _drawn(figure: Figure, making: Making) -> ShownFigure | None:
     )
 
 
-def as_json(trends: Trends, command: str) -> str:
+def content_of(trends: Trends) -> dict[str, Any]:
     """Every number with its points and what was judged of it, for machines."""
     covariate = trends.covariate
-    tree = {
-        "schema": 1,
-        "program": f"campaign {__version__}",
-        "command": command,
+    return {
         "over": {"name": covariate.name, "unit": covariate.unit, "per": covariate.per},
         "family": {"tests": trends.tested, "rate": RATE, "level": trends.level, "power": POWER},
         "runs": [
@@ -156,7 +226,6 @@ def as_json(trends: Trends, command: str) -> str:
         "problems": [p for fitted in trends.fitted for p in fitted.problems]
         + [p for member in trends.members for p in member.problems],
     }
-    return json_text(tree)
 
 
 def _tree(each: Followed, trends: Trends) -> dict[str, Any]:

@@ -342,7 +342,7 @@ def test_samples_that_are_removed_with_an_excuse_are_told_of(sealed):
     assert found.sound
     (remark,) = found.remarks
     assert remark.trial == "trial-00002"
-    assert remark.reason == "its samples are not kept: no room; their digests are"
+    assert remark.reason == "no samples of it are kept: no room; their digests are"
 
 
 @pytest.mark.parametrize("text", ["", "nonsense", "[]", "[" * 90_000])

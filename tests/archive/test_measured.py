@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
+import numpy as np
 import pytest
 
 from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
@@ -17,6 +18,7 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.measured import Measured
 from campaign.archive.verifying.verification import verify_run
 from campaign.estimate import Estimate, Systematic
+from campaign.policy import Keeping
 from campaign.reason import Cause, Reason
 from campaign.recording import Ending, Outcome
 from tests.archive import forging
@@ -210,12 +212,28 @@ def test_without_samples_nobody_looks(tmp_path: Path, kit) -> None:
     failed = writer.begin(kit.trial(1))
     failed.finish(Ending(Outcome.FAULT, "no power"), kit.STARTED, kit.ENDED)
     assert failed.measure(measure) == ""
-    dropped = writer.begin(kit.trial(2), not_kept="a study of seeds")
+    writer.close()
+
+
+def test_samples_that_are_not_kept_are_measured_before_they_go(tmp_path: Path, kit) -> None:
+    time, block = kit.samples(9000)  # more than one chunk
+    read = []
+
+    def measure(archived: ArchivedTrial) -> Measured:
+        read.append(archived.recording())
+        return FOUND
+
+    writer = begun(tmp_path, kit)
+    dropped = writer.begin(kit.trial(1), Keeping("none"))
     dropped.start(kit.CHANNELS)
-    dropped.append(*kit.samples(500))
+    for part in (slice(0, 4000), slice(4000, 9000)):
+        dropped.append(time[part], block[:, part])
     dropped.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
     assert dropped.measure(measure) == ""
     writer.close()
+    assert np.array_equal(read[0].time, time, equal_nan=True)
+    for channel, row in zip(kit.CHANNELS, block, strict=True):
+        assert np.array_equal(read[0][channel.name], row, equal_nan=True)
 
 
 def test_nothing_is_measured_before_it_is_kept(tmp_path: Path, kit) -> None:

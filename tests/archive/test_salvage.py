@@ -16,8 +16,11 @@ import pytest
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.verifying.verification import verify_run
 from campaign.errors import ArchiveError
+from campaign.policy import Keeping
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import put_text, text_of
+
+NONE = "the protocol says keep = none"
 
 
 @pytest.fixture(scope="module")
@@ -222,14 +225,14 @@ def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit)
     """So a damaged index costs such a trial, and that is said."""
     trials = [kit.trial(number) for number in (1, 2)]
     writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], not_kept="to save room")
+    recorder = writer.begin(trials[0], Keeping("none"))
     recorder.start(kit.CHANNELS)
     recorder.append(*kit.samples(20, 1))
     recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
     kit.record(writer, trials[1], 20)
     path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     with h5py.File(path) as file:
-        assert json.loads(text_of(file, "run/not_kept/data")) == {"trial_00001": "to save room"}
+        assert json.loads(text_of(file, "run/not_kept/data")) == {"trial_00001": NONE}
     damage(path, "run/index/data", '"number":1,', '"number":7,')
     run = open_run(path)
     assert [archived.trial.number for archived in run.trials] == [2]

@@ -16,11 +16,14 @@ from campaign.archive.verifying.verification import verify_run
 from campaign.archive.writing.nexus import REQUIRED
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.errors import ArchiveError
+from campaign.policy import Keeping
 from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
 from campaign.trial import Role
 from tests.archive.forging import sha256, text_of
 
 ENDED = "2026-11-21T09:40:00Z"
+
+NONE = "the protocol says keep = none"
 
 
 def begin(results: Path, kit, count: int = 3, **fields: object) -> tuple[RunWriter, list]:
@@ -206,7 +209,7 @@ def test_without_any_samples_it_opens_nothing(tmp_path, kit):
 def test_of_samples_that_are_not_kept_the_run_says_why(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
     for trial in trials[:2]:
-        recorder = writer.begin(trial, not_kept=f"policy {trial.number}")
+        recorder = writer.begin(trial, Keeping("none"))
         recorder.start(kit.CHANNELS)
         recorder.append(*kit.samples(20))
         recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
@@ -215,7 +218,7 @@ def test_of_samples_that_are_not_kept_the_run_says_why(tmp_path, kit):
     found = texts_of(path)
     assert found["not_kept/type"] == "application/json"
     assert found["not_kept/file_name"] == "not-kept.json"
-    assert found["not_kept/data"] == '{"trial_00001":"policy 1","trial_00002":"policy 2"}'
+    assert found["not_kept/data"] == f'{{"trial_00001":"{NONE}","trial_00002":"{NONE}"}}'
     with h5py.File(path) as file:
         assert set(file) == {"run", "trial_00003"}
         assert file["run/not_kept"].attrs["NX_class"] == "NXnote"

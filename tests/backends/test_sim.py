@@ -201,6 +201,25 @@ def test_somebody_can_stop_it_between_blocks(monkeypatch: pytest.MonkeyPatch) ->
     assert len(recording.time) == 300
 
 
+def test_a_trial_is_looked_at_once_for_all_seeds_and_again_for_another_bench(monkeypatch) -> None:
+    backend, looked = SimBackend(SimOptions()), []
+    look_at = SimBackend._look_at
+
+    def noting(self: SimBackend, each: Trial) -> Any:
+        looked.append(each.seed)
+        return look_at(self, each)
+
+    monkeypatch.setattr(SimBackend, "_look_at", noting)
+    first = trial(bench(), task())
+    assert backend.refuses(first) is None
+    assert backend.refuses(first.model_copy(update={"seed": first.seed + 1})) is None
+    assert len(looked) == 1
+    other = bench(lambda tree: tree["axis"].update(inertia="80 kg m^2"))
+    for each in (trial(other, task()), trial(bench(), task(sample_rate=500.0))):
+        assert backend.refuses(each) is None
+    assert len(looked) == 3
+
+
 def test_it_refuses_what_it_cannot_execute() -> None:
     backend = SimBackend(SimOptions())
     assert backend.refuses(trial(bench(), task())) is None

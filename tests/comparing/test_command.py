@@ -40,7 +40,7 @@ def test_declared_differences_come_first_and_the_code_is_0(
 @pytest.fixture
 def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
     """No page is drawn, which takes seconds."""
-    monkeypatch.setattr(command, "write_comparison", lambda found, output, templates: output)
+    monkeypatch.setattr(command, "write_comparison", lambda found, output, *_: output)
 
 
 @pytest.mark.usefixtures("unwritten")

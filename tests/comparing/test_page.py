@@ -13,9 +13,11 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.comparing.comparison import Comparison, compare_runs
-from campaign.comparing.page import render, write_comparison
+from campaign.comparing.page import article_of, write_comparison
 from campaign.errors import UsageError
 from campaign.experiments import experiments
+from campaign.report.article import article_html
+from campaign.report.page.templates import Templates
 from campaign.resources import templates_folder
 
 Compare = Callable[..., Comparison]
@@ -40,7 +42,12 @@ class Seen(HTMLParser):
 @pytest.fixture(scope="module")
 def page(results: Path) -> tuple[str, dict[str, str]]:
     runs = [open_run(results / f"{name}.nxs") for name in ("before", "after", "again")]
-    return render(compare_runs(runs, experiments()), templates_folder())
+    return render(compare_runs(runs, experiments()))
+
+
+def render(comparison: Comparison) -> tuple[str, dict[str, str]]:
+    article = article_of(comparison)
+    return article_html(article, Templates(templates_folder(), None)), article.folder.files
 
 
 def seen(html: str) -> Seen:
@@ -149,7 +156,7 @@ def test_a_figure_that_cannot_be_drawn_costs_only_itself(pair: Comparison, monke
 
     monkeypatch.setattr("campaign.comparing.page.changes_figure", broken)
     monkeypatch.setattr("campaign.comparing.page.draw", lambda figure: "<svg></svg>")
-    html, files = render(pair, templates_folder())
+    html, files = render(pair)
     assert "the picture of all changes cannot be shown: ValueError: no ink" in html
     assert "tables/pairs.csv" in files
 
@@ -158,5 +165,5 @@ def test_a_test_without_result_is_a_problem_on_the_page(pair: Comparison, monkey
     monkeypatch.setattr("campaign.comparing.page.draw", lambda figure: "<svg></svg>")
     side = pair.sides[1]
     broken = replace(side, tests=(replace(side.tests[0], problem="the analysis failed"),))
-    html, _ = render(replace(pair, sides=(pair.sides[0], broken)), templates_folder())
+    html, _ = render(replace(pair, sides=(pair.sides[0], broken)))
     assert "B: map: the analysis failed" in html

@@ -128,6 +128,7 @@ class MemoryTrialData:
     ending: Ending
     samples: Recording
     estimates: tuple[Estimate, ...] = ()
+    not_kept: str = ""
 
     def recording(self) -> Recording:
         return self.samples
@@ -149,6 +150,7 @@ class MemoryArchive:
     lock: threading.Lock = field(default_factory=threading.Lock)
     trials: dict[int, Trial] = field(default_factory=dict)
     stages: list[TrialsFollowed] = field(default_factory=list)
+    measured: dict[int, tuple[Estimate, ...]] = field(default_factory=dict)
 
     def archived(self, number: int) -> MemoryTrialData:
         with self.lock:
@@ -163,7 +165,13 @@ class MemoryArchive:
     def folder(self) -> Path:
         return Path("run.partial")
 
-    def begin(self, trial: Trial) -> MemoryTrial:
+    def attempt(self, trial: Trial) -> int:
+        return sum(number == trial.number for number, _ in self.attempts) + 1
+
+    def metrics(self) -> dict[int, tuple[Estimate, ...]]:
+        return self.measured
+
+    def begin(self, trial: Trial, keeping: object = None) -> MemoryTrial:
         return MemoryTrial(self, trial)
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:

@@ -358,7 +358,7 @@ def test_workers_share_the_bench_time_until_a_rest() -> None:
 
 def test_an_archive_that_fails_in_one_of_them_ends_the_run() -> None:
     class Full(MemoryArchive):
-        def begin(self, trial: Trial):
+        def begin(self, trial: Trial, keeping: object = None):
             file = super().begin(trial)
             if trial.number == 2:
 

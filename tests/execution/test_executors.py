@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -71,7 +72,7 @@ def run(
             measure=Measuring(experiments()),
             finished={n: o for n, o in writer.finished.items() if o is Outcome.COMPLETED},
             supervision=Supervision(timing=timing),
-            in_processes=in_processes,
+            executor=partial(process_executor, count=2) if in_processes else None,
         )
 
 
@@ -144,7 +145,7 @@ def test_what_is_under_way_in_processes_ends_when_the_executor_is_stopped(
     told: list[Outcome] = []
     with closing(RunWriter.create(tmp_path, header, plan.trials)) as writer:
         conditions = Conditions(SimBackend(SimOptions()), writer, lambda: False, Supervision())
-        with process_executor(1, conditions, writer) as executor:
+        with process_executor(conditions, writer, count=1) as executor:
             executor.stop()
             executor.submit(
                 plan.trials[:1], lambda trial, done, _: told.append(done.ending.outcome)

@@ -201,7 +201,7 @@ def test_what_execute_says_is_archived_as_plain_text_and_json():
 def test_an_archive_that_cannot_be_written_ends_the_run_unsealed_with_the_bench_safe():
     bench = Bench(3, FakeBackend())
 
-    def full(trial: Trial) -> None:
+    def full(trial: Trial, keeping: object) -> None:
         raise ArchiveError("no space left")
 
     bench.archive.begin = full  # type: ignore[assignment]
@@ -341,7 +341,7 @@ def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_written(
 ):
     bench = Bench(3, FakeBackend(rest=rest))
 
-    def full(trial: Trial) -> None:
+    def full(trial: Trial, keeping: object) -> None:
         raise ArchiveError("no space left")
 
     bench.archive.begin = full  # type: ignore[assignment]
@@ -450,7 +450,7 @@ def test_when_the_archive_fails_the_other_trials_end_before_the_bench_is_made_sa
         bench.backend.log.append("ended")
         return COMPLETED
 
-    def full(trial: Trial) -> object:
+    def full(trial: Trial, keeping: object) -> object:
         if trial.number == 2:
             raise ArchiveError("no space left")
         return begin(trial)

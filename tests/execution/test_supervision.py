@@ -399,7 +399,7 @@ def test_a_disk_that_hangs_leaves_no_bench_running(
     bench = lab(once(lambda live, recorder, stop: hand_over(recorder, 0, 10) or COMPLETED))
     begin = bench.archive.begin
 
-    def begin_on_a_slow_disk(trial: Trial) -> MemoryTrial:
+    def begin_on_a_slow_disk(trial: Trial, keeping: object) -> MemoryTrial:
         file = begin(trial)
         file.append = lambda time, block: bench.backend.released.wait(LONG)  # type: ignore[assignment]
         return file

@@ -30,6 +30,7 @@ class Done:
     ending: Ending
     samples: Recording
     estimates: tuple[Estimate, ...] = ()
+    not_kept: str = ""
 
     def recording(self) -> Recording:
         return self.samples

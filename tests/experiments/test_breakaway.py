@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from campaign.channels import GYRO_RATE
-from campaign.estimate import Estimate, Kind, Systematic
+from campaign.estimate import Estimate, Kind, Origin, Systematic
 from campaign.estimation.intervals import with_error
 from campaign.experiments import experiments
-from campaign.experiments.breakaway.experiment import default_positions
+from campaign.experiments.breakaway.experiment import _damping, default_positions
 from campaign.experiments.breakaway.figures import DOTS, _what_shows
 from campaign.experiments.breakaway.means import _between, mean
 from campaign.physics.bench import Bench
@@ -81,6 +81,23 @@ def test_damping_is_assumed_and_says_so() -> None:
     assert any("assumed" in note for note in result.notes)
     columns = {column.name: column.label for column in table(result, "presliding").columns}
     assert "assumed" in columns["bristle_damping"]
+
+
+def test_damping_carries_the_interval_of_the_stiffness() -> None:
+    """d sigma1 / d sigma0 = zeta sqrt(J / sigma0); three ramps, t(2) = 4.303."""
+    stiffness = with_error("bristle_stiffness", 15000.0, "N m/rad", 300.0, 20.0, "", systematic=())
+    slope = 0.8 * np.sqrt(35.0 / 15000.0)
+    one = _damping(stiffness, 1150.0, slope)
+    assert one.half_width == pytest.approx(slope * stiffness.half_width)
+    assert one.origin is Origin.ASSUMED
+    places = [slope * x for x in (-600.0, 0.0, 600.0)]
+    bare = Estimate("bristle_stiffness", 15000.0, "N m/rad")
+    rule = [_damping(bare, 1150.0 + x, slope) for x in places]
+    assert not mean("bristle_damping", rule).has_interval
+    known = [replace(one, value=1150.0 + x, low=1140.0 + x, high=1160.0 + x) for x in places]
+    found = mean("bristle_damping", known)
+    assert found.half_width == pytest.approx(4.303 * slope * 600.0 / np.sqrt(3.0), rel=1e-3)
+    assert (found.origin, found.reason) == (one.origin, one.reason)
 
 
 def test_the_window_matters_little_and_is_reported() -> None:

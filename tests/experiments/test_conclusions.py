@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from campaign.access.sentences import remarks, sentence
-from campaign.estimate import Estimate, Origin
-from campaign.estimation.stabilization_error import NO_SCATTER, OF_ONE_TRIAL, quotient
+from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin
+from campaign.estimation.stabilization_error import NO_SCATTER, quotient
 from campaign.experiments import experiments
 from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.force_rate import force_rate_conclusions

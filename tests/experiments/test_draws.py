@@ -28,6 +28,7 @@ class Made:
     value: float
     estimates: Sequence[Estimate] = ()
     ending: Ending = DONE
+    not_kept: str = ""
 
     def recording(self) -> Recording:
         raise AssertionError("nobody needs samples")

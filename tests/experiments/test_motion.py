@@ -340,7 +340,7 @@ def test_of_a_recording_that_is_too_long_no_sample_is_read(tmp_path: Path):
 
     class Unread:
         trial = archived.trial.model_copy(update={"task": task})
-        ending, estimates = archived.ending, ()
+        ending, estimates, not_kept = archived.ending, (), ""
 
         def recording(self):
             raise AssertionError("its samples were read")

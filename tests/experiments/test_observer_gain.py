@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from campaign.estimate import Estimate
+from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.estimation.sine_amplitude import amplitude
-from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.observer_gain.experiment import EXPERIMENT, ObserverGainOptions
 from campaign.experiments.observer_gain.metrics import TOO_FEW, Gain, Rejection, measured_corner
 from campaign.recording import Ending, Outcome

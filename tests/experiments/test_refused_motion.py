@@ -55,6 +55,7 @@ def recorded(*made: Channel) -> Any:
         trial=trial,
         ending=SimpleNamespace(outcome="completed"),
         estimates=(),
+        not_kept="",
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
     )

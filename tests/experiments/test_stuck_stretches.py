@@ -31,6 +31,7 @@ class OneTrial:
         options={},
     )
     ending = SimpleNamespace(outcome="completed")
+    not_kept = ""
 
     @staticmethod
     def channel_names() -> frozenset[str]:

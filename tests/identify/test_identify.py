@@ -150,7 +150,8 @@ def test_the_command_writes_a_page_its_data_and_a_bench(
     assert re.search(r"\n  inverse_dynamics: .*axis\.inertia", noted.partition("bench: ")[2])
     html = page.read_text(encoding="utf-8")
     assert "deg" not in html.split("</style>")[1].replace("degrees", "")
-    data = json.loads((page.parent / "identification.json").read_text(encoding="utf-8"))
+    text = (page.parent / "identification.json").read_text(encoding="utf-8")
+    data = json.loads(text)["content"]
     [method] = data["methods"]
     [mass] = [each for each in method["parameters"] if each["quantity"] == "inertia"]
     assert mass["low"] <= rig.truth["inertia"] <= mass["high"]
@@ -353,7 +354,8 @@ def test_a_validation_that_the_model_does_not_predict_is_a_warning(
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     _say(told)
     text = f"validation residual (RMS): {100 * share:.2g} % of the measured force"
-    data = json.loads((page.parent / "identification.json").read_text(encoding="utf-8"))
+    written = (page.parent / "identification.json").read_text(encoding="utf-8")
+    data = json.loads(written)["content"]
     said = " ".join(capsys.readouterr().err.split())
     for each in (said, page.read_text(encoding="utf-8"), str(data["methods"][0]["warnings"])):
         assert (text in each) is warned

@@ -31,7 +31,7 @@ from tests.experiments.laboratory import trials as planned
 from tests.identify import conftest as rig_files
 from tests.physics.benches import bench
 
-OF_A_TRIAL = ("trial", "ending", "recording", "channel_names")
+OF_A_TRIAL = ("trial", "ending", "recording", "channel_names", "not_kept")
 
 
 @pytest.mark.slow

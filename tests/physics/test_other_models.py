@@ -65,7 +65,7 @@ MAXWELL = FrictionModel(
     summary="parallel springs that slip",
     options=MaxwellOptions,
     parameters=_maxwell_parameters,
-    state_size=lambda options: options.elements,
+    state_size=lambda options, step: options.elements,
     step=_maxwell_step,
     viscous=lambda options: 0.0,
     steady_state=lambda options, v: options.slip_torque * np.sign(v),
@@ -105,7 +105,7 @@ KARNOPP = FrictionModel(
     parameters=lambda options: np.array(
         [options.static_torque, options.coulomb_torque, options.band]
     ),
-    state_size=lambda options: 0,
+    state_size=lambda options, step: 0,
     step=_karnopp_step,
     viscous=lambda options: 0.0,
     steady_state=lambda options, v: options.coulomb_torque * np.sign(v),
@@ -159,7 +159,7 @@ def test_ten_elements_have_a_memory_of_where_they_turned() -> None:
 def test_a_state_is_as_large_as_the_options_say() -> None:
     for elements in (1, 3, 50):
         tree = {**MAXWELL_TREE, "elements": elements}
-        assert MAXWELL.state_size(MaxwellOptions.model_validate(tree)) == elements
+        assert MAXWELL.state_size(MaxwellOptions.model_validate(tree), 1e-3) == elements
 
 
 def test_ten_elements_give_back_what_they_store() -> None:
@@ -249,6 +249,8 @@ def test_a_model_of_the_former_kind_is_refused_by_name() -> None:
         FrictionModel(**{**fields, "step": former})
     with pytest.raises(TypeError, match=r"'maxwell'.*fixed state size"):
         FrictionModel(**{**fields, "state_size": 10})
+    with pytest.raises(TypeError, match=r"'maxwell' must take options and step"):
+        FrictionModel(**{**fields, "state_size": lambda options: 10})
 
 
 def _sizes(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:

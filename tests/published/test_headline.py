@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from campaign.published.evidence import Evidence
 from campaign.published.headline import headline, once
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.status import Status
 from campaign.published.values import read_published
 from campaign.report.content.lines import scored_tables
-from campaign.report.content.tables import agreement
+from campaign.report.content.tables import agreement, closeness
 from campaign.result import Finding
 
 PUBLISHED = read_published(
@@ -118,8 +116,9 @@ def test_counts_speak_by_status() -> None:
     found = headline(board(fitted=("2",)))
     counts = {str(c.status): (c.compared, c.good) for c in found.counts}
     assert counts == {"calibrated": (2, 0), "predicted": (6, 2)}
-    assert found.deviations == pytest.approx((0.0, 25.0, 50.0), abs=1e-9)
-    assert (found.median_deviation, found.worst_deviation) == pytest.approx((25.0, 50.0))
+    # Fitted: 1.1 for 1.0 is off by 10 %, 0.5 for 0.6 by 17 %. Others with percent: 0, 25, 50 %.
+    within = {str(c.status): (c.numbers, c.within) for c in found.counts}
+    assert within == {"calibrated": (2, (0, 0, 1, 2)), "predicted": (3, (1, 1, 1, 1))}
     assert [line.cell.path for line in found.missed] == ["figure 3/b/threshold"]
     assert [line.cell.path for line in found.not_reached] == ["figure 3/a/threshold"]
     not_run = ["1/observer/error", "2/none/simulated", "2/static/simulated", "figure 3/c/threshold"]
@@ -132,15 +131,17 @@ def test_the_sentences_say_all_of_it() -> None:
     # 4 + 4 + 6 cells; the number of "none" on hardware stands in both tables.
     assert "Of 14 printed numbers 1 repeat and 5 without a number to compare are left out" in text
     assert "calibrated 0 of 2, predicted 2 of 6" in text
-    assert "the median is 25 %, the worst 50 %" in text
     assert "Claims missed: Figure 3 (b)." in text
     assert "1 not reached, 4 not run" in text
     assert agreement(Scoreboard()) == "No published number was measured in this run."
 
 
-def test_what_was_fitted_alone_has_no_median() -> None:
-    text = agreement(board(fitted=("*",)))
-    assert "No deviation among them is of a value that nobody fitted." in text
+def test_deviations_stand_by_status_within_limits() -> None:
+    table = closeness(board(fitted=("2",)))
+    assert table is not None
+    rows = [tuple(row.values()) for row in table.rows]
+    assert rows == [("calibrated", 2, 0, 2, 0, 0, 1, 2), ("predicted", 6, 2, 3, 1, 1, 1, 1)]
+    assert closeness(Scoreboard()) is None
 
 
 def test_what_the_document_excludes_is_in_no_count_and_is_told() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin, Systematic
 from campaign.published.values import Cell
 from campaign.published.verdicts import Reproduced, deviation, judge, reproduced
 from campaign.result import Finding
@@ -18,7 +18,8 @@ def cell(value: float, relation: str = "equal", decimals: int | None = 1) -> Cel
     ("found", "verdict"),
     [
         (Reproduced(10.04), "agrees"),
-        (Reproduced(10.04, 1.0, 99.0), "agrees"),
+        (Reproduced(10.04, 9.1, 10.98), "agrees"),
+        (Reproduced(10.04, 1.0, 99.0), "undecided"),  # it may agree by luck
         (Reproduced(10.06), "differs"),
         (Reproduced(10.5, 9.9, 11.1), "compatible"),
         (Reproduced(10.5, 9.55, 11.55), "compatible"),  # half-width 1.0, 10 % of 10
@@ -102,3 +103,41 @@ def test_the_interval_is_the_combined_one_in_the_printed_unit() -> None:
     assert (found.low, found.high) == (pytest.approx(9.5), pytest.approx(10.5))
     with pytest.raises(ValueError, match="no multiple"):
         reproduced(Finding.of(estimate, {}), "kg m^2")
+
+
+@pytest.mark.parametrize(
+    ("ends", "calibration", "low", "high"),
+    [
+        ((9.7, 10.3), 0.4, 9.5, 10.5),  # half-widths 0.3 and 0.4 add in squares
+        ((9.7, 10.3), None, 9.7, 10.3),
+        ((None, None), 0.4, 9.6, 10.4),
+        ((None, None), None, None, None),
+        ((10.0, 10.3), 0.4, 9.6, 10.5),
+        ((9.7, None), 0.4, 9.5, None),
+    ],
+)
+def test_what_the_calibration_leaves_open_adds_in_squares(
+    ends: tuple[float | None, float | None],
+    calibration: float | None,
+    low: float | None,
+    high: float | None,
+) -> None:
+    found = reproduced(Finding.of(Estimate("error", 10.0, "mrad", *ends), {}), "mrad", calibration)
+    assert (found.low, found.high) == (pytest.approx(low), pytest.approx(high))
+
+
+def test_the_scatter_within_one_trial_is_no_interval() -> None:
+    """It is 1 % of the value; what trials share, and what the bench leaves open, is not in it."""
+    one = Estimate("error", 10.0, "mrad", 9.9, 10.1, 0.95, reason=OF_ONE_TRIAL())
+    alone = reproduced(Finding.of(one, {}), "mrad")
+    assert (alone.low, alone.high) == (None, None)
+    assert alone.reason in OF_ONE_TRIAL
+    calibrated = reproduced(Finding.of(one, {}), "mrad", 0.6)
+    assert calibrated.high == pytest.approx(10.0 + (0.1**2 + 0.6**2) ** 0.5)
+    assert not calibrated.calibration_alone
+    assert reproduced(Finding("error", 10.0, "mrad", {}), "mrad", 0.6).calibration_alone
+
+
+def test_what_a_calibration_may_lose_decides_nothing() -> None:
+    found = reproduced(Finding.of(Estimate("error", 10.0, "mrad"), {}), "mrad", lost=True)
+    assert judge(cell(10.0), found) == judge(cell(20.0), found) == "undecided"

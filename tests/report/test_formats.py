@@ -164,7 +164,7 @@ def test_markdown_has_the_page_s_numbers_and_files(folder: Path) -> None:
     images = [token.attrs["src"] for token in tokens(text) if token.type == "image"]
     assert len(images) == 4
     links = [token.attrs["href"] for token in tokens(text) if token.type == "link_open"]
-    assert len(links) == 7
+    assert len(links) == 8
     assert all((folder / file).is_file() for file in (*images, *links))
 
 

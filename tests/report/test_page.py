@@ -122,6 +122,7 @@ def test_the_folder_has_the_page_its_tables_and_its_figures(report: Report) -> N
         "tables/stabilization-stabilization-error.csv",
         "tables/table-4.3.csv",
         "tables/table-4.5.csv",
+        "tables/closeness.csv",
         "tables/table-5.2.csv",
         "tables/table-5.8.csv",
         "tables/text-4.2.1.csv",
@@ -175,7 +176,7 @@ def test_each_downloaded_table_is_the_file(report: Report, page: Page) -> None:
     links = [a for a in page.all("a") if "download" in a]
     files = {path.name: path for path in report.path.parent.rglob("*.csv")}
     assert {link["download"] for link in links} == files.keys()
-    assert len(links) == len(files) == 11
+    assert len(links) == len(files) == 12
     for link in links:
         if link["href"].startswith("data:"):
             text = unquote(link["href"].split(",", 1)[1])

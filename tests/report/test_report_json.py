@@ -18,13 +18,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment
 from campaign.reason import Cause, Reason
 from campaign.report.build import build_report
 from campaign.report.formats.as_json import POINTS, plain, read_report
-from campaign.report.formats.report_data import ReportData
+from campaign.report.formats.report_data import ArticleData, ReportData
 from campaign.result import Amount, Column, Conclusion, Factor, Finding, Result, Table
 from campaign.text import pretty_unit
 from campaign.units import convert
@@ -37,7 +38,8 @@ COMMON = re.compile(r"(\([^()]* ± [^()]*\)|[^ ]+ \([^()]* to [^()]*\)) × 10([�
 
 
 def schema_text() -> str:
-    return json.dumps(ReportData.model_json_schema(), indent=1, ensure_ascii=False) + "\n"
+    schema = TypeAdapter(ReportData | ArticleData).json_schema()
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
 def found(value: float, half: float | None, unit: str, **more: Any) -> Estimate:
@@ -188,6 +190,8 @@ def of_number(number: dict[str, Any], factor: float = 1.0) -> list[float | None]
 
 
 def every_table(told: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    if told["scoreboard"]["closeness"]:
+        yield told["scoreboard"]["closeness"]
     for test in told["tests"]:
         yield from test["tables"]
         if test["truth"]:

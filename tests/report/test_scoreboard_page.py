@@ -16,8 +16,7 @@ import pytest
 from campaign.access.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
-from campaign.estimate import Estimate
-from campaign.estimation.stabilization_error import OF_ONE_TRIAL
+from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.experiments.interface import Experiment
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.scoreboard import Line, score
@@ -187,10 +186,11 @@ def test_an_interval_of_one_trial_says_that_it_is(made_up: ModuleType, tmp_path:
         return set(shown_line(told).notes) - set(shown_line(line).notes)
 
     ends = {"low": 0.9 * value, "high": 1.1 * value}
-    said = "the interval is of one trial: how trials scatter is not in it"
+    said = "one trial: the interval is of the calibration; how trials scatter is not in it"
     assert notes(reason=OF_ONE_TRIAL(), **ends) == {said}
     assert notes(reason=Reason("of blocks", str(OF_ONE_TRIAL())), **ends) == set()
-    assert notes(reason=OF_ONE_TRIAL(), low=None, high=None) == set()
+    said = "no interval: one trial, and no calibration of its bench"
+    assert notes(reason=OF_ONE_TRIAL(), low=None, high=None) == {said}
 
 
 def test_the_reason_of_an_interval_comes_with_the_number() -> None:

@@ -104,7 +104,7 @@ def test_a_picture_or_a_note_beside_the_templates_is_nobody_s_business(page) -> 
                 " of these includes it; did you mean 'provenance.html'?"
             ),
         ),
-        ({"zzz_html": "x"}, "; there are cite.html, compare.html, identify.html, "),
+        ({"zzz_html": "x"}, "; there are article.html, cite.html, incidents.html, "),
         (
             {"report_html": EXTENDS + "\n{% block provenence %}x{% endblock %}"},
             (

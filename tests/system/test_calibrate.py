@@ -27,12 +27,20 @@ def test_the_calibrated_bench_reproduces_the_table(tmp_path: Path) -> None:
     assert "# a guess" in bench
     # The bench as it was, replaced by the calibrated one: an ordinary run agrees with the table.
     write(tmp_path, QUICK, bench)
+    (tmp_path / "calibration").mkdir()
+    told = (tmp_path / done.last_line).read_text(encoding="utf-8")
+    (tmp_path / "calibration" / "bench.toml").write_text(told, encoding="utf-8")
     run = campaign(tmp_path, "run", "calibrate.toml", "--report").last_line
     assert run.endswith(".nxs")
     (board,) = tmp_path.rglob("scoreboard.csv")
     lines = [line.split(",") for line in board.read_text().splitlines() if line.startswith("A.1")]
     assert len(lines) == 4
     assert all(abs(float(line[6])) < 1 and line[7] == "calibrated" for line in lines)
+    # t(2) = 4.30265 of what the calibration wrote, and the scatter of the trial.
+    part = result["propagation"]["standard_uncertainty"]
+    for line in lines:
+        half = 0.5 * (float(line[9]) - float(line[8]))
+        assert 0.0 <= half / (4.30265 * part["/".join(line[:3])]) - 1.0 < 0.05
 
 
 def test_a_second_calibration_leaves_the_first_alone(tmp_path: Path) -> None:

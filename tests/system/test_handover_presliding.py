@@ -114,7 +114,7 @@ def test_a_multisine_is_handed_out_handed_in_and_identified(tmp_path: Path) -> N
     words = ("--model", "presliding", "--output", "found.toml")
     page = tmp_path / campaign(tmp_path, "identify", name, *words).last_line
     text = page.with_suffix(".json").read_text(encoding="utf-8")
-    (own,) = json.loads(text)["methods"]
+    (own,) = json.loads(text)["content"]["methods"]
     assert not own["problem"]
     told = {each["quantity"]: each for each in own["parameters"]}
     for number, true in (

@@ -70,7 +70,7 @@ def test_the_page_holds_the_command_and_no_folder_of_anybody(runs: Path, tmp_pat
     told = "campaign trend still-0.nxs still-1.nxs ... still-4.nxs --over 'time'"
     assert data["command"] == told
     assert str(runs) not in page.read_text(encoding="utf-8")
-    assert len(data["runs"]) == 5
+    assert len(data["content"]["runs"]) == 5
 
 
 def test_parameters_of_a_model_are_followed_by_the_structure_of_the_first_run(
@@ -80,6 +80,7 @@ def test_parameters_of_a_model_are_followed_by_the_structure_of_the_first_run(
     names = [f"drift-{n}" for n in range(3)]
     typed(runs, names, tmp_path / "out", ["inverse_dynamics"])
     data = json.loads((tmp_path / "out" / "trend.json").read_text(encoding="utf-8"))
+    data = data["content"]
     own = [each for each in data["numbers"] if each["test"] == "inverse_dynamics"]
     refused = [text for text in data["problems"] if "inverse_dynamics" in text]
     assert own or len(refused) == 3

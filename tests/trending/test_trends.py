@@ -16,8 +16,9 @@ import pytest
 from campaign.archive import RunReader, open_run
 from campaign.errors import ArchiveError, UsageError
 from campaign.experiments import experiments
+from campaign.report.formats.as_json import plain
 from campaign.resources import templates_folder
-from campaign.trending.page import as_json, write_trends
+from campaign.trending.page import content_of, write_trends
 from campaign.trending.tables import beside_the_jump, headline
 from campaign.trending.trends import JUMP, TREND, Trends, Verdict, _imported, follow
 from tests.trending.laboratory import START, STATIC, Wanted, archived
@@ -220,7 +221,8 @@ def test_the_page_is_whole_and_the_same_every_time(jump: Trends, tmp_path: Path,
     html = page.read_text(encoding="utf-8")
     assert "cannot be shown" not in html
     assert "between runs 5 and 6" in html
-    tree = json.loads(as_json(jump, "campaign trend ..."))
+    tree = json.loads((tmp_path / "out" / "trend.json").read_text(encoding="utf-8"))["content"]
+    assert tree == json.loads(json.dumps(plain(content_of(jump))))
     assert tree["family"]["tests"] == jump.tested == 2 * jump.judged
     told = next(each for each in tree["numbers"] if each["verdict"] == "jumped")
     assert told["jumps"][0]["before_run"] == 6

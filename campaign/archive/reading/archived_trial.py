@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -24,6 +24,9 @@ class Samples(Protocol):
 
     def channels(self) -> tuple[ChannelInfo, ...]:
         """What was announced. Raises ArchiveError."""
+
+    def digests(self) -> Mapping[str, str]:
+        """SHA-256 of every series as it was recorded, by name, also where it was not kept."""
 
     def problems(self) -> Iterator[str]:
         """What is damaged, by trial and channel; reads every sample in flat memory."""
@@ -75,9 +78,16 @@ class ArchivedTrial:
         """The names of `channels`."""
         return frozenset(channel.name for channel in self.channels())
 
+    def digests(self) -> Mapping[str, str]:
+        """SHA-256 of times and channels as they were recorded, also where they were not kept."""
+        return self.samples.digests()
+
     def unmeasured(self) -> ArchivedTrial:
-        """The same trial as if nothing had been measured while it was executed."""
-        return replace(self, estimates=(), measured_by="")
+        """The same trial as if nothing had been measured while it was executed.
+
+        One without samples cannot be measured again, and stays as it is.
+        """
+        return self if self.not_kept else replace(self, estimates=(), measured_by="")
 
     def problems(self) -> Iterator[str]:
         """Reads every sample in flat memory; what is damaged, by trial and channel."""

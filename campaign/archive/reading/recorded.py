@@ -60,6 +60,10 @@ class RecordedSamples:
     def channels(self) -> tuple[ChannelInfo, ...]:
         return self.record.series
 
+    def digests(self) -> Mapping[str, str]:
+        told = {channel.name: channel.sha256 for channel in self.record.channels}
+        return {TIME.name: self.record.time, **told}
+
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
         """Channels, read now, one after another. Raises ArchiveError."""
         length = self.record.samples or 0

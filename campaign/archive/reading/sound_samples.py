@@ -92,11 +92,10 @@ def without_damaged(
     """What `make` makes of `trials`; of those that are whole when it meets one that is not.
 
     Returns what was made, the trials of which it was made, and what is damaged of the others. On
-    undamaged trials nothing is read but by `make`. Trials whose samples were not kept are left out.
+    undamaged trials nothing is read but by `make`.
 
     Raises ArchiveError when it meets damage even so.
     """
-    trials = tuple(trial for trial in trials if not trial.not_kept)
     try:
         return make(trials), trials, ()
     except ArchiveError:

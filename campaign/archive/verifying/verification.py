@@ -110,10 +110,14 @@ class _Check(EntryCheck):
             self._index(texts, story)
             told = entry_names(story.attempts)
             gone = {entry for entry in told if entry in not_kept and entry not in file}
+            reasons: dict[str, list[str]] = {}
             for entry in sorted(gone):
-                what = f"its samples are not kept: {not_kept[entry]}; their digests are"
-                self.remarks.add(f"/{entry}", what)
+                reasons.setdefault(not_kept[entry], []).append(entry)
                 self._without_samples(run, entry, told[entry])
+            for why, entries in reasons.items():
+                more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
+                what = f"no samples of it{more} are kept: {why}; their digests are"
+                self.remarks.add(f"/{entries[0]}", what)
             there = [(entry, finished) for entry, finished in told.items() if entry not in gone]
             check_entries(self, there, self.progress)
             for entry in sorted(not_kept.keys() - told.keys()):

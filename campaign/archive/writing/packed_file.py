@@ -120,6 +120,10 @@ class SampleColumns:
             for name, shuffled, places in told
         )
 
+    def drop(self) -> None:
+        """From now on only digests are wanted."""
+        self._file = None
+
     def append(self, rows: Sequence[Array]) -> list[Array]:
         """Add samples, one row per series; returns the whole chunks written, as new arrays."""
         total = len(rows[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +34,7 @@ from campaign.archive.writing.preview import PREVIEW_POINTS, Preview
 from campaign.channels import wrong_names
 from campaign.errors import ArchiveError, BackendError
 from campaign.estimate import Estimate, Window
+from campaign.policy import NotKept
 from campaign.recording import ChannelInfo, Ending, Event
 from campaign.trial import Trial
 
@@ -75,19 +76,21 @@ class TrialFile:
         folder: Path,
         trial: Trial,
         attempt: int = 1,
-        not_kept: str = "",
+        not_kept: NotKept | None = None,
         publish: Publish | None = None,
     ) -> None:
-        """`not_kept`: why of the samples only digests are to be kept; empty: all of them are."""
+        """`not_kept`: says at the end why of the samples only digests are kept; None: they are."""
         self._trial = trial
         self._attempt = attempt
-        self._not_kept = not_kept
+        self._rule = not_kept
+        self._not_kept = ""
         self._publish = publish or _publish_now
         self._final = folder / file_name(trial.number, attempt)
         self._part = self._final.with_name(self._final.name + PART)
         self._channels: tuple[ChannelInfo, ...] = ()
         self._shown = 0
         self._columns: SampleColumns | None = None
+        self._held: list[Array] = []  # blocks, of a trial whose end decides what is kept
         self._preview = Preview()
         self._events: list[Event] = []
         self._whole: Array | None = None  # a recording that was one chunk
@@ -104,8 +107,7 @@ class TrialFile:
         self._channels = channels
         names = [channel.name for channel in channels]
         self._shown = names.index(Aim.of(self._trial.task, self._trial.requires).channel(names))
-        file = None if self._not_kept else self._file
-        self._columns = SampleColumns((TIME.name, *names), file)
+        self._columns = SampleColumns((TIME.name, *names), self._file)
 
     def append(self, time: Array, block: Array) -> None:
         """Add samples: `time` (n,) in s, `block` (channels, n); ArchiveError on a full disk."""
@@ -116,9 +118,10 @@ class TrialFile:
                 f"{self._trial.name}: samples of shape {block.shape} do not fit times of shape "
                 f"{time.shape} and {len(self._channels)} channels"
             )
-        with self._writing():
-            for chunk in self._columns.append([time, *block]):
-                self._add_to_preview(chunk)
+        if self._rule is not None:
+            self._held.append(np.vstack([time, block]))
+            return
+        self._put(self._columns, [time, *block])
 
     def event(self, event: Event) -> None:
         self._events.append(event)
@@ -133,6 +136,9 @@ class TrialFile:
     ) -> FinishedFile:
         """Write the rest and publish the file."""
         groups: dict[str, tuple[PackedSeries, ...]] = {}
+        if self._rule is not None and self._columns is not None:
+            self._not_kept = self._rule(ending)
+            self._put_held(self._columns)
         with self._writing():
             series, preview = self._finish_samples(groups)
             trial, trees = shared_trees(self._trial)
@@ -157,9 +163,11 @@ class TrialFile:
             )
             digest, size = self._file.finish(packed)
             path = self._publish(self._part, self._final)
-        place = path, entry_name(self._trial.number), record, self._not_kept
-        whole = None if self._not_kept else self._whole
-        samples = PackedSamples(*place) if whole is None else MemorySamples(*place, rows=whole)
+        place = path, entry_name(self._trial.number), record
+        if self._whole is None:
+            samples = PackedSamples(*place, self._not_kept)
+        else:
+            samples = MemorySamples(*place, rows=self._whole)
         archived = trial_of_record(self._trial, samples)
         return FinishedFile(self._final.name, archived, digest, size, record.sha256)
 
@@ -176,7 +184,8 @@ class TrialFile:
         if self._columns is None:
             return None, None
         rest, (time, *digests) = self._columns.finish()
-        self._whole = rest if rest.shape[1] == self._columns.length else None
+        if rest.shape[1] == self._columns.length:
+            self._whole = rest
         self._add_to_preview(rest)
         told = zip(self._channels, digests, strict=True)
         series = self._columns.length, time, [SeriesRecord.of(*both) for both in told]
@@ -192,6 +201,20 @@ class TrialFile:
         groups["preview"] = columns.series
         preview = PreviewRecord(channel=channel, samples=columns.length, time=time, values=values)
         return series, preview
+
+    def _put(self, columns: SampleColumns, rows: Sequence[Array]) -> None:
+        with self._writing():
+            for chunk in columns.append(rows):
+                self._add_to_preview(chunk)
+
+    def _put_held(self, columns: SampleColumns) -> None:
+        """Write, or only digest, what waited for the trial's end."""
+        if self._not_kept:
+            columns.drop()
+        if self._held:
+            self._whole = np.concatenate(self._held, axis=1)
+            self._put(columns, list(self._whole))
+            self._held.clear()
 
     def _add_to_preview(self, rows: Array) -> None:
         self._preview.add(rows[0], rows[1 + self._shown])

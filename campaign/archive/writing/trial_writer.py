@@ -15,6 +15,7 @@ from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished
 from campaign.archive.reading.measured import trial_measured
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
+from campaign.policy import KEEP_ALL, Keeping, NotKept
 from campaign.recording import ChannelInfo, Ending, Event
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
@@ -44,7 +45,7 @@ class FolderWriter:
         self._entries: list[Entry] = []
         self._files: list[tuple[Path, Path]] = []
 
-    def begin(self, trial: Trial) -> TrialWriter:
+    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
         """As `RunWriter.begin`."""
         note, attempt = self._entries.append, self._attempts[trial.number]
 
@@ -52,7 +53,8 @@ class FolderWriter:
             self._files.append((part, final))
             return part
 
-        return TrialWriter.open(self._folder, trial, attempt, note, self._timing, publish=publish)
+        not_kept = keeping.rule(trial, attempt)
+        return TrialWriter.open(self._folder, trial, attempt, note, self._timing, not_kept, publish)
 
     def publish(self) -> None:
         """Put the trials on the disk that were finished. Raises ArchiveError: none counts."""
@@ -67,6 +69,14 @@ class FolderWriter:
                 with contextlib.suppress(OSError):
                     part.unlink(missing_ok=True)
             raise lost_trial(files[0][0], error, count=len(files)) from None
+
+    def take_files(self) -> dict[str, bytes]:
+        """The content of the trials that were finished, by file; nothing stays in the folder."""
+        files, self._files = self._files, []
+        found = {final.name: part.read_bytes() for part, final in files}
+        for part, _ in files:
+            part.unlink()
+        return found
 
     def take_entries(self) -> tuple[Entry, ...]:
         """The journal entries since the last call."""
@@ -106,7 +116,7 @@ class TrialWriter:
         attempt: int,
         note: Callable[[Entry], None],
         timing: Timing,
-        not_kept: str = "",
+        not_kept: NotKept | None = None,
         publish: Publish | None = None,
     ) -> Self:
         """Begin the trial's file in the folder of its run; see `RunWriter.begin`."""

@@ -27,6 +27,8 @@ from campaign.archive.writing.resuming import reopen
 from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
+from campaign.estimate import Estimate
+from campaign.policy import KEEP_ALL, Keeping
 from campaign.recording import Outcome, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
@@ -150,13 +152,14 @@ class RunWriter:
         """What the journal held when the run was resumed, in order; empty in a new run."""
         return self._told
 
-    def begin(self, trial: Trial, *, not_kept: str = "") -> TrialWriter:
+    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
         """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
 
-        A trial is executed by one thread at a time. `not_kept` says why its samples are not to be
+        A trial is executed by one thread at a time. `keeping` says whether its samples are
         kept: their digests are, and all else that there is to say of it.
         """
         attempt, note = self.attempt(trial), self.note
+        not_kept = keeping.rule(trial, attempt)
         writer = TrialWriter.open(self._folder, trial, attempt, note, self.timing, not_kept)
         with self._lock:
             self._writers = [w for w in self._writers if w.is_open] + [writer]
@@ -190,6 +193,12 @@ class RunWriter:
             measured = self._measured.get(finished.record)
         archived = read_trial_file(self._folder / finished.file, finished)
         return with_metrics(archived, measured)
+
+    def metrics(self) -> dict[int, tuple[Estimate, ...]]:
+        """What was measured in the last finished attempt at each trial, by number."""
+        with self._lock:
+            told = {number: self._measured.get(last.record) for number, last in self._last.items()}
+        return {number: each.estimates for number, each in told.items() if each is not None}
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
         """Note what a person was asked to do before `trial`, and the answer."""

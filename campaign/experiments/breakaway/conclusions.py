@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from campaign.estimation.stabilization_error import OF_ONE_TRIAL
+from campaign.estimate import OF_ONE_TRIAL
 from campaign.experiments.shared.conclusion_parts import (
     Part,
     Parts,

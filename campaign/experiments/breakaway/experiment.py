@@ -8,6 +8,7 @@ an *assumed* damping ratio gives sigma1, which the ramp itself does not show.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -66,7 +67,8 @@ WAYS = {"positive": 1.0, "negative": -1.0}
 OF_INERTIA = Cause("part of the inertia", "it serves the inertia's part alone")
 ASSUMED_RATIO = Cause(
     "assumed damping ratio",
-    "it follows from an assumed damping ratio; a ramp carries no information on it",
+    "it follows from an assumed damping ratio, on which a ramp carries no information; an interval "
+    "is that of the stiffness alone",
 )
 FOR_ORIENTATION = Cause(
     "for orientation", "torque over stiffness of the strongest interface, for orientation"
@@ -285,17 +287,11 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
     stiffness = curve.interfaces[0].stiffness  # not the end of a bound
     damping = damping_by_ratio(stiffness, inertia, viscous, options.damping_ratio)
     curve = curve.with_damping(damping)
-    yield _by_torque_constant(curve.stiffness, bench)
+    measured = _by_torque_constant(curve.stiffness, bench)
+    yield measured
     if not _is_of_any_size(curve.stiffness_at_rest):
         yield _by_torque_constant(curve.stiffness_at_rest, bench)
-    yield Estimate.without_interval(
-        "bristle_damping",
-        damping,
-        "N m s/rad",
-        ASSUMED_RATIO(),
-        origin=Origin.ASSUMED,
-        method="Equation 4.12",
-    )
+    yield _damping(measured, damping, 0.5 * (damping + viscous) / stiffness)
     yield Estimate.without_interval("chord", curve.chord, "N m/rad", CHORD())
     span = curve.interfaces[0].torque / curve.interfaces[0].stiffness
     yield Estimate.without_interval("presliding_span", span, "rad", FOR_ORIENTATION())
@@ -303,6 +299,38 @@ def _of_curve(curve: Presliding, options: BreakawayOptions, bench: Bench) -> Ite
     yield Estimate.without_interval("interfaces", count, "", BY_CRITERION(), kind="count")
     for share, own in curve.by_window.items():
         yield Estimate(**{**vars(own), "name": f"bristle_stiffness_to_{share:g}"})
+
+
+def _damping(stiffness: Estimate, value: float, slope: float) -> Estimate:
+    """sigma1 (N m s/rad) by an assumed damping ratio, with the interval that the stiffness leaves.
+
+    slope: d sigma1 / d sigma0 (s) of Equation 4.12, with ratio, inertia and viscous friction exact.
+    """
+    found = Estimate.without_interval(
+        "bristle_damping",
+        value,
+        "N m s/rad",
+        ASSUMED_RATIO(),
+        origin=Origin.ASSUMED,
+        method="Equation 4.12",
+    )
+    low, high, error = stiffness.low, stiffness.high, stiffness.standard_error
+    if stiffness.kind != "number" or low is None or high is None or error is None:
+        return found
+    parts = (
+        replace(part, standard_uncertainty=slope * (part.standard_uncertainty or 0.0))
+        for part in stiffness.systematic
+        if part.standard_uncertainty is not None
+    )
+    return replace(
+        found,
+        low=value + slope * (low - stiffness.value),
+        high=value + slope * (high - stiffness.value),
+        level=stiffness.level,
+        standard_error=slope * error,
+        freedom=stiffness.freedom,
+        systematic=tuple(parts),
+    )
 
 
 def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
@@ -377,7 +405,8 @@ def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
 def _figures(
     ramps: Ramps, means: Mapping[str, Mapping[str, Estimate]], suffix: str
 ) -> Iterator[Figure]:
-    shown = next((k for k, own in enumerate(ramps.found) if "bristle_stiffness" in own), None)
+    drawn = (k for k, data in enumerate(ramps.trials) if not data.not_kept)
+    shown = next((k for k in drawn if "bristle_stiffness" in ramps.found[k]), None)
     if shown is not None:
         data, torque = ramps.trials[shown], ramps.found[shown]["breakaway_torque"].value
         curve, place = curve_of(data, torque), ramps.places[shown]
@@ -395,6 +424,7 @@ EXPERIMENT = Experiment(
     fit=fitting_ramps.breakaway,
     warnings=_warnings,
     measure=_measure,
+    needs_samples=False,
     recorded=_found,
     windows=("rest", "ramp"),
     requires={

@@ -84,7 +84,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     value = float(np.mean([each.value for each in found]))
     unit, count = found[0].unit, len(found)
     systematic = shared_parts(found)
-    told = next((each for each in found if each.origin is Origin.ASSUMED or _bound(each)), None)
+    told = next((each for each in found if _bound(each) or _assumed(each)), None)
     if told is not None:
         lacking = next((each for each in found if math.isnan(_end(each, told))), None)
         if lacking is not None:
@@ -99,6 +99,7 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     inner = math.sqrt(float(np.mean(np.square(own))) / count)
     inner_freedom = float(sum(each.freedom or 0.0 for each in found))
     reason = next((each.reason for each in found if not each.has_interval), NONE)
+    rule = found[0].origin is Origin.ASSUMED
     if count == 1:
         return replace(found[0], systematic=systematic)
     outer = float(np.std([each.value for each in found], ddof=1)) / math.sqrt(count)
@@ -107,7 +108,18 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     method = f"mean of {count} ramps, Student's t"
     scatter = with_error(quantity, value, unit, outer, count - 1, method, systematic=systematic)
     within = with_error(quantity, value, unit, inner, inner_freedom, method, systematic=systematic)
-    return admitted(max((scatter, within), key=_width))
+    widest = max((scatter, within), key=_width)
+    return _as_assumed(widest, found[0]) if rule else admitted(widest)
+
+
+def _as_assumed(estimate: Estimate, rule: Estimate) -> Estimate:
+    """What follows from a rule, whose interval is of that alone which was measured."""
+    return replace(estimate, origin=rule.origin, reason=rule.reason)
+
+
+def _assumed(estimate: Estimate) -> bool:
+    """Whether it is of a rule alone."""
+    return estimate.origin is Origin.ASSUMED and not estimate.has_interval
 
 
 def _bound(estimate: Estimate) -> bool:
@@ -142,7 +154,7 @@ def _between(one: Estimate, other: Estimate) -> Estimate:
     value, method = 0.5 * (one.value + other.value), "mean of both directions, Welch"
     error = 0.5 * math.hypot(*errors)
     found = with_error(one.name, value, one.unit, error, freedom, method, systematic=systematic)
-    return admitted(found)
+    return _as_assumed(found, one) if one.origin is Origin.ASSUMED else admitted(found)
 
 
 def with_comparisons(groups: Sequence[Ramps]) -> list[Ramps]:

@@ -342,6 +342,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     perturbs_bench=True,
     measure=_measure,
+    needs_samples=False,
     requires={
         DRIVE_TORQUE: "the torque at which the component turns",
         GYRO_RATE: "the moment at which it turns",

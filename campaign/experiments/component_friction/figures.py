@@ -49,21 +49,29 @@ def component_figure(
 ) -> Figure:
     """The figure of one place of the sweep; sliding_rate (rad/s) counts as turning."""
     last = max(number for each in shown for number in each.numbers)
+    ramps = [_ramp(each) for each in shown if not each.ramp.not_kept]
     return Figure(
         key=f"component-friction{suffix}",
         title="Breakaway torque of the components",
-        caption="First one ramp of each component until it turns; then the repeated readings of "
-        "each, with their 95 % intervals, and their mean, each component on its own scale. "
+        caption=f"{'One ramp of each component until it turns, then the' if ramps else 'The'} "
+        "repeated readings of each component, with their 95 % intervals, and their mean, each "
+        "component on its own scale. "
         f"{_what_shows(shown)}",
         alt="Rate over torque of one ramp for each component, and breakaway torque of each "
         "component over the number of the measurement.",
         panels=(
-            Panel(
-                Axis("Torque at the load", "N m", "N m"),
-                Axis("Rate", "rad/s", "deg/s"),
-                [_ramp(each) for each in shown],
-                "One ramp of each",
-                [Mark("counts as turning", y=sliding_rate)],
+            *(
+                [
+                    Panel(
+                        Axis("Torque at the load", "N m", "N m"),
+                        Axis("Rate", "rad/s", "deg/s"),
+                        ramps,
+                        "One ramp of each",
+                        [Mark("counts as turning", y=sliding_rate)],
+                    )
+                ]
+                if ramps
+                else ()
             ),
             *(
                 Panel(

@@ -374,6 +374,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     measure=_measure,
+    needs_samples=False,
     fit=fitting.frequency_response,
     recorded=_found,
     windows=(STEADY,),

@@ -17,7 +17,7 @@ from campaign.experiments.friction_map.curves import FRICTION, Curves
 from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
 from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
-from campaign.experiments.interface import TestData
+from campaign.experiments.interface import TestData, with_samples
 from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
 from campaign.experiments.shared.conclusion_parts import count
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
@@ -284,7 +284,9 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
     """The time history of one point: the middle one of the first map."""
     # A stretch that was found in a recording has one direction, and no start of its own.
     measured = [
-        item for item in data.completed() if windows_of(item.trial).keys() >= DIRECTIONS.keys()
+        item
+        for item in with_samples(data.completed())
+        if windows_of(item.trial).keys() >= DIRECTIONS.keys()
     ]
     if not measured:
         return ()

@@ -348,6 +348,7 @@ EXPERIMENT = Experiment(
     fit=_fit,
     perturbs_bench=True,
     measure=measure,
+    needs_samples=False,
     requires={
         POINTING_ERROR: "the stabilization error",
         GYRO_RATE: "the rejection of disturbances; disturbance_frequencies = [] does without",

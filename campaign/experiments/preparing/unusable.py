@@ -37,6 +37,9 @@ class Finished(Protocol):
     @property
     def estimates(self) -> Sequence[Estimate]: ...
 
+    @property
+    def not_kept(self) -> str: ...
+
 
 FEWEST = 3
 """Samples below which nothing can be said of any signal."""
@@ -45,6 +48,7 @@ TOO_SHORT = Cause("too short", "{samples} samples were recorded")
 NO_NUMBERS = Cause("no numbers", "{channel} has no numbers")
 NEVER_CHANGED = Cause("never changed", "{channels} never changed")
 NOT_MEASURED = Cause("not measured", "{error}")
+NOT_KEPT = Cause("samples not kept", "nothing was measured, and the samples were not kept: {why}")
 
 
 def doubt(data: Finished) -> RecordingDoubt | None:
@@ -55,7 +59,11 @@ def doubt(data: Finished) -> RecordingDoubt | None:
     """
     trial = data.trial
     measured = data.ending.outcome == Outcome.COMPLETED and trial.role == Role.MEASUREMENT
-    if not measured or data.estimates or not trial.requires:
+    if not measured or data.estimates:
+        return None
+    if data.not_kept:
+        return doubted(trial, NOT_KEPT(why=data.not_kept))
+    if not trial.requires:
         return None
     lacking = missing(trial.requires, data.channel_names())
     if lacking:

@@ -264,6 +264,7 @@ EXPERIMENT = Experiment(
     fit=fitting.base_motion,
     perturbs_bench=True,
     measure=_measure,
+    needs_samples=False,
     requires={POINTING_ERROR: "the stabilization error"},
     can_use={
         COMPENSATION_TORQUE: "figures of the model alone",

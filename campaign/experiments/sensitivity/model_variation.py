@@ -14,7 +14,7 @@ import numpy as np
 
 from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
 from campaign.estimate import Window
-from campaign.experiments.interface import TrialData
+from campaign.experiments.interface import TrialData, with_samples
 from campaign.experiments.shared.common import method_label
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -103,7 +103,7 @@ def model_figures(measured: Sequence[TrialData], compensation: str) -> Iterator[
     drawn from what was recorded.
     """
     runs: dict[str, dict[float, TrialData]] = {}
-    for data in measured:
+    for data in with_samples(measured):
         if data.trial.task.mode == "prescribed":
             point = data.trial.point
             by_change = runs.setdefault(str(point["parameter"]), {})

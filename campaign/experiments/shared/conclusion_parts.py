@@ -10,9 +10,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin
 from campaign.estimation.intervals import LEVEL, ratio, student
-from campaign.estimation.stabilization_error import NO_SCATTER, OF_ONE_TRIAL
+from campaign.estimation.stabilization_error import NO_SCATTER
 from campaign.experiments.interface import TestData, bench_of
 from campaign.options import Options, describe
 from campaign.reason import Cause

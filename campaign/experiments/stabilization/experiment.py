@@ -320,6 +320,7 @@ EXPERIMENT = Experiment(
     recorded=_found,
     windows=(MEASURED,),
     measure=_measure,
+    needs_samples=False,
     requires={POINTING_ERROR: "the stabilization error"},
     can_use={
         BASE_RATE: "time stuck, and no figure of the relative rate",

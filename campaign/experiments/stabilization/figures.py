@@ -87,6 +87,8 @@ def stabilization_figures(
         return
     yield from error_figures(rows, paths, firsts[0].trial, options)
     place = _telling_place(_places(firsts, rows, paths, options))
+    if any(item.not_kept for item in place.trials.values()):
+        return
     yield from _rate_figure(place)
     yield _error_figure(place)
     if any(name != "none" for name in place.trials):

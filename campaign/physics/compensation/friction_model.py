@@ -6,13 +6,13 @@ friction inside; any other friction model makes its own compensation the same wa
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from campaign.options import Options
 from campaign.physics.compensation.interface import CompensationMethod, Compensator
-from campaign.physics.friction import FrictionField
+from campaign.physics.friction import FrictionField, friction_models
 
 
 class FrictionModelOptions(Options):
@@ -24,6 +24,14 @@ class FrictionModelOptions(Options):
     """The identified friction, by interface; each adds its torque to the command."""
     gain: float = Field(default=1.0, ge=0, le=10)
     """Share of the modelled friction that is compensated."""
+
+    @field_validator("friction")
+    @classmethod
+    def _can_compensate(cls, friction: dict[str, Any]) -> dict[str, Any]:
+        for name, options in friction.items():
+            if why := friction_models()[options.model].no_compensation:
+                raise ValueError(f"{name}: '{options.model}' cannot compensate: {why}")
+        return friction
 
 
 def _build(options: FrictionModelOptions, inertia: float, ratio: float) -> Compensator:

@@ -140,7 +140,8 @@ class FrictionModel:
         summary: one line for `campaign kinds`.
         options: its parameters; a subclass of FrictionOptions with `model: Literal[name]`.
         parameters: the flat parameters its step function reads, from validated options.
-        state_size: how many numbers its step function keeps, from validated options.
+        state_size: how many numbers its step function keeps, from validated options and the step
+            (s) that it is asked over: the engine's, or the sample of a sampled controller.
         step: its step function, plain Python that is compiled when a trial needs it; see
             `campaign.physics.step_function`.
         viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
@@ -149,19 +150,23 @@ class FrictionModel:
         changeable: the options of its own that scatter and preload may change; None for every
             option of its own with a physical unit.
         stored_energy: what its state stores (J at the interface), from validated options and the
-            state (s,) of its step function; None: not known.
+            state (s,) of its step function; NaN where that is not known for these options; None: no
+            storage function of the model is known.
         step_for: a step function that does for these options and is faster than `step`, one of the
             module's own (each function is compiled for itself); None: there is none.
         small_signal: its answer to small motions, from validated options; None: not declared, and
             the loop of a bench with it is known only while it slides.
         dry: what it is at rest, of a model without a state; None: its step function says all.
+        fastest: the shortest time (s) that a step must resolve for its torque, from validated
+            options, besides what `small_signal` says; None: none.
+        no_compensation: why it cannot compensate, for a reader; "" where it can.
     """
 
     name: str
     summary: str
     options: type[FrictionOptions]
     parameters: Callable[[Any], Array]
-    state_size: Callable[[Any], int]
+    state_size: Callable[[Any, float], int]
     step: Any
     viscous: Callable[[Any], float]
     steady_state: Callable[[Any, Array], Array]
@@ -170,6 +175,8 @@ class FrictionModel:
     stored_energy: Callable[[Any, Array], float] | None = None
     step_for: Callable[[Any], Callable[..., Any]] | None = None
     dry: DryFriction | None = None
+    fastest: Callable[[Any], float] | None = None
+    no_compensation: str = ""
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""
@@ -179,6 +186,11 @@ class FrictionModel:
                 f"the friction model {self.name!r} has a step function of "
                 f"({', '.join(form)}) or a fixed state size, as models had before engine 2: "
                 "docs/plug-ins.md says under 'A friction model of before engine 2' what to change"
+            )
+        if len(inspect.signature(self.state_size).parameters) != 2:
+            raise TypeError(
+                f"the state size of the friction model {self.name!r} must take options and step: "
+                "write `state_size=lambda options, step: ...`"
             )
 
     def may_change(self) -> tuple[str, ...]:

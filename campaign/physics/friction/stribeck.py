@@ -50,6 +50,23 @@ class NegativeDirection(Options):
     """sigma2 in the negative direction."""
 
 
+class CurveOptions(FrictionOptions):
+    """The Stribeck curve of a model, with viscous friction."""
+
+    coulomb_torque: Torque = Field(gt=0)
+    """Tc: friction of fast sliding, without the viscous part."""
+    static_torque: Torque = Field(gt=0)
+    """Ts: largest friction of slow sliding. Real axes with Ts < Tc exist."""
+    stribeck_velocity: AngularRate = Field(gt=0)
+    """vs: velocity over which friction falls from Ts to Tc."""
+    stribeck_exponent: float = Field(default=2.0, gt=0, le=10)
+    """delta: shape of that fall."""
+    viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
+    """sigma2: friction proportional to velocity."""
+    negative: NegativeDirection = NegativeDirection()
+    """What differs in the negative direction."""
+
+
 class StribeckOptions(FrictionOptions):
     """Parameters of static Stribeck friction."""
 
@@ -134,7 +151,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     """See `campaign.physics.step_function`: Eq. 4.6 at the mean rate. No state is kept."""
     v0, v1, smoothing = motion.rate_start, motion.rate_end, parameters[9]
     v = 0.5 * (v0 + v1)
-    size = _curve(parameters, where(v >= 0.0, 1.0, -1.0), abs(v))
+    size = curve_torque(parameters, where(v >= 0.0, 1.0, -1.0), abs(v))
     smooth = size * tanh(v / where(smoothing > 0.0, smoothing, 1.0))
     # The sign may change inside the step: its mean over the step, not a whole step of either.
     path = abs(v0) + abs(v1)
@@ -145,12 +162,12 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 def _sliding(parameters: Any, direction: float, speed: float) -> float:
     """See `campaign.physics.sliding_torque`: s(v), and the half difference of sigma2."""
-    torque: float = _curve(parameters, direction, speed) + direction * parameters[8] * speed
+    torque: float = curve_torque(parameters, direction, speed) + direction * parameters[8] * speed
     return torque
 
 
 @inlined
-def _curve(parameters: Any, direction: float, speed: float) -> Any:
+def curve_torque(parameters: Any, direction: float, speed: float) -> Any:
     """s(v) of Equation 4.4 (N m)."""
     tc_forwards, ts_forwards, vs_forwards, exponent_forwards = (
         parameters[0], parameters[1], parameters[2], parameters[3],
@@ -182,12 +199,13 @@ FRICTION = FrictionModel(
     summary="static: Coulomb, Stribeck and viscous friction (Eq. 4.6)",
     options=StribeckOptions,
     parameters=_parameters,
-    state_size=lambda options: 0,
+    state_size=lambda options, step: 0,
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
     changeable=CURVE,
     small_signal=_small_signal,
+    stored_energy=lambda options, state: 0.0,
     dry=DryFriction(
         sliding=_sliding,
         static_torque=lambda options, direction: in_direction(options, "static_torque", direction),

@@ -53,7 +53,10 @@ def drifts_of(run: RunReader) -> tuple[list[Drift], list[str], list[Damage]]:
         same = tuple(
             t
             for t in run.trials_of(test)
-            if t.trial.task == task and t.ending.outcome is Outcome.COMPLETED and _comparable(t)
+            if t.trial.task == task
+            and t.ending.outcome is Outcome.COMPLETED
+            and _comparable(t)
+            and not t.not_kept
         )
         try:
             drift, _, found = without_damaged(run.path, same, partial(_drift, test))

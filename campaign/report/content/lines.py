@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from campaign.estimation.stabilization_error import OF_ONE_TRIAL
+from campaign.estimate import OF_ONE_TRIAL
 from campaign.published.headline import is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
@@ -52,6 +52,7 @@ def shown_line(line: Line) -> ShownLine:
     """A line of the scoreboard as text."""
     cell = line.cell
     look = None if line.status is None else STATUS[line.status]
+    notes = (cell.reason, *cell.notes, _not_in_the_interval(line))
     claim = {"near": "≈ ", "at most": "≤ ", "at least": "≥ "}.get(cell.relation, "")
     return ShownLine(
         table=cell.table,
@@ -65,18 +66,22 @@ def shown_line(line: Line) -> ShownLine:
         sign=SIGNS[look.marker] if look else "",
         verdict=str(line.verdict),
         good=line.verdict in GOOD,
-        notes=tuple(note for note in (cell.reason, *cell.notes, _of_one_trial(line)) if note),
+        notes=tuple(filter(None, notes)),
         test=line.test,
         place=place_words(line),
     )
 
 
-def _of_one_trial(line: Line) -> str:
-    """What is not in its interval; a sentence leaves such an interval of a ratio out."""
+def _not_in_the_interval(line: Line) -> str:
+    """What is not in its interval, or why it has none."""
     found = line.found
-    if found is None or not found.has_interval or found.reason not in OF_ONE_TRIAL:
+    if found is not None and found.calibration_alone and found.reason:
+        return f"the interval is of the calibration alone: {found.reason}"
+    if found is None or found.reason not in OF_ONE_TRIAL:
         return ""
-    return "the interval is of one trial: how trials scatter is not in it"
+    if found.has_interval:
+        return "one trial: the interval is of the calibration; how trials scatter is not in it"
+    return "no interval: one trial, and no calibration of its bench"
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from campaign.axis_kind import words_here
 from campaign.estimate import Estimate, Origin
-from campaign.published.headline import Headline, headline
+from campaign.published.headline import LIMITS, Headline, headline
 from campaign.published.scoreboard import Line, Scoreboard, place_columns
 from campaign.published.values import heading_of
 from campaign.reason import NONE
@@ -273,6 +273,33 @@ def agreement(scoreboard: Scoreboard) -> str:
     return " ".join(_sentences(found))
 
 
+def closeness(scoreboard: Scoreboard) -> Table | None:
+    """How many published values deviate by how much, by status; None where none is a number."""
+    counts = headline(scoreboard).counts
+    if not any(count.numbers for count in counts):
+        return None
+    limits = tuple(Column(f"within_{n}", f"≤ {n} %", exact=True) for n in LIMITS)
+    columns = (
+        Column("status", "Status"),
+        Column("compared", "Compared", exact=True),
+        Column("reproduced", "Reproduced", exact=True),
+        Column("numbers", "With a deviation", exact=True),
+        *limits,
+    )
+    rows: Iterator[dict[str, Cell]] = (
+        {
+            "status": str(count.status),
+            "compared": count.compared,
+            "reproduced": count.good,
+            "numbers": count.numbers,
+            **{each.name: n for each, n in zip(limits, count.within, strict=True)},
+        }
+        for count in counts
+    )
+    title = "Deviation from the published values, by status: values within each limit"
+    return Table("closeness", title, columns, tuple(rows))
+
+
 def _cell_in_words(line: Line) -> str:
     """`Figure 5.14 (stribeck velocity · rank)`."""
     return f"{heading_of(line.cell.table)} ({cell_name(line.cell)})"
@@ -284,14 +311,6 @@ def _sentences(found: Headline) -> Iterator[str]:
     yield f"{found.compared} {values} compared, each counted once, however often it is printed."
     yield _bridge(found)
     yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
-    middle, worst = found.median_deviation, found.worst_deviation
-    if middle is None or worst is None:
-        yield "No deviation among them is of a value that nobody fitted."
-    else:
-        yield (
-            f"Of the {len(found.deviations)} with a deviation that nobody fitted the median is"
-            f" {number(middle, 2)} %, the worst {number(worst, 2)} %."
-        )
     missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
     if missed:
         yield f"Claims missed: {missed}."

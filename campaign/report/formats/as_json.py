@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from campaign import __version__, result
 from campaign.access.estimates import row_of
@@ -16,14 +17,16 @@ from campaign.access.sentences import sentence
 from campaign.archive.reading.damage_words import in_words
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
-from campaign.published.headline import headline
+from campaign.published.headline import LIMITS, headline
 from campaign.published.scoreboard import Line
 from campaign.report.content import lines, tables
 from campaign.report.content.document import Document
 from campaign.report.drawing.decimate import kept
 from campaign.report.formats import report_data as data
+from campaign.report.page.article import Article, Part
 from campaign.report.page.folder import Comparison, Section, ShownFigure, ShownTable
 from campaign.report.page.layout import Layout
+from campaign.report.page.pieces import Folded, Items, Paragraph, Piece
 from campaign.units import factor
 
 POINTS = 400
@@ -34,7 +37,57 @@ DIGITS = 7
 
 def report_json(layout: Layout) -> str:
     """The text of `report.json`; the same report gives the same text."""
-    tree = report_data(layout).model_dump(mode="json")
+    return _text(report_data(layout))
+
+
+def article_json(article: Article) -> str:
+    """The text of a comparison's, trends' or an identification's JSON."""
+    return _text(article_data(article))
+
+
+def article_data(article: Article) -> data.ArticleData:
+    """An article as data."""
+    return data.ArticleData(
+        kind=article.kind.lower(),
+        program=f"campaign {__version__}",
+        command=article.command,
+        title=article.title,
+        facts=tuple(
+            tuple(data.Said(name=name, text=text) for name, text in pairs)
+            for _, pairs in article.facts
+        ),
+        sections=tuple(map(_part, article.parts)),
+        content=plain(article.content),
+    )
+
+
+def _part(part: Part) -> data.Section:
+    pieces = tuple(_unfolded(part.pieces))
+    sentences: list[str] = []
+    for piece in pieces:
+        if isinstance(piece, Paragraph):
+            sentences.append(piece.text)
+        elif isinstance(piece, Items):
+            sentences += piece.texts
+    return data.Section(
+        anchor=part.anchor,
+        heading=part.heading,
+        sentences=tuple(sentences),
+        figures=tuple(_figure(each) for each in pieces if isinstance(each, ShownFigure)),
+        tables=tuple(_table(each) for each in pieces if isinstance(each, ShownTable)),
+    )
+
+
+def _unfolded(pieces: Iterable[Piece]) -> Iterator[Piece]:
+    for piece in pieces:
+        if isinstance(piece, Folded):
+            yield from _unfolded(piece.pieces)
+        else:
+            yield piece
+
+
+def _text(page: BaseModel) -> str:
+    tree = page.model_dump(mode="json")
     return json.dumps(tree, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -286,11 +339,16 @@ def _scoreboard(layout: Layout) -> data.Scoreboard:
     return data.Scoreboard(
         agreement=tables.agreement(board),
         counts=tuple(
-            data.Count(status=str(each.status), compared=each.compared, good=each.good)
+            data.Count(
+                status=str(each.status),
+                compared=each.compared,
+                good=each.good,
+                numbers=each.numbers,
+                within_percent=dict(zip(map(str, LIMITS), each.within, strict=True)),
+            )
             for each in counted.counts
         ),
-        median_deviation_percent=counted.median_deviation,
-        worst_deviation_percent=counted.worst_deviation,
+        closeness=None if layout.closeness is None else _table(layout.closeness),
         not_reached=len(counted.not_reached),
         not_found=len(counted.not_found),
         not_run=len(counted.not_run),

@@ -1,15 +1,14 @@
-"""What a format is: it writes what the page shows as another file into the report's folder."""
+"""What a format is: it writes what a page shows as another file into the page's folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from campaign.report.page.damage_notice import Notice
-    from campaign.report.page.layout import Layout
+    from campaign.report.page.pieces import Piece
 
 
 def _nothing() -> None:
@@ -18,17 +17,23 @@ def _nothing() -> None:
 
 @dataclass(frozen=True)
 class Written:
-    """A report whose page, tables and figures are written already.
+    """A report or another page whose HTML, tables and figures are written already.
 
     Attributes:
-        layout: what the page shows.
-        damage: that the archive is damaged, where it is.
-        folder: where `report.html`, `tables/` and `figures/` lie.
+        name: of its files, without suffix: the page is `NAME.html`.
+        label: a short name for marks in a text, of letters, digits and dashes.
+        pieces: what the page says, in its order.
+        folder: where the page, `tables/` and `figures/` lie.
+        pdfs: figures as PDF, by their names in the folder, where the format wants them.
+        bibtex: an entry for the run; empty without one.
     """
 
-    layout: Layout
-    damage: Notice | None
+    name: str
+    label: str
+    pieces: tuple[Piece, ...]
     folder: Path
+    pdfs: Mapping[str, bytes]
+    bibtex: str = ""
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Format:
     Attributes:
         write: adds its files to the folder. Raises UsageError; then there is no report at all.
         require: raises UsageError, before anything is done, when the machine lacks what it needs.
-        pdf_figures: whether it wants the figures as PDF: `layout.folder.pdfs`.
+        pdf_figures: whether it wants the figures as PDF.
     """
 
     name: str

@@ -1,20 +1,27 @@
-r"""`report.tex`, to be `\input` into one's own paper, and `main.tex`, which typesets it alone."""
+r"""`NAME.tex`, to be `\input` into one's own paper, and `main.tex`, which typesets it alone."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
 from campaign.plain_text import on_a_page
-from campaign.report.content.citation import citation_of
 from campaign.report.formats.interface import Format, Written
 from campaign.report.formats.latex_tables import grid_lines
-from campaign.report.formats.outline import caption, outline
-from campaign.report.formats.pieces import Facts, Grid, Heading, Items, Paragraph, Piece, Source
 from campaign.report.latex_text import breakable, latex
 from campaign.report.page.folder import ShownFigure
-from campaign.report.page.names import slug
+from campaign.report.page.pieces import (
+    Facts,
+    Grid,
+    Heading,
+    Items,
+    Paragraph,
+    Piece,
+    Source,
+    caption,
+    plain,
+)
 
-BODY, MAIN, BIBLIOGRAPHY = "report.tex", "main.tex", "report.bib"
+MAIN = "main.tex"
 FLOATS = (r"\begin{figure}", r"\begin{table}")
 SECTIONS = {1: "section", 2: "subsection", 3: "subsubsection"}
 
@@ -42,35 +49,30 @@ WRAPPER = r"""% Typesets report.tex alone: pdflatex main, twice. Write your own 
 \usepackage{array,booktabs,longtable,graphicx,textcomp}
 \IfFileExists{placeins.sty}{\usepackage{placeins}}{}
 \begin{document}
-\input{report.tex}
+\input{NAME.tex}
 \end{document}
 """
 
 
 def write(written: Written) -> None:
     """Add `report.tex`, `main.tex`, `report.bib` and the figures as PDF."""
-    document, pdfs = written.layout.document, written.layout.folder.pdfs
-    run = slug(document.run.header.name)
-    pieces = _in_their_sections(outline(written), run, pdfs)
-    body = "\n\n".join(map("\n".join, pieces))
-    texts = {
-        BODY: f"{HEAD}\n{body}\n",
-        MAIN: WRAPPER,
-        BIBLIOGRAPHY: citation_of(document.run).bibtex,
-    }
+    pdfs, name = written.pdfs, written.name
+    pieces = (each for piece in written.pieces for each in plain(piece))
+    body = "\n\n".join(map("\n".join, _in_their_sections(pieces, written)))
+    texts = {f"{name}.tex": f"{HEAD}\n{body}\n", MAIN: WRAPPER.replace("NAME", name)}
+    if written.bibtex:
+        texts[f"{name}.bib"] = written.bibtex
     for name, text in texts.items():
         (written.folder / name).write_text(on_a_page(text), encoding="utf-8", newline="\n")
     for name, page in pdfs.items():
         (written.folder / name).write_bytes(page)
 
 
-def _in_their_sections(
-    pieces: Iterable[Piece], run: str, pdfs: Collection[str]
-) -> Iterator[list[str]]:
+def _in_their_sections(pieces: Iterable[Piece], written: Written) -> Iterator[list[str]]:
     """The lines of each piece; before a heading, what floats finds its place."""
     floating = False
     for piece in pieces:
-        lines = list(_lines(piece, run, pdfs))
+        lines = list(_lines(piece, written))
         if isinstance(piece, Heading):
             if piece.level > 2 and floating:
                 lines.insert(0, r"\reportbarrier")
@@ -81,12 +83,12 @@ def _in_their_sections(
         yield lines
 
 
-def _lines(piece: Piece, run: str, pdfs: Collection[str]) -> Iterator[str]:
+def _lines(piece: Piece, written: Written) -> Iterator[str]:
     match piece:
         case Heading():
             yield rf"\{SECTIONS[piece.level]}{{{latex(piece.text)}}}"
         case Paragraph():
-            yield (r"\textbf{Mind:} " if piece.warns else "") + breakable(piece.text)
+            yield (r"\textbf{Mind:} " if piece.role == "warning" else "") + breakable(piece.text)
         case Items():
             yield from _items(map(breakable, piece.texts))
         case Facts():
@@ -94,11 +96,11 @@ def _lines(piece: Piece, run: str, pdfs: Collection[str]) -> Iterator[str]:
                 rf"\textbf{{{breakable(name)}:}} {breakable(text)}" for name, text in piece.pairs
             )
         case ShownFigure():
-            yield from _figure(piece, run, pdfs)
+            yield from _figure(piece, written.label, written.pdfs)
         case Grid():
-            yield from grid_lines(piece, f"tab:{run}:{piece.number}")
+            yield from grid_lines(piece, f"tab:{written.label}:{piece.number}")
         case Source():
-            yield rf"{latex(piece.title)}: \texttt{{{latex(BIBLIOGRAPHY)}}}."
+            yield rf"{latex(piece.title)}: \texttt{{{latex(f'{written.name}.bib')}}}."
 
 
 def _items(texts: Iterable[str]) -> Iterator[str]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.report.formats.pieces import Grid
 from campaign.report.latex_text import LONGEST, breakable
+from campaign.report.page.pieces import Grid
 
 LONG = 30
 """Rows from which on a table may go over pages."""

@@ -1,4 +1,4 @@
-"""`report.md`: for GitHub and pandoc, with the figures and tables of the folder beside it."""
+"""`NAME.md`: for GitHub and pandoc, with the figures and tables of the folder beside it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,18 @@ from collections.abc import Iterable, Iterator
 
 from campaign.plain_text import on_a_page
 from campaign.report.formats.interface import Format, Written
-from campaign.report.formats.outline import caption, outline
-from campaign.report.formats.pieces import Facts, Grid, Heading, Items, Paragraph, Piece, Source
 from campaign.report.page.folder import ShownFigure
-
-FILE = "report.md"
+from campaign.report.page.pieces import (
+    Facts,
+    Grid,
+    Heading,
+    Items,
+    Paragraph,
+    Piece,
+    Source,
+    caption,
+    plain,
+)
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]<>|~$^#@&])")
 """What begins markup of GitHub's or pandoc's within a line: code, emphasis, links, HTML, maths,
@@ -23,9 +30,12 @@ _FIRST = re.compile(r"^([-+=:%]|\d+(?=[.)]))")
 
 
 def write(written: Written) -> None:
-    """Add `report.md`."""
-    text = "\n\n".join(_written(piece) for piece in outline(written)) + "\n"
-    (written.folder / FILE).write_text(on_a_page(text), encoding="utf-8", newline="\n")
+    """Add `NAME.md`."""
+    pieces = (each for piece in written.pieces for each in plain(piece))
+    text = "\n\n".join(map(_written, pieces)) + "\n"
+    (written.folder / f"{written.name}.md").write_text(
+        on_a_page(text), encoding="utf-8", newline="\n"
+    )
 
 
 def escaped(text: str) -> str:
@@ -54,7 +64,11 @@ def _lines(piece: Piece) -> Iterator[str]:
         case Heading():
             yield f"{'#' * piece.level} {escaped(piece.text)}"
         case Paragraph():
-            yield f"> **Mind:** {escaped(piece.text)}" if piece.warns else paragraph(piece.text)
+            yield (
+                f"> **Mind:** {escaped(piece.text)}"
+                if piece.role == "warning"
+                else paragraph(piece.text)
+            )
         case Items():
             yield "\n".join(f"- {paragraph(text)}" for text in piece.texts)
         case Facts():

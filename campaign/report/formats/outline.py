@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ShownLine
 from campaign.report.content.opening import Answer
-from campaign.report.formats.interface import Written
-from campaign.report.formats.pieces import (
+from campaign.report.page.damage_notice import Notice
+from campaign.report.page.folder import Comparison, Section, ShownFigure
+from campaign.report.page.layout import Layout
+from campaign.report.page.pieces import (
     Facts,
     Grid,
     Heading,
@@ -19,21 +21,19 @@ from campaign.report.formats.pieces import (
     Piece,
     Source,
 )
-from campaign.report.page.folder import Comparison, Section, ShownFigure, ShownTable
-from campaign.report.page.layout import Layout
 
 FAILED = 200
 """Most failed trials that are listed; the archive has them all."""
 
 
-def outline(written: Written) -> Iterator[Piece]:
+def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
     """All that the page says, but for the protocol's text and what only a screen can show."""
-    layout, document = written.layout, written.layout.document
+    document = layout.document
     header = document.run.header
     yield Heading(1, document.title)
-    if written.damage is not None:
+    if damage is not None:
         missing = "What cannot be read is missing from this report; tables/damaged.csv lists it."
-        yield Paragraph(f"{written.damage.heading}. {missing}", warns=True)
+        yield Paragraph(f"{damage.heading}. {missing}", role="warning")
     if header.description:
         yield Paragraph(header.description)
     yield Facts(tuple(_facts(document)))
@@ -45,6 +45,8 @@ def outline(written: Written) -> Iterator[Piece]:
         yield Heading(2, "Scoreboard", "scoreboard")
         yield Paragraph(tables.agreement(document.scoreboard))
         yield from (shown for shown in (layout.picture, layout.strips) if shown is not None)
+        if layout.closeness is not None:
+            yield layout.closeness
         yield Paragraph(f"Every published number is in {layout.scoreboard_download.file}.")
     for section in layout.sections:
         yield from _section(section, layout.telling)
@@ -53,7 +55,7 @@ def outline(written: Written) -> Iterator[Piece]:
     if document.incidents:
         yield Heading(2, "What happened besides the plan", "incidents")
         yield from layout.incident_figures
-        yield from map(_grid, layout.incident_tables)
+        yield from (layout.incident_tables)
     yield from _provenance(document)
 
 
@@ -84,7 +86,7 @@ def _opening(layout: Layout) -> Iterator[Piece]:
     yield Heading(2, "What was found", "opening")
     if opening.asked:
         yield Paragraph(opening.asked)
-    yield from (Paragraph(why, warns=True) for why in opening.wrong)
+    yield from (Paragraph(why, role="warning") for why in opening.wrong)
     shown = {section.test.name for section in layout.sections if section.truth is not None}
     if opening.intervals:
         yield Paragraph(opening.intervals)
@@ -124,51 +126,25 @@ def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
     yield Heading(2, section.test.title, section.anchor)
     if section.test.description:
         yield Paragraph(section.test.description)
-    yield from (Paragraph(problem, warns=True) for problem in section.problems)
+    yield from (Paragraph(problem, role="warning") for problem in section.problems)
     yield Heading(3, "Conditions")
     yield Facts(section.conditions)
     yield from map(_compared, section.comparisons)
     if section.truth is not None:
-        yield _grid(section.truth)
+        yield (section.truth)
     if section.prediction is not None:
-        yield _grid(section.prediction)
-    yield from map(_grid, section.references)
+        yield (section.prediction)
+    yield from (section.references)
     for figure in section.figures:
         if figure is telling:
             told = f"Figure {figure.number}, {figure.title}, stands on top of the report."
             yield Paragraph(told)
         else:
             yield figure
-    yield from map(_grid, section.tables)
+    yield from (section.tables)
     if section.test.result.notes:
         yield Heading(3, "Notes")
         yield Items(section.test.result.notes)
-
-
-def _grid(shown: ShownTable) -> Grid:
-    content = shown.content
-    left_out = [f"{content.left_out} more rows are in the file."] if content.left_out else []
-    return Grid(
-        shown.number,
-        shown.anchor,
-        f"{shown.title}.{_published(shown.published, 'Table')}",
-        content.headers,
-        tuple(cell.number for cell in content.rows[0]) if content.rows else (),
-        tuple(tuple(cell.text for cell in row) for row in content.rows),
-        (*filter(None, (shown.note,)), *content.notes, *left_out),
-        shown.download.file,
-    )
-
-
-def caption(shown: ShownFigure) -> str:
-    """A figure's caption, with what to compare it with."""
-    return f"{shown.caption}{_published(shown.published, 'Figure')}"
-
-
-def _published(numbers: Sequence[str], what: str) -> str:
-    if not numbers:
-        return ""
-    return f" Compare {what}{'s' * (len(numbers) > 1)} {', '.join(numbers)} of the source."
 
 
 def _compared(shown: Comparison) -> Grid:

@@ -1,4 +1,4 @@
-"""`report.pdf`: the page as a browser prints it on A4, with all that folds unfolded.
+"""`NAME.pdf`: the page as a browser prints it on A4, with all that folds unfolded.
 
 Chromium writes the time of printing into the file, so the same page gives the same pages and not
 the same bytes.
@@ -18,7 +18,6 @@ from pathlib import Path
 from campaign.errors import UsageError
 from campaign.report.formats.interface import Format, Written
 
-FILE = "report.pdf"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SECONDS = 180.0
 """The longest that printing may take."""
@@ -58,16 +57,16 @@ def require() -> None:
 
 
 def write(written: Written) -> None:
-    """Add `report.pdf`. Raises UsageError when the browser cannot print it."""
+    """Add `NAME.pdf`. Raises UsageError when the browser cannot print it."""
     require()
     with tempfile.TemporaryDirectory(prefix="campaign-pdf-") as scratch:
-        page, made = Path(scratch) / "report.html", Path(scratch) / FILE
-        html = (written.folder / "report.html").read_text(encoding="utf-8")
+        page, made = Path(scratch) / "page.html", Path(scratch) / "page.pdf"
+        html = (written.folder / f"{written.name}.html").read_text(encoding="utf-8")
         page.write_text(unfolded(html), encoding="utf-8")
         told = _print(page, made, Path(scratch) / "profile")
         if not made.is_file():
             raise UsageError(f"--format pdf: {browser()} printed nothing: {told or 'no message'}")
-        shutil.copyfile(made, written.folder / FILE)
+        shutil.copyfile(made, written.folder / f"{written.name}.pdf")
 
 
 def unfolded(html: str) -> str:

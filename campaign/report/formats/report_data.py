@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, JsonValue
 
 from campaign.report.content.opening import Opening
 
-FORMAT = 1
+FORMAT = 2
 """Rises when a field changes its meaning or goes; a new one may come at any time."""
 
 
@@ -270,6 +270,10 @@ class Count(_Part):
     status: str
     compared: int
     good: int
+    numbers: int
+    """Of which a deviation in percent means something."""
+    within_percent: dict[str, int]
+    """How many of these deviate by no more than so many percent."""
 
 
 class Contradiction(_Part):
@@ -287,8 +291,8 @@ class Scoreboard(_Part):
     """What it all comes to, in words."""
     counts: tuple[Count, ...]
     """Each published number once, however often it is printed."""
-    median_deviation_percent: float | None
-    worst_deviation_percent: float | None
+    closeness: Table | None
+    """The counts as the page shows them."""
     not_reached: int
     not_found: int
     not_run: int
@@ -375,6 +379,30 @@ class Incidents(_Part):
 
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
+
+
+class Section(_Part):
+    """A section of a page that is no report."""
+
+    anchor: str
+    heading: str
+    sentences: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+class ArticleData(_Part):
+    """A comparison, trends or an identification; figures and tables are those of a report."""
+
+    format: int = FORMAT
+    kind: str
+    program: str
+    command: str
+    title: str
+    facts: tuple[tuple[Said, ...], ...]
+    sections: tuple[Section, ...]
+    content: dict[str, JsonValue]
+    """What only this kind of page has."""
 
 
 class ReportData(_Part):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 from campaign.access.analysis import AnalysedTest
 from campaign.plain_text import on_a_page
@@ -49,6 +50,7 @@ class ShownFigure:
         least: CSS pixels that it must be wide for its smallest label to be legible.
     """
 
+    form: ClassVar = "figure"
     number: int
     anchor: str
     title: str
@@ -68,8 +70,12 @@ class ShownFigure:
 
 @dataclass(frozen=True)
 class ShownTable:
-    """A numbered table of a test."""
+    """A numbered table of a test.
 
+    `stacked`: on a small screen each of its rows is a block of its own.
+    """
+
+    form: ClassVar = "table"
     number: int
     anchor: str
     title: str
@@ -78,6 +84,7 @@ class ShownTable:
     content: tables.ShownTable
     download: Download
     data: Table | None = None
+    stacked: bool = False
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,7 @@ class Layout:
     Attributes:
         picture: the scoreboard's; None where nothing was compared.
         strips: published values among draws; None without draws.
+        closeness: how many published values deviate by how much; None without any.
         scoreboard_download: None where no published value takes part.
         incidents_figures, incidents_tables: what happened besides the plan.
         problems: what could not be shown or compared, one line each, damage apart.
@@ -85,6 +86,7 @@ class Layout:
     folder: Folder
     picture: ShownFigure | None
     strips: ShownFigure | None
+    closeness: ShownTable | None
     scoreboard_download: Download | None
     sections: tuple[Section, ...]
     incident_figures: tuple[ShownFigure, ...]
@@ -144,6 +146,8 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
             draws(scoreboard, folder),
         )
     )
+    close = tables.closeness(scoreboard)
+    closeness = None if close is None else folder.shown_table(close, (), close.key)
     sections = _sections(document, makers)
     happened = document.incidents
     figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
@@ -160,6 +164,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
         folder,
         picture,
         strips,
+        closeness,
         download,
         sections,
         figures,

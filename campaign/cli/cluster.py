@@ -1,0 +1,63 @@
+"""`--executor`: trials executed by a Dask cluster in place of this machine's own processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.backends.interface import Backend, BackendKind
+from campaign.cli.output import print_note
+from campaign.cli.session import choose_workers
+from campaign.errors import UsageError
+from campaign.execution.executors import OpenExecutor
+from campaign.trial import Trial
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where trials are executed, as typed.
+
+    Attributes:
+        executor: empty for this machine's own threads and processes.
+        tls: folder with the certificates of a cluster.
+    """
+
+    executor: str = ""
+    tls: Path | None = None
+
+    def check(self, kind: BackendKind, trials: Sequence[Trial], workers: int | None) -> int | None:
+        """How many trials at once; of a cluster, its processes, if that was said.
+
+        Raises UsageError.
+        """
+        if not self.executor:
+            if self.tls is not None:
+                raise UsageError("--executor-tls is for --executor dask://HOST:PORT")
+            return choose_workers(kind, len(trials), workers)
+        if not kind.picklable:
+            raise UsageError(
+                f"--executor: a cluster executes simulated trials, and the backend {kind.name!r} "
+                "is where its bench is; leave --executor out"
+            )
+        return workers
+
+    @contextmanager
+    def opened(
+        self, backend: Backend, trials: Sequence[Trial], workers: int | None
+    ) -> Iterator[tuple[int, OpenExecutor | None]]:
+        """How many trials at once, and what executes them; None for this machine itself."""
+        if not self.executor:
+            yield workers or 1, None
+            return
+        from campaign.execution.dask_executor import cluster
+
+        with cluster(self.executor, workers, backend, trials, self.tls) as found:
+            for why in found.refused.values():
+                print_note(why, style="yellow")
+            print_note(f"{self.executor}: {found.threads} trials, or blocks of them, at once")
+            yield found.threads, found.executor
+
+
+HERE = Where()

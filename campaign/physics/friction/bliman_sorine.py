@@ -1,0 +1,159 @@
+"""Bliman-Sorine friction: a fast Dahl model less a slow one (Eq. 3.12 to 3.14).
+
+P.-A. Bliman and M. Sorine, *Easy-to-use realistic dry friction models for automatic control*, 3rd
+European Control Conference (1995) 3788. The first order is Dahl's model.
+
+**Read with care.** As printed, the fast model settles at Fc and the slow one at Fs - Fc, so that
+the torque of sliding is 2 Fc - Fs. In the source and here the fast one settles at Fs:
+
+    T = T1 - T2
+    dT1/dq = sigma0 (1 - T1 sgn(v) / Ts)      dT2/dq = sigma0' (1 - T2 sgn(v) / (Ts - Tc))
+
+and sliding has Tc. The torque depends on the path alone: its peak after a reversal, which lies
+below Ts, stands over the angle and is no Stribeck effect over the rate.
+
+Scheme: both parts closed along each part of a step of one direction; the mean torque is the
+trapezoidal one, of second order in the step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from campaign.options import Options
+from campaign.physics.friction.coulomb import steady_state as coulomb_steady_state
+from campaign.physics.friction.dahl import relaxed
+from campaign.physics.friction.interface import (
+    Array,
+    FrictionModel,
+    FrictionOptions,
+    Presliding,
+    SmallSignal,
+)
+from campaign.physics.friction.path import parts_of
+from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.step_function import Motion
+from campaign.units import RotationalDamping, RotationalStiffness, Torque
+
+CURVE = ("coulomb_torque", "static_torque", "viscous_friction")
+LEAST = 1e-12
+"""Of Ts: the slow part's torque has to be more than nothing to be divided by."""
+
+
+class NegativeDirection(Options):
+    """What is different when sliding in the negative direction; the rest is as in the positive."""
+
+    coulomb_torque: Torque | None = Field(default=None, gt=0)
+    """Tc in the negative direction."""
+    static_torque: Torque | None = Field(default=None, gt=0)
+    """Ts in the negative direction."""
+    viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
+    """sigma2 in the negative direction."""
+
+
+class BlimanSorineOptions(FrictionOptions):
+    """Parameters of Bliman-Sorine friction."""
+
+    model: Literal["bliman-sorine"]
+    """Bliman-Sorine friction."""
+    order: Literal[1, 2] = 2
+    """1: the fast part alone, settling at Tc. 2: fast part less slow part."""
+    coulomb_torque: Torque = Field(gt=0)
+    """Tc: friction of sliding, without the viscous part."""
+    static_torque: Torque | None = Field(default=None, gt=0)
+    """Ts: where the fast part settles; the peak of friction is below it. Of the second order."""
+    viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
+    """sigma2: friction proportional to velocity; the thesis' model has none."""
+    negative: NegativeDirection = NegativeDirection()
+    """What differs in the negative direction."""
+    bristle_stiffness: RotationalStiffness = Field(gt=0)
+    """sigma0 of the fast part; at the onset of presliding the slope is sigma0 - sigma0'."""
+    slow_stiffness: RotationalStiffness | None = Field(default=None, gt=0)
+    """sigma0' of the slow part. Of the second order."""
+
+    def without_effect(self) -> frozenset[str]:
+        """Of the slow part, where there is none."""
+        return frozenset(("static_torque", "slow_stiffness") if self.order == 1 else ())
+
+    @model_validator(mode="after")
+    def _peaks(self) -> Self:
+        if self.order == 1:
+            return self
+        if self.static_torque is None or self.slow_stiffness is None:
+            raise ValueError("order = 2 needs static_torque and slow_stiffness")
+        for way in (1.0, -1.0):
+            fast, slow = _settling(self, way)
+            if slow <= LEAST * fast:
+                raise ValueError("static_torque must be more than coulomb_torque")
+            if self.slow_stiffness * fast >= self.bristle_stiffness * slow:
+                raise ValueError(
+                    "slow_stiffness must be less than bristle_stiffness times (Ts - Tc) / Ts: "
+                    "friction would have no peak"
+                )
+        return self
+
+
+def _settling(options: BlimanSorineOptions, way: float) -> tuple[float, float]:
+    """Torques (N m) at which the fast and the slow part settle in a direction."""
+    coulomb = in_direction(options, "coulomb_torque", way)
+    if options.order == 1 or options.static_torque is None:
+        return coulomb, 0.0
+    static = in_direction(options, "static_torque", way)
+    return static, static - coulomb
+
+
+def _parameters(options: BlimanSorineOptions) -> Array:
+    (fast, slow), (fast_back, slow_back) = (_settling(options, way) for way in (1.0, -1.0))
+    viscous = [in_direction(options, "viscous_friction", way) for way in (1.0, -1.0)]
+    half, stiffness = 0.5 * (viscous[0] - viscous[1]), options.bristle_stiffness
+    if options.order == 1:
+        return np.array([fast, fast_back, half, stiffness, 1.0, 1.0, 0.0])
+    # Scatter may take the slow torque to nothing or below; then that part is left out.
+    slow, slow_back = max(slow, LEAST * fast), max(slow_back, LEAST * fast_back)
+    return np.array([fast, fast_back, half, stiffness, slow, slow_back, options.slow_stiffness])
+
+
+def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    """See `campaign.physics.step_function`. The state is the torques of both parts (N m)."""
+    parts, fast, slow = parts_of(motion), state[0], state[1]
+    fast_at = relaxed(fast, parts.first, parameters[0], parameters[1], parameters[3])
+    slow_at = relaxed(slow, parts.first, parameters[4], parameters[5], parameters[6])
+    state[0] = relaxed(fast_at, parts.last, parameters[0], parameters[1], parameters[3])
+    state[1] = relaxed(slow_at, parts.last, parameters[4], parameters[5], parameters[6])
+    before, turned, after = fast - slow, fast_at - slow_at, state[0] - state[1]
+    v0, v1, share = abs(motion.rate_start), abs(motion.rate_end), parts.share
+    mean = 0.5 * (share * (before + turned) + (1.0 - share) * (turned + after))
+    viscous = parameters[2]
+    return mean + viscous * 0.5 * (v0 + v1), after - before + viscous * (v1 - v0)
+
+
+def _small_signal(options: BlimanSorineOptions) -> SmallSignal:
+    slow = 0.0 if options.order == 1 else options.slow_stiffness or 0.0
+    bristles = Presliding(options.bristle_stiffness - slow, 0.0)
+    return SmallSignal(stuck=bristles, stuck_compensation=bristles)
+
+
+def _stored_energy(options: BlimanSorineOptions, state: Array) -> float:
+    """Dahl's for the first order; of a difference of two such models none is known."""
+    if options.order == 2:
+        return math.nan
+    return float(0.5 * state[0] ** 2 / options.bristle_stiffness)
+
+
+FRICTION = FrictionModel(
+    name="bliman-sorine",
+    summary="dynamic: two Dahl models, with a peak over the angle after a reversal (Eq. 3.12)",
+    options=BlimanSorineOptions,
+    parameters=_parameters,
+    state_size=lambda options, step: 2,
+    step=_step,
+    viscous=mean_viscous,
+    steady_state=coulomb_steady_state,
+    changeable=(*CURVE, "bristle_stiffness", "slow_stiffness"),
+    small_signal=_small_signal,
+    stored_energy=_stored_energy,
+)

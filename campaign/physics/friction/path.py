@@ -1,0 +1,50 @@
+"""What friction models with a state share: a step in parts of one direction, and a closed form."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from campaign.physics.compiled import inlined
+from campaign.physics.elementary import expm1, where
+from campaign.physics.step_function import Motion
+
+
+class Parts(NamedTuple):
+    """A step before and after a reversal of its rate; without one, all of it is the first part.
+
+    Attributes:
+        first, last: displacements (rad) of both parts, of one direction each; together that of the
+            step. The rate is a straight line up to the reversal.
+        share: of the step that the first part lasts, 1 without a reversal.
+        turns: whether there is one.
+    """
+
+    first: float
+    last: float
+    share: float
+    turns: Any
+
+
+@inlined
+def parts_of(motion: Motion) -> Parts:
+    """The parts of a step."""
+    v0, v1, step = motion.rate_start, motion.rate_end, motion.step
+    turns = v0 * v1 < 0.0
+    share = where(turns, v0 / where(turns, v0 - v1, 1.0), 1.0)
+    whole = motion.rate_mean * step
+    first = where(turns, 0.5 * v0 * share * step, whole)
+    return Parts(first, where(turns, whole - first, 0.0), share, turns)
+
+
+@inlined
+def sign_of(x: float) -> float:
+    """1, -1, or 0 at 0."""
+    sign: float = where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
+    return sign
+
+
+@inlined
+def decayed(x: float) -> float:
+    """(1 - exp(-x)) / x for x >= 0: the mean of a decay over what it lasts."""
+    share: float = where(x > 0.0, -expm1(-x) / where(x > 0.0, x, 1.0), 1.0)
+    return share

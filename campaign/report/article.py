@@ -1,0 +1,49 @@
+"""Writing an article: its page, its JSON, its tables and figures, and other formats of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from itertools import chain
+from pathlib import Path
+
+from campaign.report.drawing.pdf import also_as_pdf
+from campaign.report.formats.as_json import article_json
+from campaign.report.formats.interface import Format, Written
+from campaign.report.output import refuse_other, replaced_folder, write_files
+from campaign.report.page.article import Article
+from campaign.report.page.names import slug
+from campaign.report.page.templates import Templates
+from campaign.report.palette import variables
+
+
+def write_article(
+    name: str,
+    make: Callable[[], Article],
+    output: Path,
+    packaged_templates: Path,
+    templates: Path | None = None,
+    formats: Sequence[Format] = (),
+) -> Path:
+    """Write what `make` makes into the folder `output`; the page's path.
+
+    name: of the article's files. `templates` and `formats`: as of a report. The same archives give
+    the same bytes. Raises UsageError when `output` is another page of ours, or cannot be written.
+    """
+    page = f"{name}.html"
+    refuse_other(output, page)
+    filled = Templates(packaged_templates, templates)
+    with also_as_pdf() if any(each.pdf_figures for each in formats) else nullcontext():
+        article = make()
+    files = {page: article_html(article, filled), f"{name}.json": article_json(article)}
+    with replaced_folder(output) as new:
+        write_files(new, chain(files.items(), article.folder.files.items()))
+        pieces, pdfs = tuple(article.pieces()), article.folder.pdfs
+        for each in formats:
+            each.write(Written(name, slug(article.title), pieces, new, pdfs))
+    return output / page
+
+
+def article_html(article: Article, templates: Templates) -> str:
+    """The text of the page."""
+    return templates.fill("article.html", {"article": article, "colours": variables()})
