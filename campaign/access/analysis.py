@@ -50,6 +50,8 @@ class AnalysedTest:
         source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
         provenance: whether its trials ran on the bench that was described.
         calibration: what that of the bench leaves open of its numbers.
+        group: heading under which the contents list it and those behind it.
+        leading_figure: key of its figure that stands on top of the page; "" for a choice.
     """
 
     name: str
@@ -67,6 +69,8 @@ class AnalysedTest:
     source: str = ""
     provenance: Provenance = NOTHING_ALTERED
     calibration: CalibrationPart = NOTHING
+    group: str = ""
+    leading_figure: str = ""
 
     @property
     def sides(self) -> Sides:
@@ -263,6 +267,8 @@ def _analysed(
             failed={t.trial.number for t in trials if t.ending.outcome is not Outcome.COMPLETED},
         ),
         calibration=calibration_part(run.header.sources, stated.bench if stated else ""),
+        group=str(test.get("group") or ""),
+        leading_figure=str(test.get("leading_figure") or ""),
     )
 
 

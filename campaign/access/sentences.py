@@ -44,6 +44,14 @@ def words(part: Amount | Factor) -> str:
     return _amount(part) if isinstance(part, Amount) else _factor(part)
 
 
+def alone(part: Amount | Factor) -> str:
+    """A number as a table has it, whose notes say why it has no interval."""
+    said = words(part).removeprefix("a ratio of ")
+    for reason in (NO_NOISE, NO_INTERVAL, " in this simulation"):
+        said = said.removesuffix(reason)
+    return said
+
+
 def remarks(conclusions: Iterable[Conclusion]) -> Iterator[str]:
     """Sentences on what the numbers of conclusions do not say: no interval, or not all of it.
 

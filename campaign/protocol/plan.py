@@ -96,6 +96,8 @@ class PlannedTest:
     chosen: Mapping[str, str] = field(default_factory=dict)
     stages: tuple[PlannedStage, ...] = ()
     warnings: tuple[str, ...] = ()
+    group: str = ""
+    leading_figure: str = ""
 
 
 @dataclass(frozen=True)
@@ -311,6 +313,8 @@ def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: i
         kind=entry.kind,
         title=entry.title,
         description=entry.description,
+        group=entry.group,
+        leading_figure=entry.leading_figure,
         reproduces=entry.reproduces,
         bench=test.bench_name,
         options={

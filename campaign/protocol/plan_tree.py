@@ -51,6 +51,8 @@ def _test(test: PlannedTest) -> dict[str, Any]:
         "kind": test.kind,
         "title": test.title,
         "description": test.description,
+        "group": test.group,
+        "leading_figure": test.leading_figure,
         "reproduces": list(test.reproduces),
         "bench": test.bench,
         "options": test.options,

@@ -131,6 +131,10 @@ class TestEntry(Options):
     """Heading of the test in the report."""
     description: str = ""
     """What the test is for, in a sentence or two."""
+    group: str = ""
+    """Heading of a group of tests in the report's contents; that of the test before when absent."""
+    leading_figure: str = ""
+    """Key of the figure of this test that stands on top of the report; chosen when absent."""
     reproduces: tuple[str, ...] = ()
     """Published tables, figures and claims it speaks to: "5.2", "figure 5.4", "text 5.2.2.2"."""
     matrix: dict[str, Any] = {}

@@ -179,6 +179,8 @@ def render(
 
     `trials`: those that will have a page of their own. `command`: what to type for the report.
     """
+    from markupsafe import Markup
+
     filled = Templates(packaged_templates, templates)
     at_work = at_work or Workers(run, measure_anew=measure_anew)
     document = document_of(
@@ -200,6 +202,8 @@ def render(
     damage = listed(document.damaged, DAMAGED)
     notice = told_on_page(run, document.damaged, layout.folder) if document.damaged else None
     added = interactive(layout.figures) if zoom else None
+    script = (packaged_templates / "report.js").read_text(encoding="utf-8")
+    script += f"\n{added.script}" if added else ""
     context = {
         "document": document,
         "layout": layout,
@@ -208,10 +212,12 @@ def render(
         "citation": citation_of(run),
         "colours": variables(),
         "interactive": added,
-        "policy": policy(*([added.script] if added else [])),
+        "script": Markup(script),  # noqa: S704 (packaged)
+        "policy": policy(script),
         "agreement": tables.agreement(document.scoreboard),
         "scoreboard": [lines.shown_line(line) for line in document.scoreboard.lines],
         "statuses": lines.statuses(document.scoreboard),
+        "answers": {answer.test: answer for answer in document.opening.answers},
         "anchors": {section.test.name: section.anchor for section in layout.sections},
         "failed": document.failed[:FAILED],
         "contradictions": lines.contradictions(document.scoreboard),

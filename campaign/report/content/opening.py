@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.access.analysis import AnalysedTest
@@ -10,11 +10,13 @@ from campaign.access.sentences import is_decided, remarks, sentence, told_with_i
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import speaking_of
-from campaign.published.headline import NOBODY_FITTED, headline
+from campaign.published.headline import LIMITS, NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
+from campaign.report.content.key_numbers import KeyNumbers, key_numbers
 from campaign.report.content.references import References
 from campaign.report.content.run_problems import wrong_with
-from campaign.report.content.truth import biases, held
+from campaign.report.content.truth import COUNTED, biases, held
+from campaign.report.content.written_units import units_of
 from campaign.result import Factor, Figure, Result, Table
 
 FROM = {
@@ -26,6 +28,8 @@ MANY = 6
 """Most tests whose answers stand on top in full; of more, that many are chosen, and have a sentence
 each: nobody reads twenty answers in a minute."""
 
+CLOSE = (5, 10)
+"""Percent of the published value that the first screen counts by, two of `LIMITS`."""
 INTERVALS = (
     "± and brackets behind a number: 95 % interval, systematic parts of known size included."
 )
@@ -80,6 +84,8 @@ class Opening:
         asked: what was executed, on which bench, in a sentence.
         compared: how many published values were reproduced; "" where none was compared.
         intervals: what ± and brackets say; "" where no sentence has any.
+        held: how many intervals of all tests hold the true values; "" unknown.
+        key_numbers: what the main tests, or all where there are few, say first.
     """
 
     answers: tuple[Answer, ...]
@@ -89,6 +95,8 @@ class Opening:
     compared: str = ""
     main: tuple[str, ...] = ()
     intervals: str = ""
+    held: str = ""
+    key_numbers: tuple[KeyNumbers, ...] = ()
 
     @property
     def chosen(self) -> tuple[Answer, ...]:
@@ -117,14 +125,17 @@ def opening_of(
 ) -> Opening:
     """The opening of a run's report; `damaged` is all damage that the report met."""
     main = _main(tests)
+    shown = [test for test in tests if not main or test.name in main]
     return Opening(
         tuple(_answer(test, truths.get(test.name), references) for test in tests),
-        _telling([test for test in tests if test.name in main]) or _telling(tests),
-        tuple(wrong_with(run, tests, damaged)),
+        _stated(tests) or _telling(shown) or _telling(tests),
+        (*wrong_with(run, tests, damaged), *_without_stated(tests)),
         _asked(run, tests),
         _compared(scoreboard),
         main,
         INTERVALS if any(map(_tells, tests)) else "",
+        held([row for table in truths.values() for row in table.rows if COUNTED in row]),
+        key_numbers(shown, units_of(tests, run.header), scoreboard),
     )
 
 
@@ -231,6 +242,23 @@ def _figure(result: Result) -> Figure | None:
     return next(named, next(iter(result.figures), None))
 
 
+def _stated(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
+    """Test and key of the figure that the protocol puts on top; None where it names none."""
+    named = ((test, test.leading_figure) for test in tests)
+    there = ((t.name, key) for t, key in named if any(f.key == key for f in t.result.figures))
+    return next(there, None)
+
+
+def _without_stated(tests: Sequence[AnalysedTest]) -> Iterator[str]:
+    for test in tests:
+        keys = [figure.key for figure in test.result.figures]
+        if test.leading_figure and test.leading_figure not in keys and keys:
+            yield (
+                f"{test.title} has no figure '{test.leading_figure}', which the protocol puts on "
+                f"top of the page; it has {', '.join(keys)}."
+            )
+
+
 def _telling(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
     """Test and key of the figure that tells most.
 
@@ -291,6 +319,12 @@ def _compared(scoreboard: Scoreboard) -> str:
     ]
     what = "published value was" if found.compared == 1 else "published values were"
     fitted = "" if free else ", none of which is a prediction"
+    near = [
+        f"{sum(each.within[LIMITS.index(limit)] for each in found.counts)} within {limit} %"
+        for limit in CLOSE
+    ]
+    numbers = sum(each.numbers for each in found.counts)
+    close = f" Of {numbers} numbers {' and '.join(near)}." if numbers else ""
     return f"{found.compared} {what} compared: reproduced are {' and '.join(shares)}".rstrip() + (
-        f"{fitted}."
+        f"{fitted}.{close}"
     )

@@ -8,7 +8,7 @@ from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ShownLine
-from campaign.report.content.opening import Answer
+from campaign.report.content.opening import Answer, Opening
 from campaign.report.page.damage_notice import Notice
 from campaign.report.page.folder import Comparison, Section, ShownFigure
 from campaign.report.page.layout import Layout
@@ -88,6 +88,10 @@ def _opening(layout: Layout) -> Iterator[Piece]:
         yield Paragraph(opening.asked)
     yield from (Paragraph(why, role="warning") for why in opening.wrong)
     shown = {section.test.name for section in layout.sections if section.truth is not None}
+    if opening.held:
+        yield Paragraph(f"{opening.held} of the simulated bench.")
+    if opening.key_numbers:
+        yield _key_numbers(opening)
     if opening.intervals:
         yield Paragraph(opening.intervals)
     for answer in opening.in_short.answers if opening.main else opening.answers:
@@ -101,6 +105,26 @@ def _opening(layout: Layout) -> Iterator[Piece]:
         for answer in group.answers:
             yield Facts(((answer.title, " ".join(_answer(answer, answer.test in shown))),))
         yield from (Paragraph(f"Of each of these: {remark}") for remark in group.remarks)
+
+
+def _key_numbers(opening: Opening) -> Grid:
+    rows = tuple(
+        (
+            group.title,
+            each.quantity,
+            ", ".join(filter(None, (each.where, group.where))),
+            each.value,
+            f"{each.published} ✓" if each.agrees else each.published,
+        )
+        for group in opening.key_numbers
+        for each in group.numbers
+    )
+    headers = ("Test", "Quantity", "Where", "Found", "Published")
+    count = 5 if any(row[-1] for row in rows) else 4
+    right = (False, False, False, True, True)
+    title = "Key numbers."
+    cut = tuple(row[:count] for row in rows)
+    return Grid(None, "key-numbers", title, headers[:count], right[:count], cut)
 
 
 def _compared_and_telling(layout: Layout) -> Iterator[Piece]:

@@ -104,6 +104,16 @@ class Layout:
         return tuple(sorted(every, key=lambda figure: figure.number))
 
     @property
+    def groups(self) -> tuple[tuple[str, tuple[Section, ...]], ...]:
+        """Sections of the tests by group; "" of those before the first that names one."""
+        found: list[tuple[str, list[Section]]] = []
+        for section in self.sections:
+            if not found or section.test.group not in ("", found[-1][0]):
+                found.append((section.test.group, []))
+            found[-1][1].append(section)
+        return tuple((name, tuple(own)) for name, own in found)
+
+    @property
     def figure_groups(self) -> tuple[tuple[ShownFigure, ...], ...]:
         """The figures in groups of about ten, few enough that any of them is soon reached."""
         figures = self.figures

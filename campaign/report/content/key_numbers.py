@@ -1,0 +1,127 @@
+"""Key numbers: what the sentences of each test say, as a table for the first screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from campaign.access.analysis import AnalysedTest
+from campaign.access.sentences import alone
+from campaign.axis_kind import speaking_of
+from campaign.experiments.preparing.draws import draws_of
+from campaign.published.draws import without_seed
+from campaign.published.evidence import speaks_to
+from campaign.published.scoreboard import Line, Scoreboard
+from campaign.published.status import Status
+from campaign.report.content.lines import shown_line
+from campaign.report.content.truth import conditions_text
+from campaign.report.content.written_units import TestUnits
+from campaign.result import Amount, Factor, Finding, Value
+from campaign.text import quantity_words
+
+MOST = 18
+"""Rows that the first screen has room for."""
+FEWEST = 2
+"""of each test, however many there are."""
+SAYS_ITSELF = ("component", "direction", "model", "parameter", "statistic")
+"""Conditions whose value is clear without their name."""
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """A finding that a sentence of its test says.
+
+    Attributes:
+        quantity: in words.
+        where: its conditions, but for those that it shares with the others of its test.
+        value: with its interval and unit, as the sentence has it.
+        published: what is printed of it, with its unit; "" where nothing is.
+        agrees: whether that is reproduced.
+    """
+
+    quantity: str
+    where: str
+    value: str
+    published: str = ""
+    agrees: bool = False
+
+
+@dataclass(frozen=True)
+class KeyNumbers:
+    """Those of one test; `where` holds for all of them."""
+
+    test: str
+    title: str
+    where: str
+    numbers: tuple[KeyNumber, ...]
+
+
+def key_numbers(
+    tests: Sequence[AnalysedTest], units: Mapping[str, TestUnits], scoreboard: Scoreboard
+) -> tuple[KeyNumbers, ...]:
+    """The first numbers that each of these tests says; tests that say none are left out."""
+    said = [(test, tuple(_said(test))) for test in tests]
+    said = [(test, found) for test, found in said if found]
+    each = max(FEWEST, MOST // max(1, len(said)))
+    return tuple(
+        _of_test(test, found[:each], units[test.name], scoreboard.lines) for test, found in said
+    )
+
+
+def _said(test: AnalysedTest) -> Iterator[tuple[Finding, Amount | Factor]]:
+    """The findings that its sentences say, in their order, each once."""
+    left = list(test.result.findings)
+    for conclusion in test.result.conclusions:
+        for part in conclusion.parts:
+            if not isinstance(part, str) and (found := _finding(part, left)) is not None:
+                left.remove(found)
+                yield found, part
+
+
+def _finding(part: Amount | Factor, findings: Sequence[Finding]) -> Finding | None:
+    """None where several findings have that value: nobody knows which of them is said."""
+    estimate = part.estimate
+    same = [f for f in findings if f.value == estimate.value and f.unit == estimate.unit]
+    same = [f for f in same if f.quantity == estimate.name] or same
+    return same[0] if len(same) == 1 else None
+
+
+def _of_test(
+    test: AnalysedTest,
+    said: Sequence[tuple[Finding, Amount | Factor]],
+    units: TestUnits,
+    lines: Sequence[Line],
+) -> KeyNumbers:
+    drawn = len(draws_of(each.trial for each in test.trials)) > 1  # a median is of no seed
+    every = [without_seed(f.conditions) if drawn else f.conditions for f, _ in said]
+    shared: dict[str, Value] = {}
+    if len(said) > 1:
+        shared = {n: v for n, v in every[0].items() if all(n in c and c[n] == v for c in every)}
+    own = [line for line in lines if line.test == test.name]
+    with speaking_of(test.sides):
+        numbers = tuple(
+            KeyNumber(
+                quantity_words(finding.quantity),
+                _where({n: v for n, v in conditions.items() if n not in shared}, units),
+                alone(part),
+                *_published(finding, own, test),
+            )
+            for (finding, part), conditions in zip(said, every, strict=True)
+        )
+        return KeyNumbers(test.name, test.title, _where(shared, units), numbers)
+
+
+def _where(conditions: Mapping[str, Value], units: TestUnits) -> str:
+    alone = [str(value) for name, value in conditions.items() if name in SAYS_ITSELF]
+    others = {name: value for name, value in conditions.items() if name not in SAYS_ITSELF}
+    return ", ".join([*alone, *filter(None, [conditions_text(others, units)])]).replace("_", " ")
+
+
+def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> tuple[str, bool]:
+    """What is printed of it, and whether it is reproduced; of doubtful cells nothing."""
+    known = test.evidence().known
+    for line in lines:
+        if line.status is not Status.INCONSISTENT and speaks_to(finding, line.cell, known):
+            shown = shown_line(line)
+            return f"{shown.published} {shown.unit}".rstrip(), shown.good
+    return "", False
