@@ -16,6 +16,7 @@ from campaign.archive import RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
+from campaign.published.headline import is_compared, once
 from campaign.reason import NONE, Reason
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.report.build import build_report, render
@@ -316,10 +317,14 @@ def test_an_analysis_that_failed_is_named_and_costs_nobody_else(
 def test_published_values_take_part_in_one_sentence(made_up: ModuleType, tmp_path: Path):
     run = made_up.made_up_run(tmp_path)
     found = document_of(run, made_up.EXPERIMENTS)
-    counts = re.findall(r"\d+", found.opening.compared)
+    said, close = found.opening.compared.split(". Of ")
+    counts = re.findall(r"\d+", said)
     assert int(counts[0]) == sum(int(each) for each in counts[2::2])
-    assert "published values were compared: reproduced are" in found.opening.compared
-    assert found.opening.compared.count(". ") == 0
+    assert "published values were compared: reproduced are" in said
+    values = filter(is_compared, once(found.scoreboard.lines))
+    sizes = [abs(line.deviation) for line in values if line.deviation is not None]
+    within = [sum(size <= limit for size in sizes) for limit in (5, 10)]
+    assert close == f"{len(sizes)} numbers {within[0]} within 5 % and {within[1]} within 10 %."
     html = render(run, tmp_path, made_up.EXPERIMENTS, made_up.TEMPLATES)[0]
     assert '<a href="#scoreboard">' in _section(html)
 
@@ -387,7 +392,7 @@ def test_a_title_that_speaks_of_hardware_says_that_it_was_simulated(
 
 
 def _section(html: str) -> str:
-    start = html.index('<section id="opening">')
+    start = html.index('<section id="opening"')
     return html[start : html.index("</section>", start)]
 
 
@@ -454,7 +459,8 @@ def test_what_is_true_is_counted_beside_what_was_found(made_up: ModuleType, tmp_
         experiments(made_up, velocity_map=lambda data: Result(findings=findings)),
         made_up.TEMPLATES,
     )[0]
-    assert re.search(r'<a href="#table-\d+">1 of 2 intervals', _section(html))
+    assert re.search(r'<a href="#table-\d+">1 of 2 intervals', html)
+    assert "1 of 2 intervals hold the true values of the simulated bench." in _section(html)
 
 
 def test_hostile_text_is_only_text(made_up: ModuleType, tmp_path: Path):
@@ -467,5 +473,5 @@ def test_hostile_text_is_only_text(made_up: ModuleType, tmp_path: Path):
         run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
     )
     html = report.path.read_text(encoding="utf-8")
-    assert "<script" not in html
+    assert html.count("<script") == 1, "the page's own"
     assert "{{ 7 * 7 }}" in _section(html)

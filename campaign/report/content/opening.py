@@ -64,10 +64,9 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Group:
-    """The answers of the tests of one kind; `remarks` are true of each of several."""
+class Short:
+    """Answers by the first sentence of each; `remarks` are what several remark, and of which."""
 
-    kind: str
     answers: tuple[Answer, ...]
     remarks: tuple[str, ...] = ()
 
@@ -99,20 +98,15 @@ class Opening:
     key_numbers: tuple[KeyNumbers, ...] = ()
 
     @property
-    def chosen(self) -> tuple[Answer, ...]:
-        """The answers of the main tests, in the protocol's order."""
-        return tuple(each for each in self.answers if each.test in self.main)
+    def in_short(self) -> Short:
+        """The main tests, or all where they are few, by the first sentence of each."""
+        return _in_short([each for each in self.answers if not self.main or each.test in self.main])
 
     @property
-    def in_short(self) -> Group:
-        """The main tests by the first sentence of each; what several remark, once and of which."""
-        return _in_short(self.chosen)
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        """All answers, those of one kind together; what each of several remarks, once."""
-        kinds = dict.fromkeys(each.kind for each in self.answers)
-        return tuple(_group(kind, [a for a in self.answers if a.kind == kind]) for kind in kinds)
+    def in_words(self) -> tuple[Answer, ...]:
+        """Those of them that say no key number."""
+        told = {each.test for each in self.key_numbers}
+        return tuple(each for each in self.in_short.answers if each.test not in told)
 
 
 def opening_of(
@@ -162,17 +156,7 @@ def _tells(test: AnalysedTest, sentences: int | None = None) -> int:
     return sum(map(told_with_intervals, test.result.conclusions[:sentences]))
 
 
-def _group(kind: str, answers: Sequence[Answer]) -> Group:
-    if len(answers) == 1:
-        return Group(kind, tuple(answers))
-    shared = [r for r in answers[0].remarks if all(r in each.remarks for each in answers)]
-    own = (
-        replace(each, remarks=tuple(r for r in each.remarks if r not in shared)) for each in answers
-    )
-    return Group(kind, tuple(own), tuple(shared))
-
-
-def _in_short(chosen: Sequence[Answer]) -> Group:
+def _in_short(chosen: Sequence[Answer]) -> Short:
     titles: dict[str, list[str]] = {}
     for each in chosen:
         for remark in each.first_remarks:
@@ -190,7 +174,7 @@ def _in_short(chosen: Sequence[Answer]) -> Group:
         f"Of {'each of these' if len(own) == len(chosen) else '; '.join(own)}: {remark}"
         for remark, own in shared.items()
     )
-    return Group("", tuple(answers), tuple(told))
+    return Short(tuple(answers), tuple(told))
 
 
 def _answer(test: AnalysedTest, truth: Table | None, references: References) -> Answer:

@@ -48,8 +48,9 @@ def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
         if layout.closeness is not None:
             yield layout.closeness
         yield Paragraph(f"Every published number is in {layout.scoreboard_download.file}.")
+    answers = {answer.test: answer for answer in document.opening.answers}
     for section in layout.sections:
-        yield from _section(section, layout.telling)
+        yield from _section(section, answers[section.test.name], layout.telling)
     yield from _contradictions(document)
     yield from _failed(document)
     if document.incidents:
@@ -81,30 +82,31 @@ def _counted(count: int, what: str) -> list[str]:
 
 
 def _opening(layout: Layout) -> Iterator[Piece]:
-    """What was asked and found, each caveat of it, and the page's first figure."""
+    """How good the run is, its key numbers, each caveat of them, and the page's first figure."""
     opening = layout.document.opening
     yield Heading(2, "What was found", "opening")
-    if opening.asked:
-        yield Paragraph(opening.asked)
     yield from (Paragraph(why, role="warning") for why in opening.wrong)
-    shown = {section.test.name for section in layout.sections if section.truth is not None}
+    if opening.compared:
+        yield Paragraph(opening.compared)
     if opening.held:
         yield Paragraph(f"{opening.held} of the simulated bench.")
     if opening.key_numbers:
         yield _key_numbers(opening)
-    if opening.intervals:
-        yield Paragraph(opening.intervals)
-    for answer in opening.in_short.answers if opening.main else opening.answers:
-        yield Facts(((answer.title, " ".join(_answer(answer, answer.test in shown))),))
-    yield from map(Paragraph, opening.in_short.remarks)
-    yield from _compared_and_telling(layout)
-    if not opening.main:
-        return
-    yield Heading(3, f"What each of the {len(opening.answers)} tests found", "every-answer")
-    for group in opening.groups:
-        for answer in group.answers:
-            yield Facts(((answer.title, " ".join(_answer(answer, answer.test in shown))),))
-        yield from (Paragraph(f"Of each of these: {remark}") for remark in group.remarks)
+    for answer in opening.in_words:
+        yield Facts(((answer.title, " ".join((*answer.sentences, *_problem(answer)))),))
+    yield from map(Paragraph, filter(None, (*_remarks(opening), opening.intervals, opening.asked)))
+    if layout.telling is not None:
+        yield layout.telling
+
+
+def _remarks(opening: Opening) -> Iterator[str]:
+    for answer in opening.in_short.answers:
+        yield from (f"{answer.title}: {remark}" for remark in answer.remarks)
+    yield from opening.in_short.remarks
+
+
+def _problem(answer: Answer) -> list[str]:
+    return [f"No result: {answer.problem}."] if answer.problem else []
 
 
 def _key_numbers(opening: Opening) -> Grid:
@@ -127,30 +129,22 @@ def _key_numbers(opening: Opening) -> Grid:
     return Grid(None, "key-numbers", title, headers[:count], right[:count], cut)
 
 
-def _compared_and_telling(layout: Layout) -> Iterator[Piece]:
-    if layout.document.opening.compared:
-        yield Paragraph(layout.document.opening.compared)
-    if layout.telling is not None:
-        yield layout.telling
-
-
 def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
-    """All that the page says of a test; `with_truth` where its truth is shown."""
+    """What the page says of a test; `with_truth` where its truth is shown."""
     yield from answer.sentences
-    if answer.problem:
-        yield f"No result: {answer.problem}."
+    yield from _problem(answer)
     if with_truth and answer.truth:
         yield f"{answer.truth}."
     yield from (f"{each}." for each in (answer.prediction, *answer.references) if each)
-    yield from answer.remarks
 
 
-def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
+def _section(section: Section, answer: Answer, telling: ShownFigure | None) -> Iterator[Piece]:
     """A test in the order of the page, which its numbers follow; `telling` is shown already."""
     yield Heading(2, section.test.title, section.anchor)
     if section.test.description:
         yield Paragraph(section.test.description)
     yield from (Paragraph(problem, role="warning") for problem in section.problems)
+    yield Paragraph(" ".join(_answer(answer, section.truth is not None)))
     yield Heading(3, "Conditions")
     yield Facts(section.conditions)
     yield from map(_compared, section.comparisons)
@@ -166,9 +160,9 @@ def _section(section: Section, telling: ShownFigure | None) -> Iterator[Piece]:
         else:
             yield figure
     yield from (section.tables)
-    if section.test.result.notes:
+    if notes := (*answer.remarks, *section.test.result.notes):
         yield Heading(3, "Notes")
-        yield Items(section.test.result.notes)
+        yield Items(notes)
 
 
 def _compared(shown: Comparison) -> Grid:
