@@ -202,7 +202,7 @@ def render(
     damage = listed(document.damaged, DAMAGED)
     notice = told_on_page(run, document.damaged, layout.folder) if document.damaged else None
     added = interactive(layout.figures) if zoom else None
-    script = (packaged_templates / "report.js").read_text(encoding="utf-8")
+    script = (packaged_templates / "report.js").read_text(encoding="utf-8").strip()
     script += f"\n{added.script}" if added else ""
     context = {
         "document": document,

@@ -202,7 +202,9 @@ def show(browser: Browser, page_file: Callable[[str], Path]) -> Iterator[Callabl
     """Open a page of `MADE` by its name: `show("usual", width=360, color_scheme="dark")`."""
     with ExitStack() as open_contexts:
 
-        def opened(name: str, *, width: int = 1440, height: int = 900, **more: Any) -> Shown:
+        def opened(
+            name: str, *, width: int = 1440, height: int = 900, unfold: bool = False, **more: Any
+        ) -> Shown:
             context = browser.new_context(viewport={"width": width, "height": height}, **more)
             open_contexts.callback(context.close)
             context.set_default_timeout(60_000)  # for a busy machine
@@ -226,6 +228,10 @@ def show(browser: Browser, page_file: Callable[[str], Path]) -> Iterator[Callabl
                 lambda said: said.type in ("warning", "error") and shown.messages.append(said.text),
             )
             page.goto(address)
+            if unfold:
+                page.evaluate(
+                    "document.querySelectorAll('details').forEach((e) => (e.open = true))"
+                )
             return shown
 
         yield opened

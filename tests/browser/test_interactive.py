@@ -18,7 +18,7 @@ def number(text):
 
 @pytest.fixture
 def shown(show):
-    return show("interactive")
+    return show("interactive", unfold=True)
 
 
 def switch(page):
@@ -173,7 +173,7 @@ def test_units_are_those_of_the_static_figure(shown):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_in_figures_that_zoom(show, axe, scheme):
-    page = show("interactive", color_scheme=scheme).page
+    page = show("interactive", unfold=True, color_scheme=scheme).page
     switch(page).click()
     zoomed(page, RATES)
     assert axe(page) == []
@@ -181,7 +181,7 @@ def test_axe_finds_nothing_in_figures_that_zoom(show, axe, scheme):
 
 @pytest.mark.parametrize("width", [360, 768, 1440])
 def test_figures_that_zoom_fit_the_window(show, width):
-    shown = show("interactive", width=width)
+    shown = show("interactive", unfold=True, width=width)
     page = shown.page
     switch(page).click()
     zoomable = page.evaluate(
@@ -225,8 +225,8 @@ def test_colours_follow_the_page(shown):
 
 
 def test_without_scripts_the_page_is_the_static_one(show):
-    page = show("interactive", java_script_enabled=False).page
-    static = show("usual", java_script_enabled=False).page
+    page = show("interactive", unfold=True, java_script_enabled=False).page
+    static = show("usual", unfold=True, java_script_enabled=False).page
     assert switch(page).count() == 0
     assert page.inner_text("body") == static.inner_text("body")
     assert page.screenshot(full_page=True) == static.screenshot(full_page=True)

@@ -64,7 +64,7 @@ NUMBERS = """() => [...document.querySelectorAll("#scoreboard table li")]
 @pytest.mark.parametrize("scripts", [True, False])
 def test_the_scoreboard_is_filtered_by_status_with_the_keyboard(show, scripts):
     """Each choice says its status, its sign and how many it leaves; the first leaves all."""
-    page = show("usual", java_script_enabled=scripts).page
+    page = show("usual", java_script_enabled=scripts, unfold=True).page
     everything = page.evaluate(NUMBERS)
     choices = page.locator("#scoreboard").get_by_role("radio")
     names = [choice.evaluate("e => e.labels[0].textContent.trim()") for choice in choices.all()]

@@ -29,8 +29,7 @@ def test_axe_finds_nothing(show, axe, name, scheme, width, height):
 
 @pytest.mark.parametrize("name", PAGES)
 def test_the_page_is_no_wider_than_the_window(show, name):
-    page = show(name).page
-    page.evaluate("document.querySelectorAll('details').forEach((each) => (each.open = true))")
+    page = show(name, unfold=True).page
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate(WIDER) == {"wider": 0, "out": []}, width
