@@ -45,11 +45,8 @@ def words(part: Amount | Factor) -> str:
 
 
 def alone(part: Amount | Factor) -> str:
-    """A number as a table has it, whose notes say why it has no interval."""
-    said = words(part).removeprefix("a ratio of ")
-    for reason in (NO_NOISE, NO_INTERVAL, " in this simulation"):
-        said = said.removesuffix(reason)
-    return said
+    """A number as a table has it: a ratio as it is, and no word on why it has no interval."""
+    return _amount(part if isinstance(part, Amount) else Amount(part.estimate))
 
 
 def remarks(conclusions: Iterable[Conclusion]) -> Iterator[str]:

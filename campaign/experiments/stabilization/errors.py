@@ -30,6 +30,8 @@ WIDE = 20.0
 DECADE = 10.0
 """Ratio of the largest to the smallest swept value from which on their axis is."""
 
+BY_METHOD = "error-by-method"
+
 Rows = Sequence[Mapping[str, Cell]]
 
 
@@ -142,7 +144,7 @@ def _by_method(rows: Rows, paths: Sequence[str], trial: Trial, options: type[Opt
         for told, group in places[:MOST_PANELS]
     ]
     return Figure(
-        key="error-by-method",
+        key=BY_METHOD,
         title="Stabilization error by compensation method",
         caption=f"Error (1σ) of each method{_where(rows, '', trial, options)}"
         f"{_with_interval(rows)}.{_left_out(places)}",

@@ -9,6 +9,7 @@ from campaign.access.analysis import AnalysedTest
 from campaign.access.sentences import alone
 from campaign.axis_kind import speaking_of
 from campaign.experiments.preparing.draws import draws_of
+from campaign.experiments.shared.common import short_label
 from campaign.published.draws import without_seed
 from campaign.published.evidence import speaks_to
 from campaign.published.scoreboard import Line, Scoreboard
@@ -16,14 +17,16 @@ from campaign.published.status import Status
 from campaign.report.content.lines import shown_line
 from campaign.report.content.truth import conditions_text
 from campaign.report.content.written_units import TestUnits
-from campaign.result import Amount, Factor, Finding, Value
-from campaign.text import quantity_words
+from campaign.result import Amount, Factor, Finding, Table, Value
+from campaign.text import SHORT, number, pretty_unit, quantity_words
+from campaign.units import convert
 
 MOST = 18
 """Rows that the first screen has room for."""
 FEWEST = 2
 """of each test, however many there are."""
-SAYS_ITSELF = ("component", "direction", "model", "parameter", "statistic")
+COMPENSATION = "compensation"
+SAYS_ITSELF = ("component", COMPENSATION, "direction", "model", "parameter", "statistic")
 """Conditions whose value is clear without their name."""
 
 
@@ -37,6 +40,7 @@ class KeyNumber:
         value: with its interval and unit, as the sentence has it.
         published: what is printed of it, with its unit; "" where nothing is.
         agrees: whether that is reproduced.
+        true: what is true of the simulated bench, with its unit; "" unknown.
     """
 
     quantity: str
@@ -44,6 +48,7 @@ class KeyNumber:
     value: str
     published: str = ""
     agrees: bool = False
+    true: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,14 +62,18 @@ class KeyNumbers:
 
 
 def key_numbers(
-    tests: Sequence[AnalysedTest], units: Mapping[str, TestUnits], scoreboard: Scoreboard
+    tests: Sequence[AnalysedTest],
+    units: Mapping[str, TestUnits],
+    scoreboard: Scoreboard,
+    truths: Mapping[str, Table],
 ) -> tuple[KeyNumbers, ...]:
     """The first numbers that each of these tests says; tests that say none are left out."""
     said = [(test, tuple(_said(test))) for test in tests]
     said = [(test, found) for test, found in said if found]
     each = max(FEWEST, MOST // max(1, len(said)))
     return tuple(
-        _of_test(test, found[:each], units[test.name], scoreboard.lines) for test, found in said
+        _of_test(test, found[:each], units[test.name], scoreboard.lines, truths.get(test.name))
+        for test, found in said
     )
 
 
@@ -91,6 +100,7 @@ def _of_test(
     said: Sequence[tuple[Finding, Amount | Factor]],
     units: TestUnits,
     lines: Sequence[Line],
+    truth: Table | None,
 ) -> KeyNumbers:
     drawn = len(draws_of(each.trial for each in test.trials)) > 1  # a median is of no seed
     every = [without_seed(f.conditions) if drawn else f.conditions for f, _ in said]
@@ -105,6 +115,7 @@ def _of_test(
                 _where({n: v for n, v in conditions.items() if n not in shared}, units),
                 alone(part),
                 *_published(finding, own, test),
+                _true(finding, part, truth),
             )
             for (finding, part), conditions in zip(said, every, strict=True)
         )
@@ -112,9 +123,17 @@ def _of_test(
 
 
 def _where(conditions: Mapping[str, Value], units: TestUnits) -> str:
-    alone = [str(value) for name, value in conditions.items() if name in SAYS_ITSELF]
+    alone = [
+        _compensation(str(value)) if name == COMPENSATION else str(value)
+        for name, value in conditions.items()
+        if name in SAYS_ITSELF
+    ]
     others = {name: value for name, value in conditions.items() if name not in SAYS_ITSELF}
     return ", ".join([*alone, *filter(None, [conditions_text(others, units)])]).replace("_", " ")
+
+
+def _compensation(name: str) -> str:
+    return "without compensation" if name == "none" else short_label(name)
 
 
 def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> tuple[str, bool]:
@@ -125,3 +144,15 @@ def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> t
             shown = shown_line(line)
             return f"{shown.published} {shown.unit}".rstrip(), shown.good
     return "", False
+
+
+def _true(finding: Finding, part: Amount | Factor, truth: Table | None) -> str:
+    """The value beside which the test's own table holds it."""
+    if truth is None or not isinstance(part, Amount):
+        return ""
+    same = (row["true"] for row in truth.rows if row["found"] == finding.known)
+    value = next((each for each in same if isinstance(each, float)), None)
+    if value is None:
+        return ""
+    unit = part.display or finding.unit
+    return f"{number(convert(value, finding.unit, unit), SHORT)} {pretty_unit(unit)}".rstrip()

@@ -1,4 +1,4 @@
-"""The first minute: what was asked, what was found and how good that is, and what went wrong."""
+"""The first screen: how good the run is, its key numbers, one figure, and what went wrong."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def opening_of(
         main,
         INTERVALS if any(map(_tells, tests)) else "",
         held([row for table in truths.values() for row in table.rows if COUNTED in row]),
-        key_numbers(shown, units_of(tests, run.header), scoreboard),
+        key_numbers(shown, units_of(tests, run.header), scoreboard, truths),
     )
 
 

@@ -50,7 +50,8 @@ def wrong_with(
 
 def _end(run: RunReader) -> Iterator[str]:
     if run.status in ENDED:
-        yield ENDED[run.status] + (f": {_short(run.reason)}." if run.reason else ".")
+        known = run.reason and run.status is not RunStatus.INCOMPLETE  # its reason says the same
+        yield ENDED[run.status] + (f": {_short(run.reason)}." if known else ".")
 
 
 def _safety(run: RunReader) -> Iterator[str]:

@@ -117,16 +117,21 @@ def _key_numbers(opening: Opening) -> Grid:
             ", ".join(filter(None, (each.where, group.where))),
             each.value,
             f"{each.published} ✓" if each.agrees else each.published,
+            each.true,
         )
         for group in opening.key_numbers
         for each in group.numbers
     )
-    headers = ("Test", "Quantity", "Where", "Found", "Published")
-    count = 5 if any(row[-1] for row in rows) else 4
-    right = (False, False, False, True, True)
-    title = "Key numbers."
-    cut = tuple(row[:count] for row in rows)
-    return Grid(None, "key-numbers", title, headers[:count], right[:count], cut)
+    headers = ("Test", "Quantity", "Where", "Found", "Published", "True")
+    kept = [n for n in range(len(headers)) if any(row[n] for row in rows)]
+    return Grid(
+        None,
+        "key-numbers",
+        "Key numbers.",
+        tuple(headers[n] for n in kept),
+        tuple(headers[n] in ("Found", "Published", "True") for n in kept),
+        tuple(tuple(row[n] for n in kept) for row in rows),
+    )
 
 
 def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
