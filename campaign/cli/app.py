@@ -2,15 +2,16 @@
 
 What is asked of archives is in `archive_commands`, of a rig by its runs in `rig_commands`, what is
 done once in `setup_commands`, and what is done at a bench in `bench_commands`: each adds its
-commands to those of the one before, so that `campaign --help` lists them in this order.
+commands to those of the one before. `GROUPS` says under which heading `--help` lists each.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 import campaign
 from campaign.cli.parameters import (
@@ -38,8 +39,32 @@ from campaign.cli.parameters import (
     workers_option,
 )
 
+GROUPS = {
+    "Experiments": ("init", "plan", "run", "resume", "rerun", "import"),
+    "Results": ("list", "show", "report", "identify", "compare", "trend", "index", "export"),
+    "Benches": ("kinds", "check", "calibrate", "fingerprint"),
+    "Archives": ("verify", "sign"),
+    "Hardware": ("device", "stop", "status"),
+    "Installation": ("warmup",),
+}
+"""Commands as the help lists them, by heading."""
+
+
+class Grouped(TyperGroup):
+    """Lists commands by heading; one without a heading comes last."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        left = {name: self.commands[name] for name in self.list_commands(ctx)}
+        for heading, names in {**GROUPS, "Others": tuple(left)}.items():
+            own = [(name, left.pop(name).get_short_help_str(110)) for name in names if name in left]
+            if own:
+                with formatter.section(heading):
+                    formatter.write_dl(own)
+
+
 app = typer.Typer(
     name="campaign",
+    cls=Grouped,
     help="Friction experiments on stabilized servo platforms: run, archive, identify, report.",
     epilog="Exit codes: 0 done, 1 some trials failed, 2 bad usage or protocol, 3 a limit or a "
     "backend fault, 4 a damaged archive, 5 safe state NOT confirmed, 6 no result, "
@@ -74,6 +99,9 @@ def _options(
 def plan(
     protocol: ProtocolArgument,
     as_json: JsonOption = False,
+    details: Annotated[
+        bool, typer.Option("--details", help="Limits, loops, chosen options, notes of each test.")
+    ] = False,
     only: OnlyOption = None,
     changes: SetOption = None,
     backend: BackendOption = "sim",
@@ -90,7 +118,7 @@ def plan(
 
     settings = (*(changes or ()), *short_settings(port, source, results, handover))
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
-    raise typer.Exit(show_plan(request, results, as_json=as_json))
+    raise typer.Exit(show_plan(request, results, as_json=as_json, details=details))
 
 
 @app.command()

@@ -36,8 +36,8 @@ class QuietCommand(TyperCommand):
 
 for _command in app.registered_commands:
     _command.cls = QuietCommand
-    # The whole sentence; the list of commands would cut it.
-    _command.short_help = getattr(_command.callback, "__doc__", None)
+    # The whole sentence, and no more; the list of commands would cut it.
+    _command.short_help = (getattr(_command.callback, "__doc__", None) or "").split("\n\n")[0]
 
 
 def main() -> None:

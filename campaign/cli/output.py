@@ -195,7 +195,9 @@ def _table(columns: Sequence[Sequence[str]]) -> Table:
     """Columns, each with its heading first, that wrap between words only."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in columns:
-        table.add_column(column[0], no_wrap=_in_one_line(column))
+        whole = _in_one_line(column)  # and is not cut: it is as wide as its cells
+        wide = max(map(cell_len, column)) if whole else None
+        table.add_column(column[0], no_wrap=whole, min_width=wide)
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*map(Text, row))
     return table

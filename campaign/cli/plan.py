@@ -21,6 +21,7 @@ from campaign.experiments import experiments
 from campaign.experiments.interface import lost_without
 from campaign.policy import Policy, Response
 from campaign.protocol import (
+    LimitUse,
     Plan,
     PlannedStage,
     PlannedTest,
@@ -36,10 +37,14 @@ from campaign.trial import Most, Role, Trial
 
 NOTES = 5
 """of a test that are shown; the others are in the JSON."""
+LEAST = 0.005
+"""Share of a limit from which on its use is shown."""
 
 
-def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
+def show_plan(request: Request, results: Path, *, as_json: bool, details: bool = False) -> ExitCode:
     """Show the plan; ARCHIVE when the run that it would replay is damaged.
+
+    details: of several tests, too.
 
     Raises LimitError, after that, when it breaks a limit or is unstable.
     """
@@ -52,7 +57,7 @@ def show_plan(request: Request, results: Path, *, as_json: bool) -> ExitCode:
         tree = {**as_tree(prepared.plan), "backend": prepared.kind.name, "without": losses}
         print_json({**tree, "cost": {test: asdict(each) for test, each in cost.items()}})
     else:
-        _print(prepared, results, losses, cost)
+        _print(prepared, results, losses, cost, details=details)
     code = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     check_limits(prepared.plan)
     check_loops(prepared.plan)
@@ -75,16 +80,12 @@ def _print(
     results: Path,
     losses: Sequence[Mapping[str, str]],
     cost: Mapping[str, Cost],
+    *,
+    details: bool,
 ) -> None:
     plan = prepared.plan
     if plan.title:
         print_line(plan.title)
-        print_line()
-    headings = ("test", "kind", "bench", "trials", "bench time", "closest limits")
-    print_table(headings, [_row(test) for test in plan.tests], spare=("bench", "kind"))
-    for test in plan.tests:
-        own = [loss for loss in losses if loss["test"] == test.name]
-        _print_details(plan, test, own, cost.get(test.name))
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
@@ -97,6 +98,17 @@ def _print(
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
         print_note(f"shuffled: {', '.join(unseeded)}; a test without `seed` draws one per run")
+    print_line()
+    headings = ("test", "kind", "bench", "trials", "bench time", "closest limit")
+    print_table(headings, [_row(test) for test in plan.tests], spare=("bench", "kind"))
+    for test in plan.tests:
+        own = [loss for loss in losses if loss["test"] == test.name]
+        if details or len(plan.tests) == 1:
+            _print_details(plan, test, own, cost.get(test.name))
+        else:
+            _print_needed(plan, test, own)
+    if not details and len(plan.tests) > 1:
+        print_line("limits, loops, chosen options and notes of each test: --details")
 
 
 def in_short(most: Most) -> str:
@@ -171,10 +183,24 @@ def _response(response: Response) -> str:
 
 
 def _row(test: PlannedTest) -> tuple[str, ...]:
-    closest = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)[:2]
-    limits = ", ".join(f"{use.margin.called} {use.margin.fraction:.0%}" for use in closest)
+    closest = _closest(test)[:1]
+    limit = "".join(f"{use.margin.called} {use.margin.fraction:.0%}" for use in closest)
     trials = str(len(test.numbers))
-    return (test.name, test.kind, test.bench, trials, clock(test.duration), limits)
+    return (test.name, test.kind, test.bench, trials, clock(test.duration), limit)
+
+
+def _closest(test: PlannedTest) -> list[LimitUse]:
+    """How close it comes to its limits, the closest first; those that it hardly uses apart."""
+    found = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)
+    return [use for use in found if use is found[0] or use.margin.fraction >= LEAST]
+
+
+def _print_needed(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]]) -> None:
+    """What somebody must do, what there will be none of, and what may follow."""
+    trials = [plan.trials[number - 1] for number in test.numbers]
+    lacking = (f"without {loss['channel']}: no {loss['no']}" for loss in losses)
+    for line in (*_by_hand(trials), *lacking, *stage_lines(test.stages)):
+        print_line(f"{test.name}: {line}")
 
 
 def _print_chosen(test: PlannedTest) -> None:
@@ -198,7 +224,7 @@ def _print_details(
         print_line(f"  {checks} of the trials check that the bench is still the same")
     for line in _by_hand(trials):
         print_line(f"  {line}")
-    for use in sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True):
+    for use in _closest(test):
         value, bound = in_display_units(use.margin)
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"

@@ -180,8 +180,8 @@ def test_a_plan_says_what_an_optional_channel_costs(
     show_plan(request, tmp_path / "results", as_json=False)
     lines = [line for line in capsys.readouterr().out.splitlines() if "without" in line]
     assert lines == [
-        "  without base_rate: no time stuck, and no figure of the relative rate",
-        "  without command: no command in the figure of one point",
+        "sea: without base_rate: no time stuck, and no figure of the relative rate",
+        "map: without command: no command in the figure of one point",
     ]
     show_plan(request, tmp_path / "results", as_json=True)
     tree = json.loads(capsys.readouterr().out)

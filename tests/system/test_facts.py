@@ -127,7 +127,7 @@ def test_other_commands_take_it_or_say_what_they_miss(folder: Path) -> None:
     # Limits are all that it takes; what can be executed is by hand, and says so.
     done = campaign(folder, "init", "new", "--bench", "rig.toml")
     assert "campaign plan new/identify.toml --backend files --handover out" in done.out
-    plan = ("plan", "new/identify.toml", "--backend", "files", "--handover", "out")
+    plan = ("plan", "new/identify.toml", "--backend", "files", "--handover", "out", "--details")
     told = campaign(folder, *plan)
     assert "the rate loop is not described" in told.out
     assert "no breakaway torque can be told of its ramps" in told.err
