@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,15 +124,23 @@ def _write_picture(bench: CompleteBench, path: Path) -> None:
 
 def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:
     print_line(f"{bench.name}{f': {bench.description}' if bench.description else ''}")
+    print_line(", ".join(_counted([*loops, *facts])))
     print_line()
     if loops:
-        print_table(HEADINGS, [_loop_row(loop) for loop in loops])
+        spare = ("slowest decay", "delay margin", "least damped", "crossover")
+        print_table(HEADINGS, [_loop_row(loop) for loop in loops], spare=spare)
         print_line()
     if not facts:
         return
     headings = ("what against what", "is", "of", "share", "verdict", "what to do")
-    print_table(headings, [_fact_row(fact) for fact in facts])
+    print_table(headings, [_fact_row(fact) for fact in facts], spare=("of", "is", "share"))
     print_line()
+
+
+def _counted(checked: Sequence[CheckedLoop | Fact]) -> Iterator[str]:
+    """How many have which verdict: `9 fine, 3 low margin`."""
+    for verdict, count in Counter(each.verdict for each in checked).items():
+        yield f"{count} {verdict}"
 
 
 def _loop_row(loop: CheckedLoop) -> tuple[str, ...]:
