@@ -20,6 +20,7 @@ from campaign.cli.parameters import (
     TemplatesOption,
     output_option,
 )
+from campaign.errors import UsageError
 
 __all__ = ["app"]
 
@@ -46,11 +47,19 @@ def report(
         typer.Option(
             "--only-figure",
             metavar="TEST/KEY",
-            help="Only this figure, SVG and CSV; into RUN-figures, or --output. Its caption on "
-            "the page names it.",
+            help="Only this figure, or all, SVG and CSV; into RUN-figures, or --output. Its "
+            "caption on the page names it.",
             show_default=False,
         ),
     ] = None,
+    column: Annotated[
+        str,
+        typer.Option(
+            "--column",
+            metavar="single|double",
+            help="With --only-figure: 88 or 180 mm wide, with PDF, for a paper.",
+        ),
+    ] = "",
     formats: FormatOption = None,
     trials: Annotated[
         str,
@@ -76,7 +85,7 @@ def report(
     ] = None,
 ) -> None:
     """Write report.html, its tables and its figures, from an archive alone."""
-    from campaign.cli.report import draw_figure, report_run
+    from campaign.cli.report import draw_figures, report_run
 
     if only_figure is not None:
         of_the_page = {
@@ -88,11 +97,20 @@ def report(
             "--reference": references,
         }
         useless = [option for option, value in of_the_page.items() if value]
-        file, code = draw_figure(
-            run, results, output, only_figure, measure_anew=measure_anew, useless=useless
+        drawings, code = draw_figures(
+            run,
+            results,
+            output,
+            only_figure,
+            measure_anew=measure_anew,
+            useless=useless,
+            column=column,
         )
-        print_line(str(file))
+        for drawing in drawings:
+            print_line(str(drawing))
         raise typer.Exit(code)
+    if column:
+        raise UsageError("--column is for --only-figure TEST/KEY, or --only-figure all")
     page, code = report_run(
         run,
         results,

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from campaign.archive import RunReader, find_run, open_run
 from campaign.cli.output import print_note
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from campaign.archive.writing.results_file import PreparedResults
     from campaign.report.content.document import Document
     from campaign.report.content.references import Files
+    from campaign.report.drawing.figures import Column
 
 LISTED = 4
 """Most files of a folder that are named one by one."""
@@ -172,7 +173,7 @@ def _told(files: Iterable[str]) -> Iterator[str]:
 
 
 @unwinding()
-def draw_figure(
+def draw_figures(
     name: str | None,
     results: Path,
     output: Path | None,
@@ -180,8 +181,9 @@ def draw_figure(
     *,
     measure_anew: bool = False,
     useless: Sequence[str] = (),
-) -> tuple[Path, ExitCode]:
-    """Write one figure of a run's report, TEST/KEY; its drawing, and whether all could be read.
+    column: str = "",
+) -> tuple[tuple[Path, ...], ExitCode]:
+    """Write a figure of a run's report, TEST/KEY, or all; drawings, and whether all could be read.
 
     useless: options that were given besides and are of the whole page; UsageError for any.
     """
@@ -191,14 +193,17 @@ def draw_figure(
         )
     from campaign.cli.damage import say_damaged
     from campaign.experiments import experiments
-    from campaign.report.one_figure import write_figure
+    from campaign.report.one_figure import write_figures
 
+    if column not in ("", "single", "double"):
+        raise UsageError(f"--column {column}: is neither 'single' nor 'double'")
     path = find_run(results, name)
-    file, damaged = write_figure(
+    drawings, damaged = write_figures(
         open_run(path),
         wanted,
         output or path.with_name(f"{path.stem}-figures"),
         experiments=experiments(),
         measure_anew=measure_anew,
+        column=cast("Column", column) if column else None,
     )
-    return file, say_damaged(path, damaged)
+    return drawings, say_damaged(path, damaged)

@@ -210,7 +210,7 @@ def _analyse(data: TestData) -> Result:
         for item, own in items
     )
     small = [amplitude for place in found for amplitude in _small(place)]
-    again = f" On the right those up to {_amplitude(max(small), display)} again." if small else ""
+    again = f" Beside them those up to {_amplitude(max(small), display)} again." if small else ""
     figure = Figure(
         key="presliding-hysteresis",
         title="Friction over small displacements",

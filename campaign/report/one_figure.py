@@ -1,10 +1,11 @@
-"""One figure of a report by itself: drawing and numbers, as the report's folder has them."""
+"""Figures of a report by themselves: as the report's folder has them, or for a paper's column."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 
 from campaign.archive import RunReader
@@ -14,6 +15,8 @@ from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
 from campaign.protocol.problems import allowed
 from campaign.report.content.document import document_of
+from campaign.report.drawing.figures import Column, in_column
+from campaign.report.drawing.pdf import also_as_pdf
 from campaign.report.page.damage_notice import told_on_page
 from campaign.report.page.layout import lay_out
 from campaign.text import nearest
@@ -22,45 +25,64 @@ WRITTEN = ".campaign-figures"
 """Of a folder of figures: SHA-256 and name of each file that was written there, a line each."""
 
 
-def write_figure(
+ALL = "all"
+"""Instead of `TEST/KEY`: every figure."""
+
+
+def write_figures(
     run: RunReader,
     wanted: str,
     output: Path,
     *,
     experiments: Mapping[str, Experiment],
     measure_anew: bool = False,
-) -> tuple[Path, tuple[Damage, ...]]:
-    """Write the SVG and the CSV file of the figure `TEST/KEY` into the folder `output`.
+    column: Column | None = None,
+) -> tuple[tuple[Path, ...], tuple[Damage, ...]]:
+    """Write the SVG and the CSV file of the figure `TEST/KEY`, or of all, into the folder `output`.
 
     The whole report is laid out for it: colours, names and what stands beside a curve follow from
     all of it, so that the bytes are those of the report's own files.
 
-    Returns the path of the drawing, and what of the run is damaged. Raises UsageError when the run
-    has no such figure, when a file of that name is somebody's own, or when the folder cannot be
+    column: drawn 88 or 180 mm wide in place of that, with PDF files; names end with it.
+
+    Returns the paths of the drawings, and what of the run is damaged. Raises UsageError when the
+    run has no such figure, when a file of that name is somebody's own, or when the folder cannot be
     written.
     """
     document = document_of(run, experiments, measure_anew=measure_anew)
-    layout = lay_out(document)
+    with ExitStack() as drawing:
+        if column is not None:
+            drawing.enter_context(in_column(column))
+            drawing.enter_context(also_as_pdf())
+        layout = lay_out(document)
     if document.damaged:
         told_on_page(run, document.damaged, layout.folder)
     figures = {
         f"{section.test.name}/{figure.data.key}": figure
         for section in layout.sections
         for figure in section.figures
-        if figure.data
+        if figure.data and figure.download
     }
-    figure = figures.get(wanted)
-    if figure is None or figure.download is None:
+    if wanted != ALL and wanted not in figures:
         slip = nearest(wanted, figures)
-        raise UsageError(f"{wanted!r} is no figure of this run; {allowed(figures)}{slip}")
-    files = (figure.file, figure.download.file)
-    _write(output, {Path(name).name: on_a_page(layout.folder.files[name]) for name in files})
-    return output / Path(figure.file).name, document.damaged
+        raise UsageError(f"{wanted!r} is no figure of this run; {allowed([ALL, *figures])}{slip}")
+    files: dict[str, bytes] = {}
+    drawings = []
+    for figure in figures.values() if wanted == ALL else [figures[wanted]]:
+        name = Path(figure.file).stem + (f"-{column}" if column else "")
+        for file in (figure.file, figure.file.removesuffix(".svg") + ".csv"):
+            files[name + Path(file).suffix] = on_a_page(layout.folder.files[file]).encode()
+        pdf = layout.folder.pdfs.get(figure.file.removesuffix(".svg") + ".pdf")
+        if pdf is not None:
+            files[f"{name}.pdf"] = pdf
+        drawings.append(output / f"{name}.svg")
+    _write(output, files)
+    return tuple(drawings), document.damaged
 
 
-def _write(output: Path, texts: Mapping[str, str]) -> None:
+def _write(output: Path, files: Mapping[str, bytes]) -> None:
     """Write files into a folder, none of them in place of one that was not written here."""
-    new = {f"{_digest(text.encode())}  {name}": text for name, text in texts.items()}
+    new = {f"{_digest(data)}  {name}": data for name, data in files.items()}
     marker = output / WRITTEN
     try:
         ours = (
@@ -68,7 +90,7 @@ def _write(output: Path, texts: Mapping[str, str]) -> None:
             if marker.is_file()
             else []
         )
-        for name in texts:
+        for name in files:
             path = output / name
             if (path.exists() or path.is_symlink()) and not _is_one_of(path, {*ours, *new}):
                 raise UsageError(
@@ -77,9 +99,9 @@ def _write(output: Path, texts: Mapping[str, str]) -> None:
                 )
         output.mkdir(parents=True, exist_ok=True)
         # What is written stands here before it is: whatever happens, it is known for ours.
-        _replace(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))))
-        for line, text in new.items():
-            _replace(output / line.partition("  ")[2], text)
+        _replace(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))).encode())
+        for line, data in new.items():
+            _replace(output / line.partition("  ")[2], data)
     except OSError as error:
         raise UsageError(f"{output}: the figure cannot be written: {error.strerror}") from None
 
@@ -93,11 +115,11 @@ def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _replace(path: Path, text: str) -> None:
-    """The whole text or the old one, also when somebody interrupts."""
+def _replace(path: Path, data: bytes) -> None:
+    """The whole file or the old one, also when somebody interrupts."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        part.write_text(text, encoding="utf-8", newline="\n")
+        part.write_bytes(data)
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)

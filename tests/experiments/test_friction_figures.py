@@ -260,7 +260,7 @@ def test_loops_are_closed_and_tell_their_energy() -> None:
     assert [len(panel.curves) for panel in shown.panels] == [2, 1]
     assert small.curves[0].label == "± 6 µrad"
     assert np.max(np.abs(small.curves[0].x)) < 0.2 * np.max(np.abs(whole.curves[1].x))
-    assert "On the right those up to ± 6 µrad again." in shown.caption
+    assert "Beside them those up to ± 6 µrad again." in shown.caption
     # A box: 4 Fs times the amplitude, and 4 / pi.
     assert "36.0 µJ a cycle at ± 6 µrad (loss factor 1.3)" in shown.caption
     assert "288 µJ a cycle at ± 48 µrad (loss factor 1.3)" in shown.caption

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 from campaign.errors import UsageError
-from campaign.report.one_figure import WRITTEN, write_figure
+from campaign.report.drawing.figures import Column
+from campaign.report.one_figure import ALL, WRITTEN, write_figures
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -22,7 +24,8 @@ def test_a_figure_takes_nobody_s_place(made_up: ModuleType, tmp_path: Path, kind
 
     def write() -> Path:
         wanted = "stabilization/position-error"
-        return write_figure(run, wanted, tmp_path / "f", experiments=made_up.EXPERIMENTS)[0]
+        (drawn,), _ = write_figures(run, wanted, tmp_path / "f", experiments=made_up.EXPERIMENTS)
+        return drawn
 
     other, drawn = tmp_path / "other.svg", tmp_path / "f" / "figure-5.9.svg"
     other.write_text("mine")
@@ -49,11 +52,41 @@ def test_a_figure_that_is_another_now_takes_the_older_one_s_place(
 ) -> None:
     run = made_up.made_up_run(tmp_path)
     wanted, folder = "stabilization/position-error", tmp_path / "f"
-    drawn, _ = write_figure(run, wanted, folder, experiments=made_up.EXPERIMENTS)
+    (drawn,), _ = write_figures(run, wanted, folder, experiments=made_up.EXPERIMENTS)
     # As an earlier version would have drawn it.
     new, older = drawn.read_bytes(), b"<svg/>"
     drawn.write_bytes(older)
     with (folder / WRITTEN).open("a", encoding="utf-8") as marker:
         marker.write(f"{hashlib.sha256(older).hexdigest()}  {drawn.name}\n")
-    write_figure(run, wanted, folder, experiments=made_up.EXPERIMENTS)
+    write_figures(run, wanted, folder, experiments=made_up.EXPERIMENTS)
     assert drawn.read_bytes() == new
+
+
+@pytest.mark.parametrize(("column", "wide"), [("single", 88.0), ("double", 180.0)])
+def test_figures_for_a_column_have_its_width_and_lettering_for_print(
+    made_up: ModuleType, tmp_path: Path, column: Column, wide: float
+) -> None:
+    run = made_up.made_up_run(tmp_path)
+    drawings, _ = write_figures(
+        run, ALL, tmp_path / "f", experiments=made_up.EXPERIMENTS, column=column
+    )
+    assert len(drawings) == 3
+    for drawn in drawings:
+        assert drawn.stem.endswith(f"-{column}")
+        assert drawn.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        assert drawn.with_suffix(".csv").is_file()
+        svg = drawn.read_text(encoding="utf-8")
+        told = re.search(r'<svg [^>]*width="([\d.]+)pt"', svg)
+        assert told is not None
+        assert float(told[1]) / 72 * 25.4 == pytest.approx(wide, abs=0.1)
+        sizes = {float(size) for size in re.findall(r"font: (?:bold )?([\d.]+)px", svg)}
+        assert sizes
+        assert min(sizes) >= 7, drawn.name
+        assert max(sizes) <= 9, drawn.name
+
+
+def test_several_panels_have_letters(made_up: ModuleType, tmp_path: Path) -> None:
+    run, wanted = made_up.made_up_run(tmp_path), "stabilization/position-error"
+    (drawn,), _ = write_figures(run, wanted, tmp_path, experiments=made_up.EXPERIMENTS)
+    svg = drawn.read_text(encoding="utf-8")
+    assert [f"({each})" in svg for each in "abcde"] == [True] * 4 + [False]

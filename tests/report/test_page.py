@@ -25,7 +25,7 @@ from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.recording import Ending, Outcome
 from campaign.report.build import Report, build_report
-from campaign.report.one_figure import WRITTEN, write_figure
+from campaign.report.one_figure import WRITTEN, write_figures
 from campaign.report.output import MARKER, replaced_folder
 from campaign.report.page.drawings import Drawing
 from campaign.report.page.folder import LINKED, Folder
@@ -534,7 +534,7 @@ def test_one_figure_is_drawn_as_the_report_has_it(
 ) -> None:
     run = made_up.made_up_run(tmp_path)
     wanted = "stabilization/position-error"
-    drawn, damaged = write_figure(run, wanted, tmp_path / "f", experiments=made_up.EXPERIMENTS)
+    (drawn,), damaged = write_figures(run, wanted, tmp_path / "f", experiments=made_up.EXPERIMENTS)
     assert drawn == tmp_path / "f/figure-5.9.svg"
     assert not damaged
     theirs = contents(report.path.parent / "figures")
@@ -546,13 +546,13 @@ def test_one_figure_is_drawn_as_the_report_has_it(
 def test_a_figure_that_the_run_does_not_have_is_told(made_up: ModuleType, tmp_path: Path) -> None:
     run = made_up.made_up_run(tmp_path)
     with pytest.raises(UsageError, match="did you mean 'stabilization/position-error'"):
-        write_figure(
+        write_figures(
             run, "stabilization/position-eror", tmp_path / "f", experiments=made_up.EXPERIMENTS
         )
     assert not (tmp_path / "f").exists()
     (tmp_path / "f").write_text("a file")
     with pytest.raises(UsageError, match="cannot be written"):
-        write_figure(
+        write_figures(
             run, "stabilization/position-error", tmp_path / "f", experiments=made_up.EXPERIMENTS
         )
 

@@ -182,7 +182,7 @@ def _bode(
     less = list(_differences(curves))
     every = [curve.x for curve in more_gain] + [r.frequency for _, _, r, _, _ in curves]
     across = _range(np.concatenate(every)) if less else FREQUENCY
-    below = " Below: what compensation changes, less the response without." if less else ""
+    below = " (c, d) What compensation changes, less the response without." if less else ""
     return Figure(
         key=key,
         title=title,

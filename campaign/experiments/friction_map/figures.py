@@ -48,9 +48,9 @@ def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
     return Figure(
         key=f"map{suffix}",
         title=f"Friction-velocity map{f' ({where})' if where else ''}",
-        caption=f"{_what_shows(fits)} Above: both directions with their signs, on the right only "
-        f"the slow half of the runs, up to {amount(slow, 'rad/s', 'deg/s', 2)}; below: each in "
-        "its own sign over the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
+        caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b) the slow half of "
+        f"the runs, up to {amount(slow, 'rad/s', 'deg/s', 2)}, (c, d) each in its own sign over "
+        "the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
         "free, with its 95 % band. Bars: 95 %, window and scatter between points.",
         alt="Friction torque over rate for both directions, one dot per constant-velocity run, and "
         "the fitted curves; over all rates, over the slow ones, and for each direction over the "
@@ -181,8 +181,8 @@ def fit_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
     return Figure(
         key=f"fit{suffix}",
         title=f"Stribeck curve fitted to the map{f' ({where})' if where else ''}",
-        caption="Equation 4.6 fitted by least squares, with δ free and with δ = 2; below, what the "
-        "points differ from the fit with δ free, on a scale of its own. "
+        caption="Equation 4.6 fitted by least squares, (a, b) with δ free and with δ = 2; (c, d) "
+        "what the points differ from the fit with δ free, on a scale of its own. "
         f"{_misfit(fits.fits)} The logarithmic axis shows the low speeds that decide Ts and vs. "
         "Bars and band: 95 %.",
         alt="Measured friction torque over speed on a logarithmic axis with both fitted curves, "
@@ -317,7 +317,7 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
         Figure(
             key="one-point",
             title=f"One point of the map: {speed}",
-            caption=f"Rate and drive torque of one run at {speed}, and below the torque of its "
+            caption=f"(a) Rate and (b) drive torque of one run at {speed}, (c) the torque of its "
             f"shaded stretch alone.{start} The mean torque of that "
             f"stretch{told} less inertia times what is left of acceleration is the friction torque "
             "at this speed.",

@@ -10,9 +10,11 @@ import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +50,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WIDTH = 6.9
-"""Inches: the text width of a page in two columns of a journal, or of the report."""
+WIDTH = 180.0 / 25.4
+"""Inches: the width of both columns of a journal."""
+SINGLE = 88.0 / 25.4
+"""Inches: that of one."""
+LONGEST_LABEL = 24
+"""Characters of a line of a y axis' label in one column, whose panels are low."""
+Column = Literal["single", "double"]
+_column: ContextVar[Column] = ContextVar("_column", default="double")
 FIGURE_POINTS = 40_000
 """Most points of a figure's lines together; many curves share them."""
 TITLE_PAD = 7.0
@@ -120,6 +128,8 @@ def draw(
         for place, (panel, ax) in enumerate(zip(figure.panels, axes, strict=False)):
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
+            if len(figure.panels) > 1:
+                ax.set_title(f"({letter(place)}) {panel.title}".rstrip())
         if figure.one_scale:
             _share_scales(sets)
         marked = [_finish(each, chosen) for each in sets]
@@ -229,13 +239,31 @@ def _titles_say_it(figure: Figure) -> bool:
     )
 
 
+def letter(place: int) -> str:
+    """What a panel is called by: a, b, ..."""
+    return "abcdefghijklmnopqrstuvwxyz"[place % 26]
+
+
+@contextmanager
+def in_column(column: Column) -> Iterator[None]:
+    """Within the block, figures are as wide as a column of a journal."""
+    before = _column.set(column)
+    try:
+        yield
+    finally:
+        _column.reset(before)
+
+
 def _across(figure: Figure) -> int:
-    return max(1, min(figure.across, len(figure.panels), 3))
+    most = 1 if _column.get() == "single" else 3
+    return max(1, min(figure.across, len(figure.panels), most))
 
 
 def _size(figure: Figure) -> tuple[float, float]:
     across = _across(figure)
     down = -(-len(figure.panels) // across) if figure.panels else 1
+    if _column.get() == "single":
+        return SINGLE, 0.35 + (2.9 if down == 1 else 1.9) * max(down, 1)
     each = {1: 3.3 if down == 1 else 2.4, 2: 2.7, 3: 2.2}[across]
     return WIDTH, 0.35 + each * max(down, 1)
 
@@ -323,7 +351,8 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look]) -> Marked:
 
 def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
     ax.set_xlabel(axis_label(panel.x))
-    ax.set_ylabel(axis_label(panel.y))
+    label = axis_label(panel.y)
+    ax.set_ylabel(fill(label, LONGEST_LABEL) if _column.get() == "single" else label)
     if panel.title:
         ax.set_title(panel.title)
     limits = ((ax.set_xlim, panel.x, scale_x), (ax.set_ylim, panel.y, scale_y))
