@@ -79,7 +79,7 @@ def test_figures_for_a_column_have_its_width_and_lettering_for_print(
         told = re.search(r'<svg [^>]*width="([\d.]+)pt"', svg)
         assert told is not None
         assert float(told[1]) / 72 * 25.4 == pytest.approx(wide, abs=0.1)
-        sizes = {float(size) for size in re.findall(r"font: (?:bold )?([\d.]+)px", svg)}
+        sizes = {float(size) for size in re.findall(r"font(?:-size)?: ?(?:bold )?([\d.]+)px", svg)}
         assert sizes
         assert min(sizes) >= 7, drawn.name
         assert max(sizes) <= 9, drawn.name
