@@ -1,6 +1,6 @@
 "use strict";
-// Marks in the contents where one is, and hides tests without every word of a search. Without this
-// script all is shown, and the browser itself opens what a link leads into.
+// Marks in the contents where one is, hides tests without every word of a search, and copies tables.
+// Without this script all is shown, and the browser itself opens what a link leads into.
 (() => {
   const contents = document.querySelector(".contents > details > ol");
   const entries = Array.from(document.querySelectorAll(".contents a[href^='#']"))
@@ -59,4 +59,51 @@
     count.textContent = words.length ? `${shown} of ${tests.length} tests` : "";
     mark();
   });
+})();
+
+(() => {
+  const escaped = { "&": "\\&", "%": "\\%", "#": "\\#", "_": "\\_", "$": "\\$", "{": "\\{", "}": "\\}",
+    "\\": "\\textbackslash{}", "^": "\\^{}", "~": "\\~{}", "±": "$\\pm$", "−": "$-$", "·": "$\\cdot$",
+    "≤": "$\\le$", "≥": "$\\ge$", "≈": "$\\approx$", "°": "$^\\circ$", "²": "$^2$", "³": "$^3$", "µ": "$\\mu$",
+    "σ": "$\\sigma$", "δ": "$\\delta$", "✓": "$\\checkmark$", "\u00a0": "~" };
+  const latex = (text) => Array.from(text, (each) => escaped[each] ?? each).join("");
+  const line = (cells) => `${cells.map(latex).join(" & ")} \\\\`;
+  const forms = {
+    TSV: (rows) => rows.map((cells) => cells.join("\t")).join("\n"),
+    Markdown: ([head, ...rows], right) => [
+      head, right.map((each) => (each ? "---:" : "---")), ...rows,
+    ].map((cells) => `| ${cells.map((each) => each.replaceAll("|", "\\|")).join(" | ")} |`).join("\n"),
+    LaTeX: ([head, ...rows], right) => [
+      `\\begin{tabular}{${right.map((each) => (each ? "r" : "l")).join("")}}`, "\\toprule", line(head),
+      "\\midrule", ...rows.map(line), "\\bottomrule", "\\end{tabular}",
+    ].join("\n"),
+  };
+
+  async function copy(table, form, told) {
+    const rows = Array.from(table.rows, (row) =>
+      Array.from(row.cells, (cell) => cell.textContent.replace(/[^\S\u00a0]+/g, " ").trim()));
+    const right = Array.from(table.rows[0].cells, (cell) => cell.classList.contains("n"));
+    try {
+      await navigator.clipboard.writeText(forms[form](rows, right));
+      told.textContent = `copied as ${form}`;
+    } catch {
+      told.textContent = "the browser does not let a page copy; the CSV file has the numbers";
+    }
+  }
+  for (const box of document.querySelectorAll(".table")) {
+    const table = box.querySelector("table"), bar = document.createElement("p");
+    const told = document.createElement("output");
+    bar.className = "copy";
+    bar.append("Copy as ");
+    for (const form of Object.keys(forms)) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = form;
+      button.setAttribute("aria-label", `Copy ${box.querySelector(".number").textContent} as ${form}`);
+      button.addEventListener("click", () => copy(table, form, told));
+      bar.append(button);
+    }
+    bar.append(told);
+    box.append(bar);
+  }
 })();

@@ -80,3 +80,29 @@ def test_the_scoreboard_is_filtered_by_status_with_the_keyboard(show, scripts):
         assert len(left) == int(count)
     page.keyboard.press("ArrowDown")  # from the last to the first
     assert page.evaluate(NUMBERS) == everything
+
+
+@pytest.mark.parametrize("form", ["TSV", "Markdown", "LaTeX"])
+def test_a_table_is_copied_by_a_button(show, form):
+    page = show("usual", unfold=True, permissions=["clipboard-read", "clipboard-write"]).page
+    box = page.locator(".table").first
+    cells = box.locator("tbody tr").first.locator("th, td").all_text_contents()
+    button = box.get_by_role("button", name=re.compile(f"as {form}"))
+    button.focus()
+    page.keyboard.press("Enter")
+    box.get_by_text(f"copied as {form}").wait_for()
+    text = page.evaluate("navigator.clipboard.readText()")
+    lines = text.splitlines()
+    rows = box.locator("tbody tr").count()
+    cells = [" ".join(cell.replace("\u00a0", "~").split()).replace("~", "\u00a0") for cell in cells]
+    if form == "TSV":
+        assert lines[1].split("\t") == cells
+        assert len(lines) == rows + 1
+    elif form == "Markdown":
+        assert lines[2] == f"| {' | '.join(cells)} |"
+        assert len(lines) == rows + 2
+    else:
+        assert lines[1] == r"\toprule"
+        assert lines[-2:] == [r"\bottomrule", r"\end{tabular}"]
+        assert not re.search(r"[±−·%_](?<!\\%)(?<!\\_)", text)
+        assert len(lines) == rows + 6

@@ -76,7 +76,7 @@ def test_what_is_folded_on_the_screen_is_on_paper(show, printed, name):
           const found = [[], []];
           const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
           for (let text = walker.nextNode(); text; text = walker.nextNode()) {
-            const not = "style, script, svg, summary, label, button, .download";
+            const not = "style, script, svg, summary, label, button, .download, .copy";
             if (text.parentElement.closest(not)) continue;
             const words = text.data.split(/\\s+/).filter((word) => word.length > 1);
             found[text.parentElement.closest("details") ? 0 : 1].push(...words);
