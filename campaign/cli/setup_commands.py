@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from campaign.cli.completion import complete_kind
+from campaign.cli.output import print_line
 from campaign.cli.rig_commands import app
 
 __all__ = ["app"]
@@ -32,6 +33,40 @@ def kinds(
         list_kinds()
     else:
         show_kind(name)
+
+
+@app.command()
+def model(
+    names: Annotated[
+        list[str],
+        typer.Argument(metavar="NAME...", help="Friction models, of `campaign kinds`."),
+    ],
+    rate: Annotated[
+        str, typer.Option("--rate", metavar="RATE", help="Amplitude of the rate.")
+    ] = "1 deg/s",
+    frequency: Annotated[
+        str, typer.Option("--frequency", metavar="FREQUENCY", help="Of the rate.")
+    ] = "1 Hz",
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="PARAMETER=VALUE", help="A parameter; may be given again."),
+    ] = None,
+    bench: Annotated[
+        str,
+        typer.Option(
+            "--bench", metavar="BENCH", help="Its first friction interface gives the others."
+        ),
+    ] = "simulink",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", metavar="FILE.svg", help="Where to draw.", show_default=False),
+    ] = None,
+) -> None:
+    """Draw friction models alone, at a sinusoidal rate; CSV beside the picture."""
+    from campaign.cli.model import show_models
+
+    motion = {"rate": rate, "frequency": frequency}
+    print_line(str(show_models(names, motion, changes or (), bench, output)))
 
 
 @app.command()

@@ -13,10 +13,10 @@ from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_posi
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
 from campaign.experiments.any_motion.motions import Moved, with_slowest
-from campaign.experiments.whole_model.along import Along
 from campaign.experiments.whole_model.models import Sizes, models
 from campaign.experiments.whole_model.whole_model_fit import _with_band, find, product, resolved
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
+from campaign.physics.friction_along import Along
 from campaign.reason import Reason
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.rigs import random_rigs
@@ -40,7 +40,7 @@ def swinging() -> Motion:
 def test_friction_along_a_motion_is_that_of_its_curve() -> None:
     motion = swinging()
     options = StribeckOptions.model_validate(CURVE, context={"si": True})
-    found = Along(motion.rate, motion.sample_rate).friction(CURVE)
+    found = Along.rates(motion.rate, motion.sample_rate).friction(CURVE)
     moves = np.abs(motion.rate) > 0.02
     assert found[moves] == pytest.approx(steady_state(options, motion.rate)[moves], rel=2e-3)
 

@@ -11,8 +11,8 @@ from campaign.estimation.inverse.motion import Array, Filtering, Motion, decimat
 from campaign.estimation.inverse.rows import all_rows, late_force, moving
 from campaign.estimation.inverse.terms import TERMS, Term
 from campaign.estimation.whole_model import Values
-from campaign.experiments.whole_model.along import Along
 from campaign.experiments.whole_model.models import Model
+from campaign.physics.friction_along import Along
 
 STEPS = 10
 """Simulated steps of a row at least: rates of a motion are low-passed, and rows all the more."""
@@ -48,7 +48,7 @@ class Residuals:
         self._forces = [late_force(motion, filtering) for motion in motions]
         self._columns = [all_rows(motion, terms, filtering).columns for motion in motions]
         self._moves = [moving(motion, filtering) for motion in motions]
-        self._along = [Along(*_thinned(motion, every)) for motion in motions]
+        self._along = [Along.rates(*_thinned(motion, every)) for motion in motions]
         self._counts = [-(-(len(each.time) - filtering.skip) // every) for each in motions]
         self._decimation = filtering.decimation // every
         self._friction = lru_cache(KEPT)(self._simulated)

@@ -1,0 +1,214 @@
+"""`campaign model`: friction models alone, at a sinusoidal rate: a picture and its numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from campaign.cli.output import print_line
+from campaign.errors import UsageError
+from campaign.options import Options
+from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionModel
+from campaign.physics.friction_along import Along
+from campaign.protocol.bench_file import bench_source
+from campaign.protocol.overrides import parse_overrides
+from campaign.protocol.problems import find_faults
+from campaign.report.drawing.figures import draw
+from campaign.result import Axis, Curve, Figure, Panel
+from campaign.text import nearest, number
+from campaign.units import AngularRate, Frequency
+
+Array = NDArray[np.float64]
+
+CYCLES = 4
+"""The last one is shown: a state has settled by then."""
+PER_CYCLE = 2_000
+"""Samples of a cycle at first, and of what is shown."""
+FINEST = 256 * PER_CYCLE
+ACCURACY = 1e-3
+"""Share of the largest friction by which half the step may change it."""
+
+
+class MotionOptions(Options):
+    """The motion that all models meet."""
+
+    rate: AngularRate = Field(gt=0)
+    """Amplitude of the rate."""
+    frequency: Frequency = Field(gt=0)
+    """Of the rate."""
+
+
+@dataclass(frozen=True)
+class Met:
+    """What a model makes of the last cycle; SI, shape (PER_CYCLE,) each.
+
+    Attributes:
+        change: by which half the step changed the friction, as a share of the largest.
+    """
+
+    model: FrictionModel
+    options: Any
+    friction: Array
+    change: float
+
+
+def show_models(
+    names: Sequence[str],
+    motion: Mapping[str, str],
+    changes: Sequence[str],
+    bench: str,
+    output: Path | None,
+) -> Path:
+    """Draw friction over rate, angle and time; the picture's path, its numbers are beside it.
+
+    Args:
+        names: of friction models.
+        motion: `MotionOptions` as written.
+        changes: `PARAMETER=VALUE`, for every model that has the parameter.
+        bench: whose first friction interface gives the other parameters.
+        output: of the picture, `.svg`.
+
+    Raises UsageError: no such model, parameter or file; a parameter that is missing.
+    """
+    asked = find_faults(MotionOptions, motion)
+    if isinstance(asked, list):
+        raise UsageError("\n".join(f"--{place[0]}: {message}" for place, _, message in asked))
+    path = output or Path(f"{'-'.join(names)}.svg")
+    if path.suffix != ".svg":
+        raise UsageError(f"--output {path}: a picture's name ends in .svg")
+    chosen = list(_chosen(names, changes, bench))
+    met = [_met(model, options, asked) for model, options in chosen]
+    for each in met:
+        told = f"half the step changes it by {number(100 * each.change, 2)} % at most"
+        print_line(f"{each.model.name}: {each.model.summary}; {told}")
+    try:
+        path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
+        path.with_suffix(".csv").write_text(_csv(met, asked), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+    return path
+
+
+def _chosen(
+    names: Sequence[str], changes: Sequence[str], bench: str
+) -> Iterator[tuple[FrictionModel, Any]]:
+    """Each model with its validated options."""
+    known = friction_models()
+    if wrong := [name for name in names if name not in known]:
+        raise UsageError(f"there is no friction model {wrong[0]!r}{nearest(wrong[0], known)}")
+    overrides, problems = parse_overrides([f"model.{change}" for change in changes])
+    if problems:
+        raise UsageError("\n".join(str(problem) for problem in problems))
+    friction = bench_source(bench).tree.get("friction")
+    given: Mapping[str, Any] = (
+        next(iter(friction.values()), {}) if isinstance(friction, Mapping) else {}
+    )
+    used: set[str] = set()
+    for name in names:
+        fields = known[name].options.model_fields
+        tree: dict[str, Any] = {key: value for key, value in given.items() if key in fields}
+        tree["model"] = name
+        for override in overrides:
+            key, *deeper = map(str, override.keys[1:])
+            if key in fields:
+                used.add(key)
+                tree[key] = reduce(lambda value, step: {step: value}, deeper[::-1], override.value)
+        options = find_faults(known[name].options, tree)
+        if isinstance(options, list):
+            told = (": ".join((*map(str, place), message)) for place, _, message in options)
+            raise UsageError(
+                f"{name}: {'; '.join(told)}; --set PARAMETER=VALUE states it, and "
+                f"`campaign kinds {name}` lists all"
+            )
+        yield known[name], options
+    for override in overrides:
+        if (key := str(override.keys[1])) not in used:
+            raise UsageError(f"--set {key}: none of these models has it: {', '.join(names)}")
+
+
+def _met(model: FrictionModel, options: Any, motion: MotionOptions) -> Met:
+    """With a step that is halved until that changes little."""
+    tree = options.model_dump(mode="json")
+    per_cycle, coarse = PER_CYCLE, _cycle(tree, motion, PER_CYCLE)
+    while True:
+        per_cycle *= 2
+        fine = _cycle(tree, motion, per_cycle)
+        change = float(np.max(np.abs(fine - coarse)) / max(np.max(np.abs(fine)), 1e-300))
+        if change <= ACCURACY or per_cycle >= FINEST:
+            return Met(model, options, fine, change)
+        coarse = fine
+
+
+def _cycle(tree: Mapping[str, Any], motion: MotionOptions, per_cycle: int) -> Array:
+    """Friction in the last cycle, at `PER_CYCLE` samples of it."""
+    along = Along.sine(motion.rate, motion.frequency, CYCLES, per_cycle)
+    return along.friction(tree)[-per_cycle :: per_cycle // PER_CYCLE]
+
+
+def _motion(motion: MotionOptions) -> tuple[Array, Array, Array]:
+    """Time (s), rate (rad/s) and angle (rad) of a cycle, shape (PER_CYCLE,)."""
+    time = np.arange(PER_CYCLE) / (PER_CYCLE * motion.frequency)
+    turned = 2.0 * np.pi * motion.frequency
+    angle = -motion.rate / turned * np.cos(turned * time)
+    return time, motion.rate * np.sin(turned * time), angle
+
+
+def _figure(met: Sequence[Met], motion: MotionOptions) -> Figure:
+    time, rate, angle = _motion(motion)
+    torque = Axis("Friction torque", "N m", "N m")
+    steady = np.linspace(-motion.rate, motion.rate, 401)
+    closed = [np.append(each.friction, each.friction[0]) for each in met]
+    names = [each.model.name for each in met]
+
+    def over(x: Array) -> list[Curve]:
+        around = np.append(x, x[0])
+        return [Curve(around, y, name, name) for y, name in zip(closed, names, strict=True)]
+
+    alone = met[0].model.steady_state(met[0].options, steady)
+    return Figure(
+        key="model",
+        title="Friction models at a sinusoidal rate",
+        caption="",
+        alt="Friction torque over rate, over angle and over time.",
+        panels=(
+            Panel(
+                Axis("Rate", "rad/s", "deg/s"),
+                torque,
+                [
+                    *over(rate),
+                    Curve(steady, alone, f"{names[0]}, steady sliding", "reference", "line"),
+                ],
+                "Over rate",
+            ),
+            Panel(Axis("Angle", "rad", "deg"), torque, over(angle), "Over angle"),
+            Panel(
+                Axis("Time", "s"),
+                torque,
+                [
+                    Curve(time, each.friction, name, name)
+                    for each, name in zip(met, names, strict=True)
+                ],
+                "Over time",
+            ),
+        ),
+        across=2,
+    )
+
+
+def _csv(met: Sequence[Met], motion: MotionOptions) -> str:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["time_s", "rate_rad_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])
+    columns = (*_motion(motion), *(each.friction for each in met))
+    rows.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+    return text.getvalue()
