@@ -8,13 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.model_choice import identified
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_position
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
 from campaign.experiments.any_motion.motions import Moved, with_slowest
-from campaign.experiments.whole_model.models import Sizes, models
+from campaign.experiments.whole_model.models import models
 from campaign.experiments.whole_model.whole_model_fit import _with_band, find, product, resolved
+from campaign.physics.friction import friction_models
+from campaign.physics.friction.sought import Sizes
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from campaign.physics.friction_along import Along
 from campaign.reason import Reason
@@ -99,7 +102,7 @@ def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
 ) -> None:
     """It looks like a delay: 0.7 ms of it, and viscous friction is 4 % too large."""
     monkeypatch.setattr(
-        "campaign.experiments.whole_model.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
+        "campaign.experiments.whole_model.whole_model_fit.models", lambda *told: models(*told)[1:2]
     )
     rig = random_rigs(16, seed=51, stribeck=True)[1]
     filtering = Filtering.for_rate(1000.0)
@@ -130,7 +133,7 @@ def test_what_is_passed_faster_than_rows_show_is_refused(
     omega = 2 * np.pi * 0.7
     motion = replace(motion, acceleration=omega * np.cos(omega * motion.time))
     model = models(Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5))[2]
-    told = {each.unknown.name: each.unknown.start for each in model.numbers}
+    told = {each.name: each.start for each in model.numbers}
     told |= {"stribeck_velocity": slow, "bristle_stiffness": stiff}
     found = SimpleNamespace(unknowns=[Unknown(name, -1.0, 1e9, v) for name, v in told.items()])
     sure = {name: Estimate(name, v, "", v - 0.1, v + 0.1, 0.95) for name, v in told.items()}
@@ -208,3 +211,37 @@ def test_intervals_hold_and_a_jump_of_friction_has_no_bristles(count: int) -> No
         assert bristles["bristle_damping"].origin is not Origin.MEASURED
     assert len(held) >= 2 * count
     assert rejected({"all": held}, "less") == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("truth", ["coulomb", "dahl", "lugre"])
+def test_the_model_that_a_rig_has_is_named(truth: str) -> None:
+    """LuGre can be Dahl and Coulomb friction as well, with numbers that tell nothing."""
+    found = identified(truth, 1, ("coulomb", "dahl", "lugre"), seconds=10.0)
+    assert found.fits[found.best].model.model == truth
+    assert all(each.startswith(truth) for each in found.as_good)
+
+
+def test_a_model_that_states_no_unknowns_is_refused_by_name() -> None:
+    sizes = Sizes((2.0, 2.0), (0.01, 0.01), 0.5, 1.0)
+    with pytest.raises(ValueError, match="karnopp does not say what is fitted of it; there are"):
+        models(sizes, ("karnopp",))
+    with pytest.raises(ValueError, match="no friction model 'lugr'; did you mean 'lugre'"):
+        models(sizes, ("lugr",))
+    assert [each.name for each in models(sizes, ("gms", "dahl"))] == [
+        "gms, directions alike",
+        "gms, by direction",
+        "dahl, by direction",
+    ]
+
+
+@pytest.mark.parametrize("name", [n for n, m in friction_models().items() if m.sought is not None])
+def test_what_a_model_states_makes_valid_options(name: str) -> None:
+    """At the start and at both bounds of every unknown."""
+    sizes = Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5)
+    for model in models(sizes, (name,)):
+        start = {each.name: each.start for each in model.unknowns}
+        for each in model.unknowns:
+            for value in (each.lower, each.start, each.upper):
+                options = model.options({**start, each.name: value})
+                assert friction_models()[name].options.model_validate(options, context={"si": True})

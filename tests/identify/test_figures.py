@@ -57,7 +57,7 @@ def test_the_plain_regression_is_drawn_beside_the_friction_models(
     regression: InverseDynamics, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "campaign.experiments.whole_model.whole_model_fit.models", lambda sizes: models(sizes)[1:2]
+        "campaign.experiments.whole_model.whole_model_fit.models", lambda *told: models(*told)[1:2]
     )
     still = replace(regression.filtering, slowest=0.25 * regression.filtering.slowest)
     whole = find_whole(regression.pieces, [], still, starts=1)

@@ -22,13 +22,14 @@ from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.motions import Moved, with_slowest
 from campaign.experiments.whole_model import parts
-from campaign.experiments.whole_model.models import Sizes, models
+from campaign.experiments.whole_model.models import models
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
 from campaign.experiments.whole_model.whole_model_fit import find
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
+from campaign.physics.friction.sought import Sizes
 from tests.estimation.rigs import random_rigs
 
 

@@ -21,6 +21,7 @@ from campaign.experiments.interface import TestData
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.recorded_motion import of_any_motion
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
+from campaign.experiments.whole_model.models import USUAL
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.shown import figures, models_table, values_table
 from campaign.experiments.whole_model.whole_model_fit import Fit, find, product
@@ -32,17 +33,6 @@ from campaign.text import words
 from campaign.units import Frequency, Time
 
 FRICTION = "friction.load"
-FORCES = (
-    "inertia",
-    "coulomb",
-    "viscous",
-    "static_torque",
-    "bristle",
-    "spring",
-    "offset",
-    "cogging",
-)
-"""Beginnings of names whose numbers grow with the force's constant."""
 RATIO = "static_over_coulomb"
 """of both directions, or the beginning of the name of one's own."""
 PARTS = Cause(
@@ -55,11 +45,6 @@ STILL = 0.25
 LINEAR = ("spring", "gravity", "cogging")
 """Beginnings of terms of a plain regression that no friction model stands in for."""
 ADVICE = {
-    RATIO: "slide more slowly, and reverse more often",
-    "stribeck_velocity": "slide at more speeds between rest and the fastest",
-    "bristle": "stay below breakaway: `presliding_multisine` measures it",
-    "coulomb": "reverse more often",
-    "viscous": "slide at more, and further apart, speeds",
     "inertia": "move with more acceleration at the same speeds",
     "spring": "move over more of the travel",
 }
@@ -78,6 +63,8 @@ class WholeModelOptions(Options):
     """Fits of each model, the first from plain inverse dynamics and the others at random."""
     model: str = ""
     """Name of the model whose numbers are told; absent: the one that does best."""
+    models: tuple[str, ...] = Field(default=USUAL, min_length=1)
+    """Friction models that are fitted; the first with both directions alike, too."""
 
 
 def _identify(data: TestData, options: WholeModelOptions) -> Result:
@@ -93,7 +80,10 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
     extra = _linear_terms(regression)
     held = regression.instruments
     known = held.delay if held is not None and held.of_wanted else None
-    found = find(pieces, unseen, filtering, extra, options.starts, data.say, known=known)
+    found = find(
+        pieces, unseen, filtering, extra, options.starts, data.say, known=known,
+        names=options.models,
+    )  # fmt: skip
     names = [each.model.name for each in found.fits]
     if options.model and options.model not in names:
         raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
@@ -106,7 +96,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
         figures=tuple(figures(found, regression, unseen)),
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
         notes=tuple(_notes(best)),
-        conclusions=tuple(_conclusions(best)),
+        conclusions=tuple(_conclusions(best, found.as_good)),
         identified=Identified(
             parameters,
             correlations=best.fit.correlation,
@@ -136,8 +126,9 @@ def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
 
 def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
     told = dict(best.fit.estimates)
-    keys = {each.unknown.name: each for each in best.model.numbers if not each.over}
-    meanings = {each.unknown.name: each.meaning for each in best.model.numbers}
+    numbers = {each.name: each for each in best.model.numbers}
+    keys = {name: each for name, each in numbers.items() if not each.over}
+    meanings = {each.name: each.meaning for each in best.model.numbers}
     meanings |= {term.name: term.meaning for term in best.extra}
     meanings["inertia"] = "What resists acceleration."
     meanings["delay"] = "By how much the force acts later than it is recorded."
@@ -146,27 +137,27 @@ def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
         if name in keys:
             bench = f"{FRICTION}.{keys[name].key}"
         advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
+        advice = numbers[name].advice if name in numbers else advice
         display = "ms" if name == "delay" else ""
         one = admitted(_scaled(estimate, data))
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
     for each in best.model.numbers:
         if not each.over:
             continue
-        ratio = told[each.unknown.name]
-        base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
+        ratio = told[each.name]
+        base = next(n.name for n in best.model.numbers if n.key == each.over)
         share = best.fit.correlation.get((ratio.name, base), 0.0)
         share = share or best.fit.correlation.get((base, ratio.name), 0.0)
         way = base.removeprefix("coulomb")
         made = product(f"static_torque{way}", ratio, told[base], share)
         meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
-        advice = ADVICE[RATIO]
         made = admitted(_scaled(made, data))
-        yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", advice)
+        yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", each.advice)
 
 
 def _scaled(one: Estimate, data: TestData) -> Estimate:
     """With what a wrong constant of the force would do to it."""
-    if not one.name.startswith(FORCES) or one.origin is Origin.NOT_DETERMINED:
+    if not one.unit.startswith(("N", "kg")) or one.origin is Origin.NOT_DETERMINED:
         return one
     first = data.trials[0]
     if data.bench.motor is not None and not first.trial.recording:
@@ -181,15 +172,15 @@ def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[obj
         f"{FRICTION}.model": (best.model.model, "", "fitted")
     }
     values = best.values
-    flat = {each.unknown.name: each for each in best.model.numbers if not each.over}
+    flat = {each.name: each for each in best.model.numbers if not each.over}
     for name, estimate in best.fit.estimates.items():
         if name in flat and f"{FRICTION}.{flat[name].key}" not in stated:
             each = flat[name]
             told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, str(estimate.reason))
     for each in best.model.numbers:
         if each.over and f"{FRICTION}.{each.key}" not in stated:
-            base = next(n.unknown.name for n in best.model.numbers if n.key == each.over)
-            value = values[each.unknown.name] * values[base]
+            base = next(n.name for n in best.model.numbers if n.key == each.over)
+            value = values[each.name] * values[base]
             told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
     return told
 
@@ -220,7 +211,7 @@ def _notes(best: Fit) -> Iterator[str]:
     )
 
 
-def _conclusions(best: Fit) -> Iterator[Conclusion]:
+def _conclusions(best: Fit, as_good: Sequence[str]) -> Iterator[Conclusion]:
     told = best.fit.estimates
     names = [name for name in ("coulomb", "coulomb_positive", "coulomb_negative") if name in told]
     parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
@@ -229,6 +220,9 @@ def _conclusions(best: Fit) -> Iterator[Conclusion]:
         parts += [", and "] if index else []
         parts += [Amount(told[name], "N m"), f" in the {way} direction" if way else ""]
     yield Conclusion((*parts, "."))
+    if as_good:
+        others = " and ".join(f"‘{name}’" for name in as_good)
+        yield Conclusion((f"The motion does not tell this model from {others}.",))
     if best.validation is not None:
         yield Conclusion(
             ("This model leaves ", Amount(best.validation, "percent"), " of an unseen torque.")

@@ -54,8 +54,9 @@ def models_table(found: Whole) -> Table:
             row |= {"validation": each.validation, "gain": each.gain}
         rows_.append(row)
     note = (
-        "The arrow shows the one that does best on blocks that it was not fitted to (every third "
-        "of twelve). BIC counts the rows by what they are worth for each model."
+        "The arrow shows the one with the lowest BIC, over the rows that those of the model are "
+        "worth that does best on blocks it was not fitted to (every third of twelve). The column "
+        "BIC counts the rows by what they are worth for each model."
     )
     return Table("models", "Friction models", tuple(columns), tuple(rows_), note=note)
 

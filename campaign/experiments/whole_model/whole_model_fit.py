@@ -30,8 +30,9 @@ from campaign.estimation.whole_model import (
 from campaign.experiments.any_motion.inverse_fit import together
 from campaign.experiments.any_motion.motions import Moved, never_moved
 from campaign.experiments.interface import say_at
-from campaign.experiments.whole_model.models import Model, Sizes, models
+from campaign.experiments.whole_model.models import USUAL, Model, models
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
+from campaign.physics.friction.sought import Sizes
 from campaign.reason import Cause, Reason
 
 DELAYS = 5.0
@@ -57,6 +58,8 @@ UNRESOLVED = Cause(
     "faster than rows", "{what} takes {milliseconds:.2g} ms, and rows show {resolved:.2g} ms"
 )
 FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
+STRONG = 10.0
+"""Difference of BIC from which on one model is told from another."""
 WIDE = 5.0
 """How many times more or less than plain inverse dynamics the inertia may be."""
 
@@ -84,6 +87,12 @@ class Fit:
     gain: Estimate | None = None
 
     @property
+    def faster_than_rows(self) -> bool:
+        """Whether its bristles bend faster than rows show."""
+        below = (self.fit.estimates[n.name] for n in self.model.numbers if n.presliding)
+        return any(each.reason in UNRESOLVED for each in below)
+
+    @property
     def values(self) -> dict[str, float]:
         """SI, by name."""
         names = [unknown.name for unknown in self.fit.found.unknowns]
@@ -92,12 +101,45 @@ class Fit:
 
 @dataclass(frozen=True)
 class Whole:
-    """All models, and which one does best on blocks that it was not fitted to."""
+    """All models, and which one has the lowest BIC."""
 
     fits: tuple[Fit, ...]
     best: int
     filtering: Filtering
     pieces: tuple[Moved, ...]
+
+    @property
+    def as_good(self) -> tuple[str, ...]:
+        """Names of others that the motion does not tell from the best: BIC less than 10 above.
+
+        A difference of 10 is strong evidence (Kass and Raftery 1995).
+        """
+        above = _above(self.fits)
+        others = (i for i in range(len(above)) if i != self.best)
+        return tuple(
+            self.fits[i].model.name for i in others if above[i] - above[self.best] < STRONG
+        )
+
+
+def _above(fits: Sequence[Fit]) -> list[float]:
+    """BIC of each less that of the one that does best on blocks it was not fitted to.
+
+    All on the rows that that one's are worth: a model that lacks something leaves correlated
+    residuals, and would count few. A model whose bristles bend faster than rows show takes no part:
+    it stands for a jump that is filtered, which a model without them has as well.
+    """
+    shown = [each for each in fits if not each.faster_than_rows]
+    first = min(shown or fits, key=lambda each: each.held_out)
+    rows = first.fit.regression.effective if first.fit.regression is not None else math.nan
+    if not rows > 1.0:
+        return [0.0 if each is first else math.inf for each in fits]
+    return [
+        2.0 * rows * math.log(each.relative / first.relative)
+        + (len(each.fit.values) - len(first.fit.values)) * math.log(rows)
+        if each in shown or not shown
+        else math.inf
+        for each in fits
+    ]
 
 
 def find(
@@ -109,15 +151,17 @@ def find(
     say: Callable[[str], None] = lambda text: None,
     *,
     known: Estimate | None = None,
+    names: Sequence[str] = USUAL,
 ) -> Whole:
     """Fit every model. Raises ValueError where the motion does not slide in both directions.
 
     known: the delay as instruments along the wanted motion have it (s); None without any.
+    names: of the friction models; ValueError for one that does not say what is fitted of it.
     """
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
     fits: list[Fit] = []
-    tried = models(sizes)
+    tried = models(sizes, names)
     for number, model in enumerate(tried, 1):
         done = partial(say_at, say, f"model {number} of {len(tried)} ({model.name})")
         alike = "alike" in model.name
@@ -126,7 +170,8 @@ def find(
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
-    best = min(range(len(fits)), key=lambda i: fits[i].held_out)
+    above = _above(fits)
+    best = min(range(len(fits)), key=above.__getitem__)
     return Whole(tuple(fits), best, filtering, tuple(pieces))
 
 
@@ -162,7 +207,7 @@ def _fitted(
         Unknown("delay", -DELAYS / rate, DELAYS / rate, 0.0),
         *(_linear(term, motions, force) for term in extra),
     )
-    units = {each.unknown.name: each.unit for each in model.numbers}
+    units = {each.name: each.unit for each in model.numbers}
     units |= {"inertia": "kg m^2", "delay": "s"} | {term.name: term.unit for term in extra}
     names = [unknown.name for unknown in unknowns]
 
@@ -266,7 +311,8 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
             found[name] = _open(found[name], COULOMB_AT_BOUND())
     stiffness = found.get("bristle_stiffness")
     if stiffness is not None and stiffness.origin is not Origin.MEASURED:
-        found["bristle_damping"] = _open(found["bristle_damping"], NO_STIFFNESS())
+        for name in found.keys() & {"bristle_damping"}:
+            found[name] = _open(found[name], NO_STIFFNESS())
     return replace(fit, estimates=found)
 
 
@@ -292,13 +338,15 @@ def resolved(
             if name in found:
                 found[name] = _open(found[name], reason)
 
-    slow = values["stribeck_velocity"]
-    ratios = [name for name in found if name.startswith("static_over_coulomb")]
-    refuse(("stribeck_velocity", *ratios), slow / turning, "passing it in a reversal")
+    if "stribeck_velocity" in values:
+        ratios = [each.name for each in model.numbers if each.over]
+        slow = values["stribeck_velocity"]
+        refuse(("stribeck_velocity", *ratios), slow / turning, "passing it in a reversal")
     if "bristle_stiffness" in values:
         bent = float(model.options(values)["coulomb_torque"]) / values["bristle_stiffness"]
         takes = math.sqrt(2.0 * bent / turning)
-        refuse(("bristle_stiffness", "bristle_damping"), takes, "bending the bristles")
+        below = [each.name for each in model.numbers if each.presliding]
+        refuse(below, takes, "bending the bristles")
     return replace(fit, estimates=found)
 
 

@@ -115,4 +115,5 @@ FRICTION = FrictionModel(
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
+    sought=LUGRE.sought,
 )

@@ -32,6 +32,7 @@ from campaign.physics.elementary import exp, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.path import decayed, parts_of, sign_of
+from campaign.physics.friction.sought import SLIDE, Sizes, Sought, curve, stiffness
 from campaign.physics.friction.stribeck import (
     CURVE,
     CurveOptions,
@@ -136,6 +137,16 @@ def _stored_energy(options: GmsOptions, state: Array) -> float:
     return float(0.5 * np.sum(state[: len(stiffnesses)] ** 2 / stiffnesses))
 
 
+def _sought(sizes: Sizes, by_direction: bool) -> tuple[Sought, ...]:
+    """A lag s(v) / C that is between a millionth and a thousand times that of a whole stroke."""
+    usual = sizes.torque * sizes.rate / sizes.travel
+    attraction = Sought(
+        "attraction", "attraction", "N m/s", "How fast slipping elements approach the curve.",
+        1e-3 * usual, 1e6 * usual, 1e2 * usual, SLIDE, logarithmic=True,
+    )  # fmt: skip
+    return (*curve(sizes, by_direction=by_direction), stiffness(sizes), attraction)
+
+
 FRICTION = FrictionModel(
     name="gms",
     summary="dynamic: N Maxwell-slip elements with a Stribeck curve and lag (Eq. 3.23 to 3.25)",
@@ -148,4 +159,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "attraction"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,
+    sought=_sought,
 )

@@ -166,4 +166,5 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
+    sought=LUGRE.sought,
 )

@@ -23,6 +23,7 @@ from campaign.physics.friction.interface import (
     Presliding,
     SmallSignal,
 )
+from campaign.physics.friction.sought import bristles
 from campaign.physics.friction.stribeck import (
     CURVE,
     NegativeDirection,
@@ -166,4 +167,5 @@ FRICTION = FrictionModel(
     small_signal=_small_signal,
     stored_energy=_stored_energy,
     step_for=_step_for,
+    sought=lambda sizes, by_direction: bristles(sizes, by_direction=by_direction),
 )

@@ -25,6 +25,7 @@ from campaign.physics.friction.interface import Array, FrictionModel, Presliding
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import parts_of, sign_of
+from campaign.physics.friction.sought import PRESLIDE, Sizes, Sought, bristles
 from campaign.physics.friction.stribeck import (
     curve_parameters,
     curve_torque,
@@ -95,6 +96,15 @@ def _small_signal(options: FadingOptions) -> SmallSignal:
     return SmallSignal(stuck=bristles, stuck_compensation=bristles)
 
 
+def _sought(sizes: Sizes, by_direction: bool) -> tuple[Sought, ...]:
+    fading = Sought(
+        "damping_velocity", "damping_velocity", "rad/s", "Rate at which sigma1 has fallen to 37 %.",
+        1e-4 * sizes.rate, 10.0 * sizes.rate, 0.1 * sizes.rate, PRESLIDE, logarithmic=True,
+        presliding=True,
+    )  # fmt: skip
+    return (*bristles(sizes, by_direction=by_direction), fading)
+
+
 FRICTION = FrictionModel(
     name="lugre-fading",
     summary="dynamic: LuGre friction with a bristle damping that fades with the rate",
@@ -107,4 +117,5 @@ FRICTION = FrictionModel(
     changeable=(*(LUGRE.changeable or ()), "damping_velocity"),
     small_signal=_small_signal,
     stored_energy=LUGRE.stored_energy,
+    sought=_sought,
 )

@@ -22,6 +22,7 @@ from campaign.physics.friction.interface import (
     Presliding,
     SmallSignal,
 )
+from campaign.physics.friction.sought import curve
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate, RotationalDamping, Torque
 
@@ -211,4 +212,5 @@ FRICTION = FrictionModel(
         static_torque=lambda options, direction: in_direction(options, "static_torque", direction),
         jumps=lambda options: options.sign_smoothing == 0.0,
     ),
+    sought=lambda sizes, by_direction: curve(sizes, by_direction=by_direction),
 )
