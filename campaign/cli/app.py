@@ -42,7 +42,7 @@ from campaign.cli.parameters import (
 GROUPS = {
     "Experiments": ("init", "plan", "run", "resume", "rerun", "import"),
     "Results": ("list", "show", "report", "identify", "compare", "trend", "index", "export"),
-    "Benches": ("kinds", "model", "check", "calibrate", "fingerprint"),
+    "Benches": ("kinds", "schema", "model", "check", "calibrate", "fingerprint"),
     "Archives": ("verify", "sign"),
     "Hardware": ("device", "stop", "status"),
     "Installation": ("warmup",),

@@ -8,6 +8,7 @@ from pathlib import Path
 from campaign.archive import RunSummary, list_runs
 from campaign.archive.writing.remnants import find_remnants
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
+from campaign.cli.schemas import write_schemas
 from campaign.cli.selection import Selection
 from campaign.interrupts import unwinding
 from campaign.resources import copy_shipped
@@ -44,6 +45,7 @@ def init_folder(folder: Path) -> None:
     """Copy what is shipped into `folder` and say how to go on."""
     written = copy_shipped(folder)
     print_line(f"{len(written)} files written to {folder}")
+    write_schemas(folder)
     print_line(f"now: campaign run {folder / 'protocols' / 'quickstart.toml'} --report")
 
 

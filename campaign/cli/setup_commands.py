@@ -70,6 +70,18 @@ def model(
 
 
 @app.command()
+def schema(
+    of: Annotated[
+        str, typer.Argument(metavar="protocol|bench|report", help="Which files it describes.")
+    ],
+) -> None:
+    """Print a JSON Schema, by which editors complete and check TOML."""
+    from campaign.cli.schemas import print_schema
+
+    print_schema(of)
+
+
+@app.command()
 def warmup() -> None:
     """Compile the engine now, once per installation, instead of in the first run."""
     from campaign.cli.warmup import warm_up

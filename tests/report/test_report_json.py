@@ -18,14 +18,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment
 from campaign.reason import Cause, Reason
 from campaign.report.build import build_report
-from campaign.report.formats.as_json import POINTS, plain, read_report
-from campaign.report.formats.report_data import ArticleData, ReportData
+from campaign.report.formats.as_json import POINTS, plain, read_report, report_schema
 from campaign.result import Amount, Column, Conclusion, Factor, Finding, Result, Table
 from campaign.text import pretty_unit
 from campaign.units import convert
@@ -38,8 +36,7 @@ COMMON = re.compile(r"(\([^()]* ± [^()]*\)|[^ ]+ \([^()]* to [^()]*\)) × 10([�
 
 
 def schema_text() -> str:
-    schema = TypeAdapter(ReportData | ArticleData).json_schema()
-    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(report_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def found(value: float, half: float | None, unit: str, **more: Any) -> Estimate:

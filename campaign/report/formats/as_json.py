@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 from campaign import __version__, result
 from campaign.access.estimates import row_of
@@ -94,6 +94,11 @@ def _text(page: BaseModel) -> str:
 def read_report(text: str) -> data.ReportData:
     """A report from its JSON. Raises ValueError where it is not as the schema says."""
     return data.ReportData.model_validate_json(text)
+
+
+def report_schema() -> dict[str, Any]:
+    """JSON Schema of `report.json`, and of the JSON of other pages."""
+    return TypeAdapter(data.ReportData | data.ArticleData).json_schema()
 
 
 def report_data(layout: Layout) -> data.ReportData:

@@ -1,0 +1,55 @@
+"""`campaign schema`, and what `campaign init` leaves so that editors find schemas."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from campaign.cli.output import print_json
+from campaign.errors import UsageError
+from campaign.experiments import experiments
+from campaign.protocol.json_schema import bench_schema, protocol_schema
+from campaign.report.formats.as_json import report_schema
+
+SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
+    "protocol": lambda: protocol_schema(experiments()),
+    "bench": bench_schema,
+    "report": report_schema,
+}
+FOLDER = "schemas"
+RULES = """\
+# Which JSON Schema an editor holds each file against (taplo, Even Better TOML).
+# `campaign schema protocol` and `campaign schema bench` write them anew.
+[[rule]]
+include = ["**/*.toml"]
+exclude = ["**/benches/*.toml", "**/.taplo.toml"]
+schema = { path = "./schemas/protocol.json" }
+
+[[rule]]
+include = ["**/benches/*.toml"]
+schema = { path = "./schemas/bench.json" }
+"""
+
+
+def print_schema(of: str) -> None:
+    """The JSON Schema of protocols, benches or reports. Raises UsageError for anything else."""
+    if of not in SCHEMAS:
+        raise UsageError(f"there is no schema of {of!r}; there are {', '.join(SCHEMAS)}")
+    print_json(SCHEMAS[of]())
+
+
+def write_schemas(folder: Path) -> None:
+    """Those of protocols and benches, and the rules that name them; what is there stays."""
+    files = {
+        f"{FOLDER}/{of}.json": json.dumps(SCHEMAS[of](), indent=1, ensure_ascii=False) + "\n"
+        for of in ("protocol", "bench")
+    }
+    try:
+        (folder / FOLDER).mkdir(exist_ok=True)
+        for name, text in {**files, ".taplo.toml": RULES}.items():
+            if not (folder / name).exists():
+                (folder / name).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be written: {error.strerror}") from None

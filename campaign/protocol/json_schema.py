@@ -1,0 +1,173 @@
+"""JSON Schema (draft 7) of protocols and benches, so that editors complete and check TOML.
+
+It says what a file may contain: tables, keys, words, and that a quantity is text of a number and a
+unit. Which units those are depends on the axis, and whether values suit each other on the whole
+file: `campaign plan` and `campaign check` say that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
+
+from campaign.choice import Choice
+from campaign.options import TextFile, meaning_of
+from campaign.physics.bench import Bench
+from campaign.protocol.schema import ExperimentKind, ProtocolFile, TestEntry
+from campaign.units import Quantity
+
+DIALECT = "http://json-schema.org/draft-07/schema#"
+QUANTITY = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(/[1-9]\d*)?(\s+\S|[^\s\d.]).*$"
+"""A number, or a fraction, and a unit."""
+BOUNDS = ("gt", "ge", "lt", "le", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
+"""Of a quantity: SI, which no text is held against."""
+Tree = dict[str, Any]
+
+
+class _Generator(GenerateJsonSchema):
+    """Knows quantities, choices between tables, and docstrings of fields."""
+
+    def function_before_schema(self, schema: Any) -> Tree:
+        """See `GenerateJsonSchema`."""
+        owner = getattr(schema["function"]["function"], "__self__", None)
+        return _quantity(owner) if isinstance(owner, Quantity) else self._inner(schema["schema"])
+
+    def function_plain_schema(self, schema: Any) -> Tree:
+        """See `GenerateJsonSchema`."""
+        owner = getattr(schema["function"]["function"], "__self__", None)
+        if isinstance(owner, Choice):
+            return self._choice(owner)
+        if owner is TextFile:
+            return {"type": "string"}
+        return {}
+
+    def default_schema(self, schema: Any) -> Tree:
+        """Without defaults, which are SI: the description says what matters."""
+        return self._inner(schema["schema"])
+
+    def nullable_schema(self, schema: Any) -> Tree:
+        """TOML has no null: what is not there is absent."""
+        return self._inner(schema["schema"])
+
+    def model_schema(self, schema: Any) -> Tree:
+        """See `GenerateJsonSchema`."""
+        tree: Tree = super().model_schema(schema)
+        model = schema["cls"]
+        for name, each in tree.get("properties", {}).items():
+            each.pop("title", None)
+            if name in model.model_fields and (told := meaning_of(model, name)):
+                tree["properties"][name] = _described(each, told)
+        return tree
+
+    def _choice(self, choice: Choice) -> Tree:
+        words = [word for word in choice.words() if choice.options(word) is not None]
+        return {
+            "type": "object",
+            "required": [choice.tag],
+            "properties": {choice.tag: {"enum": words}},
+            "allOf": [
+                {
+                    "if": {"properties": {choice.tag: {"const": word}}, "required": [choice.tag]},
+                    "then": self._inner(_core(choice.options(word))),
+                }
+                for word in words
+            ],
+        }
+
+    def _inner(self, schema: Any) -> Tree:
+        return dict(self.generate_inner(schema))
+
+
+def _core(model: type[BaseModel] | None) -> Any:
+    if model is None:
+        raise TypeError("no options")
+    return model.__pydantic_core_schema__
+
+
+def _quantity(quantity: Quantity) -> Tree:
+    units = quantity.accepts + (quantity.linear.accepts if quantity.linear else ())
+    told = f"A {quantity.name}, such as {quantity.example}; units: {', '.join(units)}."
+    return {"type": "string", "pattern": QUANTITY, "description": told}
+
+
+def _described(schema: Tree, text: str) -> Tree:
+    """With the words of the field before those of its quantity; a mere reference beside them."""
+    if "$ref" in schema:
+        return {"allOf": [schema], "description": text}
+    own = schema.get("description", "")
+    return {**schema, "description": f"{text} {own}".strip()}
+
+
+def _cleaned(tree: Any) -> Any:
+    """Without bounds on text, and without titles, which repeat names."""
+    if isinstance(tree, list):
+        return [_cleaned(each) for each in tree]
+    if not isinstance(tree, dict):
+        return tree
+    dropped = BOUNDS if tree.get("type") == "string" else ()
+    return {
+        name: {key: _cleaned(each) for key, each in value.items()}
+        if name in ("properties", "$defs", "definitions")
+        else _cleaned(value)
+        for name, value in tree.items()
+        if name not in dropped and not (name == "title" and isinstance(value, str))
+    }
+
+
+def _of_model(model: type[BaseModel]) -> Tree:
+    tree: Tree = model.model_json_schema(
+        schema_generator=_Generator, ref_template="#/definitions/{model}"
+    )
+    tree["definitions"] = tree.pop("$defs", {})
+    cleaned: Tree = _cleaned(tree)
+    return cleaned
+
+
+def bench_schema() -> Tree:
+    """Of a bench file."""
+    tree = _of_model(Bench)
+    definitions = tree["definitions"]
+    definitions["Scatter"] = {"anyOf": [{"type": "number"}, definitions["Scatter"]]}
+    gear = definitions["GearOptions"]
+    gear["required"], gear["oneOf"] = [], [{"required": ["ratio"]}, {"required": ["lead"]}]
+    _named_by_key(tree["properties"]["compensation"], definitions)
+    return {"$schema": DIALECT, "title": "A bench of campaign", **tree}
+
+
+def _named_by_key(table: Tree, definitions: Mapping[str, Tree]) -> None:
+    """An entry called like a kind needs no word that says so: `[compensation.observer]`."""
+    choice = table["additionalProperties"]
+    (tag,) = choice["required"]
+    table["properties"] = {}
+    for case in choice["allOf"]:
+        word = case["if"]["properties"][tag]["const"]
+        own = definitions[case["then"]["$ref"].rpartition("/")[2]]
+        required = [name for name in own.get("required", ()) if name != tag]
+        table["properties"][word] = {**own, "required": required}
+
+
+def protocol_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
+    """Of a protocol with these experiments; a test's keys follow from its kind."""
+    top, entry = _of_model(ProtocolFile), _of_model(TestEntry)
+    definitions = {**top.pop("definitions"), **entry.pop("definitions")}
+    cases = []
+    for name, kind in experiments.items():
+        own = _of_model(kind.options)
+        definitions |= own.pop("definitions")
+        properties = {**own.get("properties", {}), **entry["properties"]}
+        required = [*entry.get("required", ()), *own.get("required", ())]
+        then = {"properties": properties, "required": required, "additionalProperties": False}
+        given = {"properties": {"kind": {"const": name}}, "required": ["kind"]}
+        cases.append({"if": given, "then": then})
+    test = {**entry, "additionalProperties": True, "allOf": cases}
+    test["properties"] = {**entry["properties"], "kind": {"enum": list(experiments)}}
+    top["properties"]["test"] = {"type": "array", "items": test}
+    return {
+        "$schema": DIALECT,
+        "title": "A protocol of campaign",
+        **top,
+        "definitions": definitions,
+    }
