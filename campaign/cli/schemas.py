@@ -24,11 +24,12 @@ RULES = """\
 # `campaign schema protocol` and `campaign schema bench` write them anew.
 [[rule]]
 include = ["**/*.toml"]
-exclude = ["**/benches/*.toml", "**/.taplo.toml"]
+exclude = ["**/benches/**", "**/calibration/**", "**/.taplo.toml"]
 schema = { path = "./schemas/protocol.json" }
 
 [[rule]]
 include = ["**/benches/*.toml"]
+exclude = ["**/calibration/**"]
 schema = { path = "./schemas/bench.json" }
 """
 
