@@ -45,7 +45,7 @@ GROUPS = {
     "Benches": ("kinds", "schema", "model", "check", "calibrate", "fingerprint"),
     "Archives": ("verify", "sign"),
     "Hardware": ("device", "stop", "status"),
-    "Installation": ("warmup",),
+    "Installation": ("doctor", "warmup"),
 }
 """Commands as the help lists them, by heading."""
 

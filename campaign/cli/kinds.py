@@ -37,7 +37,7 @@ def list_kinds() -> None:
     """One line per kind, and what is wrong with installed packages that have some."""
     rows: list[tuple[str, str, str]] = []
     problems: list[str] = []
-    for room in _rooms():
+    for room in rooms():
         for name, kind in room.described():
             if isinstance(kind, str):
                 problems.append(kind)
@@ -63,13 +63,13 @@ def show_kind(name: str) -> None:
     if name == BENCH[1]:
         _show(*BENCH)
         return
-    rooms = [room for room in _rooms() if name in room]
-    models = {} if rooms else experiments_by_model()
-    if not rooms and name not in models:
+    named = [room for room in rooms() if name in room]
+    models = {} if named else experiments_by_model()
+    if not named and name not in models:
         close = difflib.get_close_matches(name, kind_names(), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "`campaign kinds` lists them"
         raise UsageError(f"there is no kind {name!r}; {hint}")
-    for room in rooms:
+    for room in named:
         kind = room[name]
         options = getattr(kind, "options", None)  # an export format has none
         _show(room.room, name, f"{kind.summary}{_whose(room, name)}", options)
@@ -94,7 +94,7 @@ def show_kind(name: str) -> None:
 def kind_names() -> list[str]:
     """All that `show_kind` knows, sorted."""
     own = (CHANNELS[1], UNITS_KIND[1], BENCH[1])
-    return sorted({*own, *experiments_by_model(), *(name for room in _rooms() for name in room)})
+    return sorted({*own, *experiments_by_model(), *(name for room in rooms() for name in room)})
 
 
 def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:
@@ -130,7 +130,8 @@ def _show_channels() -> None:
     print_table(("channel", "unit", "linear axis", "side", "known by", "meaning"), rows)
 
 
-def _rooms() -> Iterator[Kinds[Any]]:
+def rooms() -> Iterator[Kinds[Any]]:
+    """Everything that packages may bring kinds of."""
     yield from (experiments(), friction_models(), compensation_methods(), backends())
     yield from (exports(), formats())
 

@@ -9,6 +9,7 @@ import typer
 
 from campaign.cli.completion import complete_kind
 from campaign.cli.output import print_line
+from campaign.cli.parameters import RESULTS, JsonOption, ResultsOption
 from campaign.cli.rig_commands import app
 
 __all__ = ["app"]
@@ -87,6 +88,14 @@ def warmup() -> None:
     from campaign.cli.warmup import warm_up
 
     raise typer.Exit(warm_up())
+
+
+@app.command()
+def doctor(results: ResultsOption = RESULTS, as_json: JsonOption = False) -> None:
+    """Say what this installation is, what is wrong with it, and what to do."""
+    from campaign.cli.doctor import examine
+
+    raise typer.Exit(examine(results, as_json=as_json))
 
 
 @app.command()
