@@ -43,6 +43,7 @@ GROUPS = {
     "Experiments": ("init", "plan", "run", "resume", "rerun", "import"),
     "Results": ("list", "show", "report", "identify", "compare", "trend", "index", "export"),
     "Benches": ("kinds", "schema", "model", "check", "calibrate", "fingerprint"),
+    "Controllers": ("export-compensation",),
     "Archives": ("verify", "sign"),
     "Hardware": ("device", "stop", "status"),
     "Installation": ("doctor", "warmup"),

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from campaign.cli.output import print_line
 from campaign.cli.parameters import (
     BaudOption,
     BenchArgument,
@@ -158,3 +159,19 @@ def status(
     from campaign.cli.status import show_status
 
     raise typer.Exit(show_status(port, baud, patience, as_json=as_json))
+
+
+@app.command("export-compensation")
+def export_compensation_command(
+    bench: BenchArgument,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the bench's [compensation].")],
+    target: Annotated[str, typer.Option("--to", metavar="c|json", help="In which form.")] = "c",
+    output: Annotated[
+        Path, typer.Option("--output", metavar="DIR", help="Where to write it.")
+    ] = Path(),
+) -> None:
+    """Write a compensation of a bench as code for a controller, with test vectors."""
+    from campaign.cli.export_compensation import export_compensation
+
+    for path in export_compensation(bench, name, target, output):
+        print_line(str(path))

@@ -1,0 +1,101 @@
+"""A compensation of a bench as the sampled controller has it: numbers, states, step functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.errors import UsageError
+from campaign.physics.blocks import (
+    Controller,
+    Elements,
+    Memory,
+    controller_of,
+    elements_of,
+    memory_of,
+)
+from campaign.physics.complete import CompleteBench
+from campaign.physics.friction_elements import Interface
+from campaign.physics.lanes import Lane, Lanes, together
+from campaign.physics.rows import KEPT_CURRENT
+from campaign.physics.sampled import _compensate, _rates
+from campaign.signals import Zero
+from campaign.trial import Task
+
+Array = NDArray[np.float64]
+INPUTS = ("gyro_rate", "load_angle", "motor_angle", "motor_current")
+"""rad/s, rad, rad at the load, A."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A compensation made ready: what code for a controller is written from.
+
+    Attributes:
+        name: of the bench's compensation.
+        lanes: the same as the engine runs it.
+    """
+
+    name: str
+    bench: CompleteBench
+    lanes: Lanes
+
+    @classmethod
+    def of(cls, bench: CompleteBench, name: str) -> Sampled:
+        """Raises UsageError where the bench has no such compensation, or it is not sampled."""
+        if name not in bench.compensation:
+            there = ", ".join(bench.compensation) or "none"
+            raise UsageError(f"{bench.name} has no compensation {name!r}; there are {there}")
+        rate = bench.controller.sample_rate
+        if rate is None:
+            raise UsageError(
+                f"{bench.name} does not say controller.sample_rate: a continuous compensation "
+                "has no code"
+            )
+        task = Task(
+            mode="rate", command=Zero(), compensation=name, duration=1.0, window=(0.0, 1.0),
+            sample_rate=rate,
+        )  # fmt: skip
+        return cls(name, bench, together([Lane.of(bench, task, 1)], 1))
+
+    @property
+    def controller(self) -> Controller:
+        return self.lanes.controller
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """Friction models, in the order in which their torques are summed."""
+        return self.lanes.trials[0].compensation
+
+    @property
+    def motor_side(self) -> tuple[bool, ...]:
+        """Of each interface, whether it reads the motor's angle."""
+        return tuple(bool(each) for each in self.lanes.compensation.side)
+
+    def torques(self, inputs: Array) -> Array:
+        """Torque (N m at the load) of each sample, shape (n,), from `INPUTS`, shape (n, 4).
+
+        No more than the bench's `limits.torque`, which the code keeps as well.
+        """
+        made = together(list(self.lanes.trials), 1)  # with states of its own
+        out = np.empty(len(inputs))
+        _run(made.controller, made.compensation, made.memory, np.ascontiguousarray(inputs), out)
+        return np.clip(out, -self.bench.limits.torque, self.bench.limits.torque)
+
+
+@numba.njit(error_model="numpy")  # type: ignore[untyped-decorator]
+def _run(
+    controller: Controller, compensation: Elements, memory: Memory, inputs: Array, out: Array
+) -> None:
+    """The controller's own compensation, sample after sample."""
+    controller, memory = controller_of(1, controller), memory_of(1, memory)
+    compensation = elements_of(1, compensation)
+    for k in range(len(inputs)):
+        gyro, encoder, resolver = inputs[k, 0], inputs[k, 1], inputs[k, 2]
+        memory.kept[KEPT_CURRENT] = inputs[k, 3]
+        gyro = _rates(controller, memory.kept, k == 0, gyro, encoder, resolver)
+        motor_torque = controller.torque_per_current * inputs[k, 3]
+        out[k] = _compensate(1, controller, compensation, memory, gyro, motor_torque)

@@ -1,0 +1,196 @@
+"""Compensations in C: the bits of the engine, for every model and for inputs that hurt."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaign.cli.export_compensation import vectors
+from campaign.controller_code.c_code import c_code, test_code
+from campaign.controller_code.compensation import Sampled
+from campaign.controller_code.transpile import MOTION, ROWS, Program
+from campaign.errors import UsageError
+from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete
+from campaign.physics.elementary import exp, where
+from campaign.physics.friction import friction_models
+from campaign.protocol.bench_file import simulable
+from tests.physics.friction.cases import CURVE, MODELS
+from tests.system.user import campaign
+
+test_code.__test__ = False  # type: ignore[attr-defined]  # a program in C
+
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wno-unused", "-O2", "-ffp-contract=off")
+SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+TRIES: dict[str, dict[str, Any]] = {
+    **{name: tree for name, tree in MODELS.items() if not friction_models()[name].no_compensation},
+    "coulomb": {"coulomb_torque": 26.0, "viscous_friction": 4.0, "sign_smoothing": 0.01}
+    if "sign_smoothing" in friction_models()["coulomb"].options.model_fields
+    else {"coulomb_torque": 26.0, "viscous_friction": 4.0},
+    "stribeck": {**CURVE, "sign_smoothing": 0.01},
+}
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler on the PATH")
+
+
+def with_friction(*friction: dict[str, Any], gain: float = 0.8) -> CompleteBench:
+    """The platform with one compensation, `tried`, of these interfaces (SI)."""
+    tree = simulable("platform").model_dump()
+    named = {f"interface-{n}": each for n, each in enumerate(friction)}
+    method = {"method": "friction-model", "friction": named, "gain": gain}
+    tree["compensation"], tree["known"] = {"tried": method}, {}
+    tree.pop("plant", None)
+    return complete(Bench.model_validate(tree, context={"si": True}))
+
+
+def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler: str) -> str:
+    """What the compiled test says; it must end with 0."""
+    name = f"compensation_{made.name}"
+    (folder / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
+    (folder / f"{name}_test.c").write_text(test_code(made, inputs), encoding="utf-8")
+    command = [compiler, *FLAGS, *flags, f"{name}_test.c", "-o", "test", "-lm"]
+    compiled = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert compiled.returncode == 0, compiled.stderr
+    assert "warning" not in compiled.stderr, compiled.stderr
+    done = subprocess.run(["./test"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize(
+    ("bench", "name"),
+    [(b, n) for b in ("platform", "linear") for n in simulable(b).compensation],
+)
+def test_shipped_compensations_have_the_bits_of_the_engine(
+    tmp_path: Path, bench: str, name: str, compiler: str
+) -> None:
+    made = Sampled.of(simulable(bench), name)
+    said = ended(tmp_path, made, vectors(made), *SANITIZED, compiler=compiler)
+    assert said == "0 of 2000 samples differ\n"
+
+
+def hurting(made: Sampled) -> np.ndarray:
+    """Reversals in every sample, rest, zeros of both signs, denormals, jumps, and fast motion."""
+    draw = np.random.default_rng(3)
+    pieces = [
+        1e-4 * (-1.0) ** np.arange(200),
+        np.zeros(50),
+        np.full(50, -0.0),
+        5e-324 * np.arange(50),
+        1e-310 * draw.standard_normal(100),
+        np.repeat(draw.uniform(-1.0, 1.0, 20), 10),
+        np.cumsum(draw.normal(0.0, 0.02, 300)),
+    ]
+    angle = np.concatenate(pieces)
+    rate = np.gradient(angle) / float(made.controller.period[0])
+    return np.column_stack([rate, angle, -angle, 10.0 * draw.standard_normal(len(angle))])
+
+
+@pytest.mark.parametrize("name", TRIES)
+def test_every_model_has_the_bits_of_the_engine(tmp_path: Path, name: str) -> None:
+    """With a ripple, with directions of their own, on either side of the gear."""
+    draw = np.random.default_rng(sum(name.encode()))
+    tree = {"model": name, **TRIES[name]}
+    for key, value in tree.items():
+        if key in ("coulomb_torque", "static_torque", "bristle_stiffness", "viscous_friction"):
+            tree[key] = float(value * draw.uniform(0.8, 1.0))
+    plain = {**tree, "negative": {"coulomb_torque": 0.7 * tree["coulomb_torque"]}}
+    rippled = {**tree, "ripple": {"amplitude": 0.1, "periods": 31.0, "phase": 0.4}}
+    motor = {**tree, "side": "motor", "velocity": "motor", "coulomb_torque": 0.03}
+    motor |= {"static_torque": 0.04} if "static_torque" in tree else {}
+    motor |= {"viscous_friction": 1e-4}  # or all is at the limit
+    made = Sampled.of(with_friction(plain, plain, rippled, motor), "tried")
+    for inputs in (vectors(made), hurting(made)):
+        ended(tmp_path, made, inputs, compiler=COMPILERS[0])
+
+
+def test_a_reading_that_is_none_leaves_the_torque_and_the_limit_is_one(tmp_path: Path) -> None:
+    made = Sampled.of(simulable("platform"), "observer")
+    name, limit = "compensation_observer", made.bench.limits.torque
+    (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
+    (tmp_path / "main.c").write_text(f'''
+#include <stdio.h>
+#include "{name}.c"
+int main(void)
+{{
+    {name}_state state;
+    double first, held, most, anew;
+    {name}_reset(&state);
+    first = {name}_step(&state, 0.1, 0.0, 0.0, 1.0);
+    held = {name}_step(&state, NAN, 0.0, 0.0, 1.0);
+    held = held == {name}_step(&state, 0.1, INFINITY, 0.0, 1.0) ? held : 1e9;
+    most = {name}_step(&state, -1e6, 0.0, 0.0, 1.0);
+    {name}_reset(&state);
+    anew = {name}_step(&state, 0.1, 0.0, 0.0, 1.0);
+    printf("%a %a %a %a\\n", first, held, most, anew);
+    return 0;
+}}
+''')
+    command = [COMPILERS[0], *FLAGS, "main.c", "-o", "test", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    said = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    first, held, most, anew = map(float.fromhex, said.stdout.split())
+    assert first == held == anew != 0.0
+    assert abs(most) == limit
+
+
+def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_path: Path) -> None:
+    done = campaign(tmp_path, "export-compensation", "platform", "lugre", "--output", "code")
+    assert "Loop, sliding, rate command: 5.85 Hz crossover, 69 deg, 30.9 dB" in done.out
+    folder = tmp_path / "code"
+    compile_ = [COMPILERS[0], *FLAGS, "compensation_lugre_test.c", "-o", "test", "-lm"]
+    subprocess.run(compile_, cwd=folder, check=True)
+    assert subprocess.run(["./test"], cwd=folder, check=False).returncode == 0
+    code = folder / "compensation_lugre.c"
+    text = code.read_text(encoding="utf-8")
+    wrong = text.replace("friction = friction + ", "friction = friction - ", 1)
+    assert wrong != text
+    code.write_text(wrong, encoding="utf-8")
+    subprocess.run(compile_, cwd=folder, check=True)
+    assert subprocess.run(["./test"], cwd=folder, check=False).returncode == 1
+
+
+def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
+    made = Sampled.of(simulable("platform"), "observer")
+    name = "compensation_observer"
+    (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
+    (tmp_path / f"{name}_test.c").write_text(test_code(made, vectors(made)), encoding="utf-8")
+    flags = ("-std=c99", "-O2", "-ffp-contract=fast", "-mfma")
+    command = [COMPILERS[0], *flags, f"{name}_test.c", "-o", "test", "-lm"]
+    if subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode:
+        pytest.skip("this processor has no fma to contract to")
+    cpu = Path("/proc/cpuinfo")
+    if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
+        pytest.skip("this processor has no fma to contract to")
+    assert subprocess.run(["./test"], cwd=tmp_path, check=False).returncode == 2
+
+
+def sorts(parameters: Any, state: Any, motion: Any) -> tuple[float, float]:
+    """A step function that C does not have."""
+    return sorted(state)[0], where(motion.rate_end > 0.0, exp(motion.rate_end), 0.0)
+
+
+def test_what_has_no_counterpart_is_refused_by_name() -> None:
+    with pytest.raises(UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"):
+        Program().function(sorts, [ROWS, ROWS, MOTION], [1, 1])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("simulink", "lugre"), "does not say controller.sample_rate"),
+        (("platform", "nobody"), "has no compensation 'nobody'; there are static, lugre, observer"),
+        (("platform", "lugre", "--to", "fortran"), "there are c, json"),
+    ],
+)
+def test_mistakes_are_said_in_a_line(tmp_path: Path, arguments: tuple[str, ...], why: str) -> None:
+    told = campaign(tmp_path, "export-compensation", *arguments, code=2).err
+    assert why in " ".join(told.split())
+    assert list(tmp_path.iterdir()) == []
