@@ -302,7 +302,8 @@ def _analysed(experiment: Experiment, data: TestData) -> Result:
         raise
     except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
         good, doubts = _measurable(experiment, data)
-        if not doubts:
+        # Who asks for parameters is told why there are none; a report has notes on each trial.
+        if not doubts or (data.model is not None and not any(good.completed())):
             raise
     result = experiment.analyse(good) if any(good.completed()) else EMPTY
     return replace(result, doubts=doubts)

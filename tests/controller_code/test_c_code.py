@@ -178,7 +178,9 @@ def sorts(parameters: Any, state: Any, motion: Any) -> tuple[float, float]:
 
 
 def test_what_has_no_counterpart_is_refused_by_name() -> None:
-    with pytest.raises(UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"):
+    with pytest.raises(
+        UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"
+    ):
         Program().function(sorts, [ROWS, ROWS, MOTION], [1, 1])
 
 

@@ -108,9 +108,7 @@ def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
     """Coulomb friction and the ratio to it are each known well enough; their product is not."""
 
     def of(name: str, key: str, over: str = "") -> Any:
-        return SimpleNamespace(
-            unknown=SimpleNamespace(name=name), key=key, over=over, meaning="", unit=""
-        )
+        return SimpleNamespace(name=name, key=key, over=over, meaning="", unit="", advice="")
 
     told = {
         "coulomb": number("coulomb", 1.0, 0.45, standard_error=0.23),

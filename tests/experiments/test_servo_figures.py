@@ -101,7 +101,7 @@ def test_what_compensation_changes_is_shown_apart() -> None:
         inside = (curve.low <= change) & (change <= curve.high)
         assert np.mean(inside) > 0.8
         assert np.median(curve.y) == pytest.approx(change, abs=0.01)
-    assert "what compensation changes" in figures["open-loop"].caption
+    assert "What compensation changes" in figures["open-loop"].caption
 
 
 def test_nothing_changes_where_there_is_nothing_to_compare() -> None:

@@ -40,15 +40,20 @@ def test_the_demo_opens_with_what_was_found_what_is_true_and_what_compensation_g
     _, archive = quickstart
     report = archive.with_name(f"{archive.stem}-report")
     html = (report / "report.html").read_text(encoding="utf-8")
-    start = html.index('<section id="opening">')
+    start = html.index('<section id="opening"')
     opening = html[start : html.index("</section>", start)]
-    coulomb = re.search(r"positive direction: Coulomb friction Tc ([\d.]+) ± ([\d.]+) N·m", opening)
+    row = r"Coulomb friction Tc <small>positive</small></th>"
+    row += r"<td[^>]*>([\d.]+) ±\s([\d.]+) N·m</td><td[^>]*>([\d.]+) N·m</td>"
+    coulomb = re.search(row, opening)
     assert coulomb
     assert abs(float(coulomb[1]) - 25.2968) <= float(coulomb[2]) < 0.3
-    held = re.findall(r"(\d+) of (\d+) intervals hold the true values", opening)
-    assert len(held) == 2
-    assert all(int(of) >= 10 and int(yes) >= 0.8 * int(of) for yes, of in held)
-    assert len(re.findall(r"[\d.]+ times less \([\d.]+ to [\d.]+\)", opening)) == 3
+    assert coulomb[3] == "25.297"
+    (held,) = re.findall(r"(\d+) of (\d+) intervals hold the true values", opening)
+    assert int(held[1]) >= 20
+    assert int(held[0]) >= 0.8 * int(held[1])
+    assert "error reduction" in opening
+    below = html[start + len(opening) :]
+    assert len(re.findall(r"[\d.]+ times less \([\d.]+ to [\d.]+\)", below)) == 3
     assert '<figure id="' in opening
     assert not (report / "tables" / "scoreboard.csv").exists()
     assert "ublished" not in opening
@@ -124,7 +129,8 @@ def test_the_plan_executes_nothing_and_is_what_runs(tmp_path: Path):
     assert plan["duration_s"] == pytest.approx(2 * 2 / 0.24)  # two trials of two cycles at 0.24 Hz
     text = campaign(tmp_path, "plan", "protocol.toml").out
     assert "3 trials" in text
-    assert "of the rate limit" in text
+    assert "rate 13%" in text
+    assert "of the rate limit" in campaign(tmp_path, "plan", "protocol.toml", "--details").out
     run = campaign(tmp_path, "run", "protocol.toml", "--only", "sea")
     assert run.err.splitlines()[-1].startswith("complete: 2 trials done")
 
@@ -218,7 +224,7 @@ def test_init_writes_what_a_bench_top_motor_needs(tmp_path: Path):
     assert not campaign(tmp_path, "init", "lab", "--bench", "motor.toml").err
     lab = tmp_path / "lab"
     assert sorted(path.name for path in lab.rglob("*.toml")) == ["identify.toml", "motor.toml"]
-    planned = campaign(lab, "plan", "identify.toml")
+    planned = campaign(lab, "plan", "identify.toml", "--details")
     assert not planned.err  # of its own plan the program has no warning
     assert "70 % of the rate limit" in planned.out
     campaign(tmp_path, "init", "all", "--bench", "motor.toml", "--all")

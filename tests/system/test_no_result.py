@@ -150,7 +150,7 @@ def test_a_method_whose_numbers_overflow_costs_that_method(tmp_path: Path) -> No
         raise OverflowError("math range error")
 
     kind = top_rate(failing(RuntimeError("no"), Counter(), ()))
-    kind = replace(kind, model=Model("overflowing", "", analyse=overflow))
+    kind = replace(kind, model=Model("overflowing", ""), analyse=overflow)
     reader = archived(tmp_path, kind)
     with experiments().including(kind), pytest.raises(NoResultError) as refused:
         identify_run(str(reader.path), tmp_path, models=(kind.model.name,))
