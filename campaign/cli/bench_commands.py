@@ -165,7 +165,9 @@ def status(
 def export_compensation_command(
     bench: BenchArgument,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the bench's [compensation].")],
-    target: Annotated[str, typer.Option("--to", metavar="c|json", help="In which form.")] = "c",
+    target: Annotated[
+        str, typer.Option("--to", metavar="c|c-single|json", help="In which form.")
+    ] = "c",
     output: Annotated[
         Path, typer.Option("--output", metavar="DIR", help="Where to write it.")
     ] = Path(),

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from campaign import __version__
 from campaign.cli.check import CheckedLoop, loops_checked
 from campaign.cli.output import print_line, print_note
-from campaign.controller_code.c_code import c_code, test_code
+from campaign.controller_code.c_code import SINGLE, c_code, vectors_code
 from campaign.controller_code.compensation import INPUTS, Sampled
 from campaign.errors import UsageError
 from campaign.physics.complete import CompleteBench
@@ -35,7 +35,11 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     Raises UsageError: no such bench, compensation or target; a bench that is not sampled; a model
     whose step function has no counterpart in the target's language.
     """
-    targets: dict[str, Callable[[Sampled, list[str]], dict[str, str]]] = {"c": _c, "json": _json}
+    targets: dict[str, Callable[[Sampled, list[str]], dict[str, str]]] = {
+        "c": _c,
+        "c-single": _c_single,
+        "json": _json,
+    }
     if target not in targets:
         raise UsageError(f"--to {target}: there are {', '.join(targets)}")
     made = Sampled.of(simulable(bench), name)
@@ -73,9 +77,17 @@ def vectors(made: Sampled) -> Array:
     return np.column_stack([rate + noise, angle, angle + twist, current])
 
 
-def _c(made: Sampled, head: list[str]) -> dict[str, str]:
+def _c(made: Sampled, head: list[str], *, single: bool = False) -> dict[str, str]:
     name = f"compensation_{made.name.replace('-', '_')}"
-    return {f"{name}.c": c_code(made, head), f"{name}_test.c": test_code(made, vectors(made))}
+    return {
+        f"{name}.c": c_code(made, head, single=single),
+        f"{name}_test.c": vectors_code(made, vectors(made), single=single),
+    }
+
+
+def _c_single(made: Sampled, head: list[str]) -> dict[str, str]:
+    told = f"In single precision: to {SINGLE:g} of the largest torque of the test vectors."
+    return _c(made, [*head, told], single=True)
 
 
 def _json(made: Sampled, head: list[str]) -> dict[str, str]:

@@ -2,48 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from campaign.controller_code.compensation import INPUTS, Sampled
-from campaign.controller_code.transpile import MOTION, PRELUDE, ROWS, Program
+from campaign.controller_code.transpile import (
+    MOTION,
+    NUMBER,
+    PRELUDE,
+    ROWS,
+    SINGLE_PRELUDE,
+    Program,
+)
 from campaign.physics import elementary
 from campaign.physics.friction_elements import Interface
 from campaign.physics.step_function import AN_INSTANT, ROOM_TEMPERATURE, Motion
 
 Array = NDArray[np.float64]
-TYPES = f"typedef struct {{ double {', '.join(Motion._fields)}; }} motion;\n"
+Literal = Callable[[float], str]
+TYPES = f"typedef struct {{ real {', '.join(Motion._fields)}; }} motion;\n"
 
 
-def c_code(made: Sampled, head: Sequence[str]) -> str:
-    """The whole of `NAME.c`; head: lines that stand above it."""
-    name, program = f"compensation_{made.name.replace('-', '_')}", Program()
+SINGLE = 1e-3
+"""Share of the largest torque of the vectors by which single precision may be off."""
+
+
+def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
+    """The whole of `NAME.c`; head: lines that stand above it. single: in floats."""
+    name, program = f"compensation_{made.name.replace('-', '_')}", Program(single=single)
     interfaces = tuple(made.interfaces)
     called = [_step(program, each) for each in interfaces]
     sine = _sine(program) if any(each.ripple[0] for each in interfaces) else ""
     numbers = [
-        f"static const double parameters_{e}[] = {_row(each.parameters)};"
+        f"static const real parameters_{e}[] = {_row(program, each.parameters)};"
         for e, each in enumerate(interfaces)
     ]
     parts = [
         "/*", *(f" * {line}".rstrip() for line in head), " */",
         "#include <math.h>", "#include <stdint.h>", "#include <string.h>", "",
-        TYPES, PRELUDE, *program.texts, *numbers, "",
+        SINGLE_PRELUDE if single else PRELUDE, TYPES, *program.texts, *numbers, "",
         _state(name, made), _reset(name),
-        _sample(name, made, called, sine), _selftest(name),
+        _sample(name, program, made, called, sine), "" if single else _selftest(name),
     ]  # fmt: skip
     return "\n".join(parts)
 
 
-def test_code(made: Sampled, inputs: Array) -> str:
-    """A program that ends with 0 where the code gives the bits of `Sampled.torques`."""
+def vectors_code(made: Sampled, inputs: Array, *, single: bool = False) -> str:
+    """A program that ends with 0 where the code gives the torques of `Sampled.torques`.
+
+    To the bit; in single precision to `SINGLE` of the largest.
+    """
     name = f"compensation_{made.name.replace('-', '_')}"
-    rows = np.column_stack([inputs, made.torques(inputs)])
-    told = ",\n".join(f"    {_row(row)}" for row in rows)
+    torques = made.torques(inputs)
+    rows = np.column_stack([inputs, torques])
+    told = ",\n".join("    {" + ", ".join(map(float.hex, map(float, row))) + "}" for row in rows)
+    if single:
+        most = SINGLE * float(np.max(np.abs(torques)))
+        promised, begins = f"all agree to {most:.3g} N m", ""
+        differs = f"!(fabs(torque - rows[k][4]) <= {most.hex()})"
+    else:
+        promised, begins = "all bits agree", _begins(name)
+        differs = "memcmp(&torque, &rows[k][4], sizeof torque) != 0"
     return f"""\
-/* Test vectors of {name}.c: {", ".join(INPUTS)}, torque (SI). Ends with 0 where all bits agree.
+/* Test vectors of {name}.c: {", ".join(INPUTS)}, torque (SI). Ends with 0 where {promised}.
  * cc -std=c99 -O2 -ffp-contract=off {name}_test.c -lm && ./a.out
  */
 #include <stdio.h>
@@ -57,14 +80,11 @@ int main(void)
 {{
     {name}_state state;
     size_t k, wrong = 0;
-    if ({name}_selftest() != 0) {{
-        puts("fma is not fused, or arithmetic is contracted: compile with -ffp-contract=off");
-        return 2;
-    }}
-    {name}_reset(&state);
+{begins}    {name}_reset(&state);
     for (k = 0; k < sizeof rows / sizeof rows[0]; k++) {{
-        const double torque = {name}_step(&state, rows[k][0], rows[k][1], rows[k][2], rows[k][3]);
-        wrong += memcmp(&torque, &rows[k][4], sizeof torque) != 0;
+        const double torque = (double){name}_step(&state, (real)rows[k][0], (real)rows[k][1],
+            (real)rows[k][2], (real)rows[k][3]);
+        wrong += {differs};
     }}
     printf("%u of %u samples differ\\n", (unsigned)wrong, (unsigned)k);
     return wrong != 0;
@@ -72,12 +92,17 @@ int main(void)
 """
 
 
-def _row(values: Sequence[float] | Array) -> str:
-    return "{" + ", ".join(map(_literal, values)) + "}"
+def _begins(name: str) -> str:
+    return f"""\
+    if ({name}_selftest() != 0) {{
+        puts("fma is not fused, or arithmetic is contracted: compile with -ffp-contract=off");
+        return 2;
+    }}
+"""
 
 
-def _literal(value: float) -> str:
-    return float(value).hex()
+def _row(program: Program, values: Sequence[float] | Array) -> str:
+    return "{" + ", ".join(map(program.literal, map(float, values))) + "}"
 
 
 def _step(program: Program, interface: Interface) -> str:
@@ -86,15 +111,17 @@ def _step(program: Program, interface: Interface) -> str:
 
 
 def _sine(program: Program) -> str:
-    return program.function(elementary.sin, ["double"])[0]
+    if program.single:
+        return "sinf"
+    return program.function(elementary.sin, [NUMBER])[0]
 
 
 def _state(name: str, made: Sampled) -> str:
     order = made.controller.c.shape[0]
-    fields = ["double load_rate, motor_rate, load_angle, motor_angle, torque;"]
-    fields += [f"double linear[{order}];"] if order else []
+    fields = ["real load_rate, motor_rate, load_angle, motor_angle, torque;"]
+    fields += [f"real linear[{order}];"] if order else []
     sizes = (max(1, each.state_size) for each in made.interfaces)
-    fields += [f"double friction_{e}[{size}];" for e, size in enumerate(sizes)]
+    fields += [f"real friction_{e}[{size}];" for e, size in enumerate(sizes)]
     lines = "\n".join(f"    {each}" for each in (*fields, "int started;"))
     return f"typedef struct {{\n{lines}\n}} {name}_state;\n"
 
@@ -122,7 +149,8 @@ int {name}_selftest(void)
 """
 
 
-def _sample(name: str, made: Sampled, called: Sequence[str], sine: str) -> str:
+def _sample(name: str, program: Program, made: Sampled, called: Sequence[str], sine: str) -> str:
+    literal = program.literal
     its = made.controller
     pole, period = float(its.filter_pole[0]), float(its.period[0])
     share = (1.0 - pole) / period
@@ -139,74 +167,82 @@ def _sample(name: str, made: Sampled, called: Sequence[str], sine: str) -> str:
         "        state->started = 1;",
         "    }",
         *(
-            f"    state->{of}_rate = {_literal(pole)} * state->{of}_rate"
-            f" + {_literal(share)} * ({of}_angle - state->{of}_angle);"
+            f"    state->{of}_rate = {literal(pole)} * state->{of}_rate"
+            f" + {literal(share)} * ({of}_angle - state->{of}_angle);"
             for of in ("load", "motor")
         ),
         "    state->load_angle = load_angle;",
         "    state->motor_angle = motor_angle;",
-        f"    const double rate = {rate}, relative = state->load_rate;",
-        f"    const double motor_torque = {_literal(its.torque_per_current[0])} * motor_current;",
+        f"    const real rate = {rate}, relative = state->load_rate;",
+        f"    const real motor_torque = {literal(its.torque_per_current[0])} * motor_current;",
         (
-            f"    double torque = {_literal(d[0])} * rate + {_literal(d[1])} * motor_torque"
-            f" + {_literal(d[2])} * relative;"
+            f"    real torque = {literal(d[0])} * rate + {literal(d[1])} * motor_torque"
+            f" + {literal(d[2])} * relative;"
         ),
-        *_linear(made),
-        *_friction(made, called, sine),
-        f"    const double limit = {_literal(limit)};  /* N m at the load: limits.torque */",
+        *_linear(made, literal),
+        *_friction(made, called, sine, literal),
+        f"    const real limit = {literal(limit)};  /* N m at the load: limits.torque */",
         "    torque = torque > limit ? limit : torque < -limit ? -limit : torque;",
         "    state->torque = torque;",
         "    return torque;",
     ]
     return f"""\
-/* The torque to add (N m at the load), once every {_literal(period)} s ({1.0 / period:.9g} Hz).
+/* The torque to add (N m at the load), once every {period!r} s ({1.0 / period:.9g} Hz).
  * gyro_rate: rad/s. load_angle: rad, relative. motor_angle: rad at the load (the motor's, by the
  * gear ratio). motor_current: A.
  */
-double {name}_step({name}_state *state, double gyro_rate, double load_angle, double motor_angle,
-    double motor_current)
+real {name}_step({name}_state *state, real gyro_rate, real load_angle, real motor_angle,
+    real motor_current)
 {{
 {chr(10).join(lines)}
 }}
 """
 
 
-def _linear(made: Sampled) -> Iterator[str]:
+def _linear(made: Sampled, literal: Literal) -> Iterator[str]:
     its = made.controller
     order = its.c.shape[0]
     if not order:
         return
-    yield f"    double next[{order}];"
+    yield f"    real next[{order}];"
     for row in range(order):
-        yield f"    torque = torque + {_literal(its.c[row, 0])} * state->linear[{row}];"
+        yield f"    torque = torque + {literal(its.c[row, 0])} * state->linear[{row}];"
         b = its.b[row, :, 0]
         yield (
-            f"    next[{row}] = {_literal(b[0])} * rate + {_literal(b[1])} * motor_torque"
-            f" + {_literal(b[2])} * relative;"
+            f"    next[{row}] = {literal(b[0])} * rate + {literal(b[1])} * motor_torque"
+            f" + {literal(b[2])} * relative;"
         )
         for column in range(order):
-            a = _literal(its.a[row, column, 0])
+            a = literal(its.a[row, column, 0])
             yield f"    next[{row}] = next[{row}] + {a} * state->linear[{column}];"
     yield "    memcpy(state->linear, next, sizeof next);"
 
 
-def _friction(made: Sampled, called: Sequence[str], sine: str) -> Iterator[str]:
+def _friction(made: Sampled, called: Sequence[str], sine: str, literal: Literal) -> Iterator[str]:
     """States over the sample that has ended, then the torque that stands now."""
     if not made.interfaces:
         return
     period = float(made.controller.period[0])
-    yield "    double friction = 0.0;"
+    yield "    real friction = 0;"
     for over in (period, AN_INSTANT):
         for e, each in enumerate(made.interfaces):
             side = "motor" if made.motor_side[e] else "load"
             yield "    {"
             if over == AN_INSTANT:
-                yield from _gain(each, e, sine)
-            yield f"        const double met = state->{side}_rate * {_literal(each.rate)};"
-            told = ["met", "met", "met", "0.0", "load_angle", _literal(ROOM_TEMPERATURE), "1.0"]
-            told += [_literal(over), _literal(1.0 / over), "0.0"]
+                yield from _gain(each, sine, literal)
+            yield f"        const real met = state->{side}_rate * {literal(each.rate)};"
+            told = [
+                "met",
+                "met",
+                "met",
+                literal(0.0),
+                "load_angle",
+                literal(ROOM_TEMPERATURE),
+                literal(1.0),
+            ]
+            told += [literal(over), literal(1.0 / over), literal(0.0)]
             yield f"        const motion now = {{{', '.join(told)}}};"
-            call = f"{called[e]}((double *)parameters_{e}, state->friction_{e}, &now)"
+            call = f"{called[e]}((real *)parameters_{e}, state->friction_{e}, &now)"
             if over == AN_INSTANT:
                 yield f"        friction = friction + {call}.v0 * gain;"
             else:
@@ -215,14 +251,14 @@ def _friction(made: Sampled, called: Sequence[str], sine: str) -> Iterator[str]:
     yield "    torque = torque + friction;"
     for e, each in enumerate(made.interfaces):
         side = "motor" if made.motor_side[e] else "load"
-        yield f"    torque = torque + {_literal(each.viscous)} * state->{side}_rate;"
+        yield f"    torque = torque + {literal(each.viscous)} * state->{side}_rate;"
 
 
-def _gain(each: Interface, place: int, sine: str) -> Iterator[str]:
+def _gain(each: Interface, sine: str, literal: Literal) -> Iterator[str]:
     amplitude, periods, phase = each.ripple
     if not amplitude:
-        yield f"        const double gain = {_literal(each.torque)};"
+        yield f"        const real gain = {literal(each.torque)};"
         return
-    wave = f"{sine}({_literal(periods)} * load_angle + {_literal(phase)})"
-    yield f"        const double ripple = 1.0 + {_literal(amplitude)} * {wave};"
-    yield f"        const double gain = {_literal(each.torque)} * ripple;"
+    wave = f"{sine}({literal(periods)} * load_angle + {literal(phase)})"
+    yield f"        const real ripple = {literal(1.0)} + {literal(amplitude)} * {wave};"
+    yield f"        const real gain = {literal(each.torque)} * ripple;"

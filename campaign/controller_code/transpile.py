@@ -20,7 +20,8 @@ from campaign.errors import UsageError
 from campaign.physics import elementary
 from campaign.physics.step_function import Motion
 
-NUMBER, INTEGER, TRUTH, MOTION, ROWS = "double", "int64_t", "int", "motion", "double *"
+NUMBER, INTEGER, TRUTH, MOTION, ROWS = "real", "int64_t", "int", "motion", "real *"
+LETTERS = {NUMBER: "r", INTEGER: "i", TRUTH: "t"}
 OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 SHARED = {**OPERATORS, ast.FloorDiv: "/"}  # of whole numbers, none below 0
 WHOLE = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
@@ -34,14 +35,25 @@ RESERVED = frozenset({
 })  # fmt: skip
 """Words of C that Python has as names."""
 PRELUDE = """\
-static inline double pick(int yes, double one, double other) { return yes ? one : other; }
+typedef double real;
+static inline real pick(int yes, real one, real other) { return yes ? one : other; }
 static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
 static inline double double_of(int64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
 """
+SINGLE_PRELUDE = """\
+typedef float real;
+static inline real pick(int yes, real one, real other) { return yes ? one : other; }
+"""
+OF_SINGLES = {
+    elementary.exp: "expf", elementary.expm1: "expm1f", elementary.log: "logf",
+    elementary.power: "powf", elementary.sin: "sinf", elementary.cos: "cosf",
+    elementary.tanh: "tanhf",
+}  # fmt: skip
+"""Of the C library: in single precision no bits are promised."""
 KNOWN = {
-    "fma": (NUMBER, "fma({}, {}, {})"),
+    "fma": (NUMBER, "fma{f}({}, {}, {})"),
     "divide": (NUMBER, "({} / {})"),
-    "nearest": (NUMBER, "rint({})"),
+    "nearest": (NUMBER, "rint{f}({})"),
     "where": (NUMBER, "pick({}, {}, {})"),
     "bits_of": (INTEGER, "bits_of({})"),
     "double_of": (NUMBER, "double_of({})"),
@@ -71,7 +83,21 @@ class Program:
 
     texts: list[str] = field(default_factory=list)
     known: dict[tuple[Any, ...], tuple[str, Any]] = field(default_factory=dict)
-    sizes: dict[str, int] = field(default_factory=dict)
+    single: bool = False
+
+    @property
+    def suffix(self) -> str:
+        """Of literals and of functions of the C library."""
+        return "f" if self.single else ""
+
+    def literal(self, value: float) -> str:
+        """A number to its last bit."""
+        if math.isnan(value):
+            return "NAN"
+        if math.isinf(value):
+            return "INFINITY" if value > 0 else "(-INFINITY)"
+        text = float(value).hex() + self.suffix
+        return f"({text})" if value < 0 else text
 
     def function(
         self, function: Callable[..., Any], types: Sequence[Any], rows: Sequence[int] = ()
@@ -93,7 +119,7 @@ class Program:
 
     def struct(self, several: Several) -> str:
         """The C type of several numbers."""
-        name = "several_" + "".join(kind[0] for kind in several.kinds)
+        name = "several_" + "".join(LETTERS[kind] for kind in several.kinds)
         parts = " ".join(f"{kind} v{place};" for place, kind in enumerate(several.kinds))
         text = f"typedef struct {{ {parts} }} {name};\n"
         if text not in self.texts:
@@ -105,21 +131,21 @@ class Program:
         key = ("polynomial", tuple(coefficients))
         if key not in self.known:
             name = f"polynomial_{len(self.known)}"
-            lines, terms, power, level = [], [_literal(c) for c in coefficients], "x", 0
+            lines, terms, power, level = [], [self.literal(c) for c in coefficients], "x", 0
             while len(terms) > 1:
                 unpaired = terms[len(terms) // 2 * 2 :]
                 joined = []
                 for place, (even, odd) in enumerate(zip(terms[::2], terms[1::2], strict=False)):
                     made = f"t{level}_{place}"
-                    lines.append(f"    const double {made} = fma({odd}, {power}, {even});")
+                    lines.append(f"    const real {made} = fma({odd}, {power}, {even});")
                     joined.append(made)
                 terms = joined + unpaired
-                lines.append(f"    const double p{level} = {power} * {power};")
+                lines.append(f"    const real p{level} = {power} * {power};")
                 power, level = f"p{level}", level + 1
             if lines:
                 lines.pop()  # the last power serves nothing
             body = "\n".join([*lines, f"    return {terms[0]};"])
-            self.texts.append(f"static double {name}(double x)\n{{\n{body}\n}}\n")
+            self.texts.append(f"static real {name}(real x)\n{{\n{body}\n}}\n")
             self.known[key] = name, NUMBER
         return self.known[key][0]
 
@@ -258,7 +284,7 @@ class _Function:
     def _said(self, node: ast.expr) -> Said:
         match node:
             case ast.Constant(value=bool() | int() | float()):
-                return _constant(node.value)
+                return self._constant(node.value)
             case ast.Name(id=name) if name in self.types:
                 return Said(name, self.types[name])
             case ast.Name(id=name):
@@ -285,7 +311,7 @@ class _Function:
                 op=ast.Pow(),
                 right=ast.Constant(value=int() as to),
             ):
-                return _constant(float(base) ** to)
+                return self._constant(float(base) ** to)
             case ast.BinOp(left=left, op=op, right=right):
                 return self._operation(node, self._said(left), op, self._said(right))
             case ast.BoolOp(op=op, values=values):
@@ -335,14 +361,14 @@ class _Function:
         if isinstance(value, ast.Attribute) and value.attr == "shape":
             return Said(self._said(value).text, INTEGER)
         if isinstance(value, ast.Name) and isinstance(place, ast.Constant):
-            return _constant(self._looked_up(node, value.id)[place.value])
+            return self._constant(self._looked_up(node, value.id)[place.value])
         raise self._refusal(node, "has no counterpart")
 
     def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> Said:
         if name == "len" and isinstance(arguments[0], ast.Name):
             return Said(str(self.rows[arguments[0].id]), INTEGER)
         if name == "abs":
-            return Said(f"fabs({self._said(arguments[0]).text})", NUMBER)
+            return Said(f"fabs{self.program.suffix}({self._said(arguments[0]).text})", NUMBER)
         function = self._looked_up(node, name)
         if function is elementary.polynomial:
             coefficients = self._looked_up(node, getattr(arguments[1], "id", ""))
@@ -351,7 +377,9 @@ class _Function:
         said = [self._said(each) for each in arguments]
         if name in KNOWN and function is getattr(elementary, name):
             kind, form = KNOWN[name]
-            return Said(form.format(*(each.text for each in said)), kind)
+            return Said(form.format(*(each.text for each in said), f=self.program.suffix), kind)
+        if self.program.single and function in OF_SINGLES:
+            return Said(f"{OF_SINGLES[function]}({', '.join(e.text for e in said)})", NUMBER)
         if isinstance(function, type) and hasattr(function, "_fields"):
             return self._several(arguments, tuple(function._fields))
         if not callable(function) or not hasattr(function, "py_func"):
@@ -371,9 +399,17 @@ class _Function:
                 return place[name]
         raise self._refusal(node, f"names {name}, which is nowhere")
 
+    def _constant(self, value: Any) -> Said:
+        if isinstance(value, bool):
+            return Said(str(int(value)), TRUTH)
+        if isinstance(value, int):
+            text = f"INT64_C({value})" if value != -(2**63) else "INT64_MIN"
+            return Said(text, INTEGER)
+        return Said(self.program.literal(float(value)), NUMBER)
+
     def _global(self, node: ast.AST, value: Any) -> Said:
         if isinstance(value, bool | int | float):
-            return _constant(value)
+            return self._constant(value)
         raise self._refusal(node, "has no counterpart")
 
     def _refusal(self, node: ast.AST, why: str) -> UsageError:
@@ -403,20 +439,3 @@ def _argument(kind: Any) -> str:
     if kind == MOTION:
         return "const motion *"
     return kind if kind.endswith("*") else f"{kind} "
-
-
-def _constant(value: Any) -> Said:
-    if isinstance(value, bool):
-        return Said(str(int(value)), TRUTH)
-    if isinstance(value, int):
-        return Said(f"INT64_C({value})" if value != -(2**63) else "INT64_MIN", INTEGER)
-    return Said(_literal(float(value)), NUMBER)
-
-
-def _literal(value: float) -> str:
-    """A double to its last bit."""
-    if math.isnan(value):
-        return "NAN"
-    if math.isinf(value):
-        return "INFINITY" if value > 0 else "(-INFINITY)"
-    return f"({value.hex()})" if value < 0 else value.hex()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from campaign.cli.export_compensation import vectors
-from campaign.controller_code.c_code import c_code, test_code
+from campaign.controller_code.c_code import c_code, vectors_code
 from campaign.controller_code.compensation import Sampled
 from campaign.controller_code.transpile import MOTION, ROWS, Program
 from campaign.errors import UsageError
@@ -22,8 +22,6 @@ from campaign.physics.friction import friction_models
 from campaign.protocol.bench_file import simulable
 from tests.physics.friction.cases import CURVE, MODELS
 from tests.system.user import campaign
-
-test_code.__test__ = False  # type: ignore[attr-defined]  # a program in C
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wno-unused", "-O2", "-ffp-contract=off")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -53,7 +51,7 @@ def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler
     """What the compiled test says; it must end with 0."""
     name = f"compensation_{made.name}"
     (folder / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
-    (folder / f"{name}_test.c").write_text(test_code(made, inputs), encoding="utf-8")
+    (folder / f"{name}_test.c").write_text(vectors_code(made, inputs), encoding="utf-8")
     command = [compiler, *FLAGS, *flags, f"{name}_test.c", "-o", "test", "-lm"]
     compiled = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert compiled.returncode == 0, compiled.stderr
@@ -74,6 +72,19 @@ def test_shipped_compensations_have_the_bits_of_the_engine(
     made = Sampled.of(simulable(bench), name)
     said = ended(tmp_path, made, vectors(made), *SANITIZED, compiler=compiler)
     assert said == "0 of 2000 samples differ\n"
+
+
+@pytest.mark.parametrize("name", simulable("platform").compensation)
+def test_in_single_precision_it_is_near_and_nothing_is_a_double(tmp_path: Path, name: str) -> None:
+    done = campaign(tmp_path, "export-compensation", "platform", name, "--to", "c-single")
+    assert "In single precision: to 0.001 of the largest torque" in done.out
+    flags = (*FLAGS, "-Wdouble-promotion", "-Werror=double-promotion")
+    command = [COMPILERS[0], *flags, "-c", f"compensation_{name}.c", "-o", "code.o"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    command = [COMPILERS[0], *FLAGS, f"compensation_{name}_test.c", "-o", "test", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    said = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert said.stdout == "0 of 2000 samples differ\n"
 
 
 def hurting(made: Sampled) -> np.ndarray:
@@ -161,7 +172,7 @@ def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     made = Sampled.of(simulable("platform"), "observer")
     name = "compensation_observer"
     (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
-    (tmp_path / f"{name}_test.c").write_text(test_code(made, vectors(made)), encoding="utf-8")
+    (tmp_path / f"{name}_test.c").write_text(vectors_code(made, vectors(made)), encoding="utf-8")
     flags = ("-std=c99", "-O2", "-ffp-contract=fast", "-mfma")
     command = [COMPILERS[0], *flags, f"{name}_test.c", "-o", "test", "-lm"]
     if subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode:
@@ -189,7 +200,7 @@ def test_what_has_no_counterpart_is_refused_by_name() -> None:
     [
         (("simulink", "lugre"), "does not say controller.sample_rate"),
         (("platform", "nobody"), "has no compensation 'nobody'; there are static, lugre, observer"),
-        (("platform", "lugre", "--to", "fortran"), "there are c, json"),
+        (("platform", "lugre", "--to", "fortran"), "there are c, c-single, json"),
     ],
 )
 def test_mistakes_are_said_in_a_line(tmp_path: Path, arguments: tuple[str, ...], why: str) -> None:
