@@ -6,6 +6,8 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from html import escape as html_escape
 from pathlib import Path
 
 import numpy as np
@@ -245,3 +247,20 @@ def test_a_test_has_its_findings_and_metrics_and_goes_by_its_name(run):
     assert {"trial", "quantity", "measured_by"} <= set(test.metrics.columns)
     with pytest.raises(UsageError, match="did you mean 'stabilization'"):
         run["stabilisation"]
+
+
+def test_in_a_notebook_each_shows_itself_and_hostile_text_is_only_text(run):
+    html = run._repr_html_()
+    assert html.startswith("<p><code>&lt;run ")
+    assert "<table" in html
+    assert "stabilization" in html
+    trial = run.trial(1)._repr_html_()
+    assert trial.startswith("<p><code>&lt;trial-00001")
+    results = run.results
+    (name,) = results.conclusions
+    for sentence in results.conclusions[name]:
+        assert f"<li>{html_escape(sentence)}</li>" in results._repr_html_()
+    hostile = "<script>alert(1)</script>"
+    (test,) = results.found.tests
+    found = replace(results.found, tests=(replace(test, title=hostile, sentences=(hostile,)),))
+    assert "<script" not in replace(results, found=found)._repr_html_()

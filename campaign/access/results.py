@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from typing import TYPE_CHECKING
 
 from campaign import __version__
@@ -94,6 +95,15 @@ class Results:
     def __repr__(self) -> str:
         tests = ", ".join(test.name for test in self.found.tests) or "no tests"
         return f"<results of {self.found.run}: {tests}; {self.origin}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: what each test comes to, or why it has no result."""
+        parts = [f"<p><code>{escape(repr(self))}</code></p>"]
+        for test in self.found.tests:
+            told = (*test.sentences, *([f"No result: {test.problem}."] if test.problem else []))
+            items = "".join(f"<li>{escape(each)}</li>" for each in told)
+            parts.append(f"<h4>{escape(test.title)}</h4><ul>{items}</ul>")
+        return "".join(parts)
 
 
 def results_of(

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -157,6 +158,11 @@ class RunView:
         count += f", damaged in {len(self.damaged)} places" if self.damaged else ""
         lines = [f"<run {self.name}: {self.status.value}, {count}>"]
         return "\n".join([*lines, *(f"  {view.name} ({view.kind}): {len(view)}" for view in tests)])
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the first line of `repr`, and its tests as a table."""
+        first = escape(repr(self).splitlines()[0])
+        return f"<p><code>{first}</code></p>{self.tests.to_html()}"
 
     def _tests(self) -> list[TestView]:
         """The protocol's tests, and any other that a trial belongs to."""

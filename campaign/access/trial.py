@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from html import escape
 from typing import TYPE_CHECKING
 
+from campaign.access.estimates import metrics_table
 from campaign.archive import ArchivedTrial
 from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
@@ -103,6 +105,11 @@ class TrialView:
         )
         cut = f", {self.cut[0]:g} s to {self.cut[1]:g} s" if self.cut else ""
         return f"<{self.name}: {self.trial.label}{cut}; {ended}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: `repr`, and its metrics as a table."""
+        told = metrics_table([self.archived]).to_html()
+        return f"<p><code>{escape(repr(self))}</code></p>{told}"
 
 
 def _described(unit: str, label: str) -> dict[str, str]:
