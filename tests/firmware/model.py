@@ -64,6 +64,7 @@ class Model:
     kept: tuple[bool, int, wire.LatchCause, str] | None = (False, 0, wire.LatchCause.NONE, "")
     forgetful: bool = False  # it has no lasting memory at all
     memory: bool = True  # remembering works
+    unremembered: bool = False  # a stop is to be remembered at the next tick
     boot: int = 7
     rest: bool = True
     persists: bool = False
@@ -162,6 +163,7 @@ class Model:
         self._enter(state)
 
     def _keep(self) -> None:
+        self.unremembered = not self.memory and not self.forgetful
         if self.memory and not self.forgetful:
             self.kept = self.latch.facts()
 
@@ -188,7 +190,7 @@ class Model:
         self.tick(now)
 
     def tick(self, now: int) -> None:
-        """Silence, and the end of a trial that is ending."""
+        """Silence, the end of a trial that is ending, a stop that could not be remembered."""
         if not self.held(now):
             if self.state is not after_silence(self.state):
                 self._begin_ending(now)
@@ -197,6 +199,8 @@ class Model:
             self.ending = None
             self.records += 1
             self.state = after_end(self.state, wire.Outcome.INTERRUPTED)
+        if self.unremembered and self.state not in (State.ARMED, State.RUNNING):
+            self._keep()
 
     @classmethod
     def new(cls, past: str) -> Model:

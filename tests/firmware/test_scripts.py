@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from campaign.wire import messages as wire
@@ -113,8 +113,12 @@ class Script:
         assert status.drive_on == (model.state is State.RUNNING)
 
 
+REMEMBERED_LATER = [("memory", False), ("send", wire.Safe(), "next"), ("memory", True), ("reset",)]
+
+
 @SCRIPTS
 @given(past=PAST, running=st.booleans(), steps=st.lists(STEP, max_size=25))
+@example(past="", running=False, steps=REMEMBERED_LATER)
 def test_any_script_leads_both_through_the_same_states(
     console: Console, past: str, running: bool, steps: list[tuple]
 ) -> None:
