@@ -20,8 +20,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
 for name in ("FORCE_COLOR", "NO_COLOR", "COLUMNS", "CAMPAIGN_DEBUG"):
     os.environ.pop(name, None)
 
-# No deadline: a busy machine makes a test slower, not red. `--hypothesis-profile=many` for a soak.
-hypothesis.settings.register_profile("usual", deadline=None)
+# No deadline: a busy machine makes a test slower, not red. The usual draws are always the same, so
+# that what is red has a cause in the change; `--hypothesis-profile=many` draws others, for a soak.
+hypothesis.settings.register_profile("usual", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("many", deadline=None, max_examples=5000)
 hypothesis.settings.load_profile("usual")
 
