@@ -208,7 +208,7 @@ class _Function:
                     *(["    } else {", *self._block(others)] if others else []),
                     "    }",
                 ]
-            case ast.For(target=ast.Name(id=name), iter=each, body=body):
+            case ast.For(target=ast.Name(id=name), iter=each, body=body, orelse=[]):
                 return self._for(name, each, body)
         raise self._refusal(node, "has no counterpart")
 
@@ -270,10 +270,21 @@ class _Function:
         if not (isinstance(over, ast.Call) and getattr(over.func, "id", "") == "range"):
             raise self._refusal(over, "is no range")
         ends = [self._said(each).text for each in over.args]
-        first, last = ("0", ends[0]) if len(ends) == 1 else ends[:2]
-        self.types.setdefault(name, INTEGER)
-        head = f"    for ({name} = {first}; {name} < {last}; {name}++) {{"
-        return [head, *self._block(body), "    }"]
+        if len(ends) > 2:
+            raise self._refusal(over, "has no counterpart")
+        first, last = ("0", *ends)[-2:]
+        inside = [node for each in body for node in ast.walk(each) if isinstance(node, ast.Name)]
+        stored = {node.id for node in inside if isinstance(node.ctx, ast.Store)}
+        read = {node.id for node in ast.walk(over) if isinstance(node, ast.Name)}
+        if name in self.types or stored & {name, *read}:  # Python keeps its range, C would not
+            raise self._refusal(
+                over, "is changed inside, or its variable used outside, which has no counterpart"
+            )
+        self.types[name] = INTEGER
+        lines = self._block(body)
+        del self.types[name]
+        head = f"    for (int64_t {name} = {first}; {name} < {last}; {name}++) {{"
+        return [head, *lines, "    }"]
 
     def _temporary(self) -> str:
         self.temporaries += 1
@@ -311,12 +322,15 @@ class _Function:
                 op=ast.Pow(),
                 right=ast.Constant(value=int() as to),
             ):
-                return self._constant(float(base) ** to)
+                return self._constant(base**to)
             case ast.BinOp(left=left, op=op, right=right):
                 return self._operation(node, self._said(left), op, self._said(right))
             case ast.BoolOp(op=op, values=values):
                 sign = " && " if isinstance(op, ast.And) else " || "
-                return Said(f"({sign.join(self._said(each).text for each in values)})", TRUTH)
+                parts = [self._said(each) for each in values]
+                if {each.type for each in parts} != {TRUTH}:  # one of them is the result in Python
+                    raise self._refusal(node, "is a number")
+                return Said(f"({sign.join(each.text for each in parts)})", TRUTH)
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARED:
                 sides = self._said(left).text, self._said(right).text
                 return Said(f"({sides[0]} {COMPARED[type(op)]} {sides[1]})", TRUTH)
@@ -354,7 +368,7 @@ class _Function:
         raise self._refusal(node, "has no counterpart")
 
     def _element(self, node: ast.expr, value: ast.expr, place: ast.expr) -> Said:
-        if isinstance(place, ast.Slice):
+        if isinstance(place, ast.Slice | ast.UnaryOp):  # an index from the end
             raise self._refusal(node, "has no counterpart")
         if isinstance(value, ast.Name) and self.types.get(value.id) == ROWS:
             return Said(f"{value.id}[{self._said(place).text}]", NUMBER)

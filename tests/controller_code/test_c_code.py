@@ -13,7 +13,7 @@ import pytest
 from campaign.cli.export_compensation import vectors
 from campaign.controller_code.c_code import c_code, vectors_code
 from campaign.controller_code.compensation import Sampled
-from campaign.controller_code.transpile import MOTION, ROWS, Program
+from campaign.controller_code.transpile import INTEGER, MOTION, ROWS, Program
 from campaign.errors import UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete
@@ -198,6 +198,62 @@ def test_what_has_no_counterpart_is_refused_by_name() -> None:
         UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"
     ):
         Program().function(sorts, [ROWS, ROWS, MOTION], [1, 1])
+
+
+def by_twos(state: Any) -> float:
+    total = 0.0
+    for i in range(0, 4, 2):
+        total += state[i]
+    return total
+
+
+def ends_otherwise(state: Any) -> float:
+    total = 0.0
+    for i in range(4):
+        total += state[i]
+    else:
+        total = 0.0
+    return total
+
+
+def range_changes(state: Any) -> float:
+    count = 4
+    for i in range(count):
+        state[i] = 0.0
+        count = 2
+    return state[0]
+
+
+def read_after(state: Any) -> float:
+    for i in range(4):
+        state[i] = 0.0
+    return state[i]
+
+
+def first_that_is_not_zero(state: Any) -> float:
+    return state[0] or state[1]
+
+
+def from_the_end(state: Any) -> float:
+    return state[-1]
+
+
+@pytest.mark.parametrize(
+    "step",
+    [by_twos, ends_otherwise, range_changes, read_after, first_that_is_not_zero, from_the_end],
+)
+def test_what_c_would_do_otherwise_is_refused(step: Any) -> None:
+    with pytest.raises(UsageError, match=rf"test_c_code\.{step.__name__}: .* in C"):
+        Program().function(step, [ROWS], [4])
+
+
+def test_a_power_of_whole_numbers_stays_whole() -> None:
+    def shifted(bits: int) -> int:
+        return bits + 2**52
+
+    program = Program()
+    assert program.function(shifted, [INTEGER]) == ("shifted_0", INTEGER)
+    assert f"INT64_C({2**52})" in program.texts[0]
 
 
 @pytest.mark.parametrize(
