@@ -9,10 +9,11 @@ from typing import Any, get_args
 from campaign.access.analysis import AnalysedTest
 from campaign.axis_kind import speaking_of
 from campaign.estimate import Estimate
+from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.known import number_at
 from campaign.result import Finding, Value
 from campaign.text import number, pretty_unit, quantity_words
-from campaign.units import TORQUE, Quantity, convert
+from campaign.units import Quantity, convert
 
 DISPLAY = {
     "rad": "deg",
@@ -25,8 +26,6 @@ DISPLAY = {
 """What is shown in place of an SI unit where no table of the test says anything else."""
 BENCH = "bench."
 """Before a swept value of the bench."""
-OF_NO_OPTION = {"average_friction": TORQUE}
-"""What a condition measures that is neither an option of its experiment nor a path of a bench."""
 
 
 def display_unit(test: AnalysedTest, finding: Finding) -> str:

@@ -39,6 +39,12 @@ def numbers(
     return document_of(run, experiments(made_up, **kinds)).opening.key_numbers
 
 
+def test_a_condition_that_is_no_option_has_its_unit(made_up: ModuleType, tmp_path: Path):
+    one = found("stabilization_error", 1e-3, "rad", average_friction=33.0)
+    (own,) = numbers(made_up, tmp_path, {"breakaway": ()}, breakaway=result([one], one))
+    assert own.numbers[0].where == "average friction 33 N·m"
+
+
 def test_a_setting_and_what_no_finding_is_are_no_key_numbers(made_up: ModuleType, tmp_path: Path):
     one = found("breakaway_torque", 31.4, direction="positive")
     (own,) = numbers(

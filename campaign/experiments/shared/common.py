@@ -13,7 +13,10 @@ from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Value
 from campaign.trial import Tree, canonical_json
+from campaign.units import TORQUE
 
+OF_NO_OPTION = {"average_friction": TORQUE}
+"""What a condition measures that is neither an option of its experiment nor a path of a bench."""
 COUNTED = Cause("counted", "counted")
 OF_RECORDING = Cause("describes the recording", "it describes this recording")
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from campaign.access.analysis import AnalysedTest
 from campaign.archive import RunHeader
+from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench import Bench
 from campaign.physics.known import number_at
 from campaign.protocol.shapes import Shape, shape_at
@@ -128,7 +129,7 @@ class TestUnits:
                 return found[1]
         if root is None or not keys:
             return None
-        quantity = _within(shape_at(root, tree, tuple(keys)))
+        quantity = _within(shape_at(root, tree, tuple(keys))) or OF_NO_OPTION.get(path)
         bench = self.test.bench
         return quantity.of(bench.sides) if quantity and bench else quantity
 
