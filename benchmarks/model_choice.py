@@ -25,19 +25,30 @@ LINE: dict[str, Any] = {
     "coulomb_torque": 2.0, "viscous_friction": 0.5, "negative": {"coulomb_torque": 2.3},
 }  # fmt: skip
 CURVE = {**LINE, "static_torque": 3.0, "stribeck_velocity": 0.05}
+BRISTLES = {**CURVE, "bristle_stiffness": 200.0, "bristle_damping": 1.0}
 TRUTHS: dict[str, dict[str, Any]] = {
     "coulomb": LINE,
     "stribeck": CURVE,
+    "karnopp": {**CURVE, "zero_band": 0.2},
+    "armstrong": {**CURVE, "bristle_stiffness": 200.0, "memory_lag": 0.02, "dwell_time": 0.1},
     "dahl": {**LINE, "bristle_stiffness": 200.0},
-    "lugre": {**CURVE, "bristle_stiffness": 200.0, "bristle_damping": 1.0},
+    "bliman-sorine": {
+        **LINE, "static_torque": 4.0, "bristle_stiffness": 200.0, "slow_stiffness": 30.0,
+    },
+    "lugre": BRISTLES,
+    "lugre-fading": {**BRISTLES, "bristle_damping": 10.0, "damping_velocity": 0.02},
+    "elasto-plastic": BRISTLES,
+    "leuven": BRISTLES,
     "gms": {**CURVE, "bristle_stiffness": 200.0, "attraction": 20.0},
-}
+}  # fmt: skip
 """N m, rad, s."""
 INERTIA, RATE = 0.8, 1000.0
 TORQUE_NOISE, ANGLE_NOISE = 0.02, 2e-6
 
 
-def identified(truth: str, seed: int, names: Sequence[str], seconds: float = 20.0) -> Whole:
+def identified(
+    truth: str, seed: int, names: Sequence[str], seconds: float = 20.0, starts: int = 1
+) -> Whole:
     """What is found on one rig. truth: of `TRUTHS`; names: the models that are tried."""
     draw = np.random.default_rng(seed)
     time = np.arange(round(seconds * RATE)) / RATE
@@ -56,19 +67,21 @@ def identified(truth: str, seed: int, names: Sequence[str], seconds: float = 20.
     filtering = Filtering.for_rate(RATE)
     motion = motion_of_position(time, seen, torque, filtering.low_pass)
     filtering = replace(filtering, slowest=0.005 * float(np.abs(motion.rate).max()))
-    return find([Moved(1, motion, None)], [], filtering, starts=1, names=names)
+    return find([Moved(1, motion, None)], [], filtering, starts=starts, names=names)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=10)
+    parser.add_argument("--starts", type=int, default=1, help="fits of each model")
     parser.add_argument("--truth", choices=TRUTHS, action="append")
+    parser.add_argument("--models", choices=TRUTHS, nargs="+", default=tuple(TRUTHS))
     arguments = parser.parse_args()
     rows = []
     for truth in arguments.truth or TRUTHS:
         named = alone = 0
         for seed in range(arguments.draws):
-            found = identified(truth, seed, tuple(TRUTHS))
+            found = identified(truth, seed, arguments.models, starts=arguments.starts)
             best = found.fits[found.best].model
             right = best.model == truth
             named += right

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,8 +16,10 @@ from campaign.experiments.friction_map import model as friction_map
 from campaign.experiments.presliding_multisine import parameters as presliding
 from campaign.experiments.shared.directions import OFFSET_OR_ASYMMETRY, with_offset
 from campaign.experiments.whole_model import experiment as whole_model
+from campaign.experiments.whole_model.models import models
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
+from campaign.physics.friction.sought import Sizes
 from tests.experiments.asked import data_of
 
 RIG = {"name": "rig", "axis": {"name": "tilt"}}
@@ -107,20 +110,15 @@ def test_a_curve_gets_what_was_fitted_beside_what_was_measured() -> None:
 def test_a_product_of_two_numbers_passes_the_gate_of_a_whole_model() -> None:
     """Coulomb friction and the ratio to it are each known well enough; their product is not."""
 
-    def of(name: str, key: str, over: str = "") -> Any:
-        return SimpleNamespace(name=name, key=key, over=over, meaning="", unit="", advice="")
-
     told = {
         "coulomb": number("coulomb", 1.0, 0.45, standard_error=0.23),
         "static_over_coulomb": number("static_over_coulomb", 1.2, 0.55, standard_error=0.28),
     }
-    numbers = (
-        of("coulomb", "coulomb_torque"),
-        of("static_over_coulomb", "static_torque", "coulomb_torque"),
-    )
+    stribeck = models(Sizes((1.0, 1.0), (0.0, 0.0), 1.0, 1.0), ("stribeck",))[0]
     best: Any = SimpleNamespace(
         fit=SimpleNamespace(estimates=told, correlation={}),
-        model=SimpleNamespace(numbers=numbers),
+        values={name: each.value for name, each in told.items()},
+        model=replace(stribeck, numbers=stribeck.numbers[:1]),
         extra=(),
     )
     trial = SimpleNamespace(

@@ -24,7 +24,7 @@ from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systema
 from campaign.experiments.whole_model.models import USUAL
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.shown import figures, models_table, values_table
-from campaign.experiments.whole_model.whole_model_fit import Fit, find, product
+from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
 from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen
 from campaign.reason import Cause, Reason
@@ -33,8 +33,7 @@ from campaign.text import words
 from campaign.units import Frequency, Time
 
 FRICTION = "friction.load"
-RATIO = "static_over_coulomb"
-"""of both directions, or the beginning of the name of one's own."""
+LEFT_OPEN = "the motion leaves it open"
 PARTS = Cause(
     "parts of the motion",
     "fitted to {used:.0f} of {recorded:.0f} s, in the {parts} parts that tell most of friction: a "
@@ -125,34 +124,23 @@ def _linear_terms(found: InverseDynamics) -> tuple[Term, ...]:
 
 
 def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
-    told = dict(best.fit.estimates)
     numbers = {each.name: each for each in best.model.numbers}
-    keys = {name: each for name, each in numbers.items() if not each.over}
     meanings = {each.name: each.meaning for each in best.model.numbers}
     meanings |= {term.name: term.meaning for term in best.extra}
     meanings["inertia"] = "What resists acceleration."
     meanings["delay"] = "By how much the force acts later than it is recorded."
-    for name, estimate in told.items():
+    for name, estimate in best.fit.estimates.items():
         bench = "axis.inertia" if name == "inertia" else ""
-        if name in keys:
-            bench = f"{FRICTION}.{keys[name].key}"
         advice = next((text for key, text in ADVICE.items() if name.startswith(key)), "")
-        advice = numbers[name].advice if name in numbers else advice
+        if name in numbers:
+            advice = numbers[name].advice
+            bench = numbers[name].key and f"{FRICTION}.{numbers[name].key}"
         display = "ms" if name == "delay" else ""
         one = admitted(_scaled(estimate, data))
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
-    for each in best.model.numbers:
-        if not each.over:
-            continue
-        ratio = told[each.name]
-        base = next(n.name for n in best.model.numbers if n.key == each.over)
-        share = best.fit.correlation.get((ratio.name, base), 0.0)
-        share = share or best.fit.correlation.get((base, ratio.name), 0.0)
-        way = base.removeprefix("coulomb")
-        made = product(f"static_torque{way}", ratio, told[base], share)
-        meaning = "Friction at the onset of sliding" + (f", {way[1:]} direction." if way else ".")
-        made = admitted(_scaled(made, data))
-        yield Parameter(made, meaning, "", f"{FRICTION}.{each.key}", each.advice)
+    for each in best.model.derived:
+        one = admitted(_scaled(derived(each, best.values, best.fit), data))
+        yield Parameter(one, each.meaning, "", f"{FRICTION}.{each.key}", each.advice)
 
 
 def _scaled(one: Estimate, data: TestData) -> Estimate:
@@ -171,17 +159,14 @@ def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[obj
     told: dict[str, tuple[object, str, str]] = {
         f"{FRICTION}.model": (best.model.model, "", "fitted")
     }
-    values = best.values
-    flat = {each.name: each for each in best.model.numbers if not each.over}
-    for name, estimate in best.fit.estimates.items():
-        if name in flat and f"{FRICTION}.{flat[name].key}" not in stated:
-            each = flat[name]
-            told[f"{FRICTION}.{each.key}"] = (values[name], each.unit, str(estimate.reason))
-    for each in best.model.numbers:
-        if each.over and f"{FRICTION}.{each.key}" not in stated:
-            base = next(n.name for n in best.model.numbers if n.key == each.over)
-            value = values[each.name] * values[base]
-            told[f"{FRICTION}.{each.key}"] = (value, "N m", "the motion leaves it open")
+    model, values = best.model, best.values
+    fitted = {each.key: (values[each.name], each) for each in model.numbers if each.key}
+    follow = {each.key: (each.value(values), each) for each in model.derived}
+    for key, (value, each) in (fitted | follow).items():
+        if f"{FRICTION}.{key}" not in stated:
+            estimate = best.fit.estimates.get(each.name)
+            why = LEFT_OPEN if estimate is None else estimate.reason
+            told[f"{FRICTION}.{key}"] = (value, each.unit, str(why))
     return told
 
 
@@ -192,19 +177,17 @@ def _notes(best: Fit) -> Iterator[str]:
     for (one, two), share in best.fit.correlation.items():
         if abs(share) >= 0.9:
             yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."
-    for name, ratio in best.fit.estimates.items():
-        if not name.startswith(RATIO):
-            continue
-        way = name.removeprefix(RATIO).lstrip("_")
-        where = f"In the {way} direction static" if way else "Static"
+    for number in best.model.numbers:
+        ratio = best.fit.estimates[number.name]
         low, high = ratio.combined
         if ratio.origin is Origin.MEASURED and high is not None and high < 1.0:
-            yield f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
+            told = number.below_one
         elif ratio.origin is not Origin.MEASURED or low is None or low <= 1.0:
-            yield (
-                f"{where} friction is not told from Coulomb friction: there is no Stribeck part "
-                "that this motion could identify."
-            )
+            told = number.about_one
+        else:
+            told = ""
+        if told:
+            yield told
     yield (
         "Each model met the rate that was measured, in steps of the recording; a loop that was "
         "closed on that rate is in the data, and not in the model."
@@ -212,13 +195,12 @@ def _notes(best: Fit) -> Iterator[str]:
 
 
 def _conclusions(best: Fit, as_good: Sequence[str]) -> Iterator[Conclusion]:
-    told = best.fit.estimates
-    names = [name for name in ("coulomb", "coulomb_positive", "coulomb_negative") if name in told]
+    told = [best.fit.estimates[each.name] for each in best.model.numbers if each.leading]
     parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
-    for index, name in enumerate(names):
-        way = name.removeprefix("coulomb").strip("_")
+    for index, each in enumerate(told):
+        way = each.name.rpartition("_")[2] if len(told) > 1 else ""
         parts += [", and "] if index else []
-        parts += [Amount(told[name], "N m"), f" in the {way} direction" if way else ""]
+        parts += [Amount(each, each.unit), f" in the {way} direction" if way else ""]
     yield Conclusion((*parts, "."))
     if as_good:
         others = " and ".join(f"‘{name}’" for name in as_good)

@@ -8,7 +8,7 @@ from typing import Any
 
 from campaign.estimation.unknowns import Unknown
 from campaign.physics.friction import friction_models
-from campaign.physics.friction.sought import Sizes, Sought
+from campaign.physics.friction.sought import Derived, Sizes, Sought
 from campaign.text import nearest
 
 USUAL = ("stribeck", "lugre")
@@ -23,11 +23,13 @@ class Model:
         name: `lugre by direction`.
         model: of the program, by its name.
         numbers: those that are fitted.
+        derived: options that follow from several of them.
     """
 
     name: str
     model: str
     numbers: tuple[Sought, ...]
+    derived: tuple[Derived, ...] = ()
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -39,10 +41,8 @@ class Model:
 
     def options(self, values: Mapping[str, float]) -> dict[str, Any]:
         """An interface's options (SI) from the values of unknowns, by name."""
-        flat: dict[str, float] = {}
-        for each in self.numbers:
-            scale = flat[each.over] if each.over else 1.0
-            flat[each.key] = scale * values[each.name]
+        flat = {each.key: values[each.name] for each in self.numbers if each.key}
+        flat |= {each.key: each.value(values) for each in self.derived}
         tree: dict[str, Any] = {"model": self.model}
         for key, value in flat.items():
             head, _, tail = key.partition(".")
@@ -67,7 +67,14 @@ def models(sizes: Sizes, names: Sequence[str] = USUAL) -> Sequence[Model]:
         if sought is None:
             there = ", ".join(each for each in known if known[each].sought is not None)
             raise ValueError(f"{name} does not say what is fitted of it; there are {there}")
-        if not found:
-            found.append(Model(f"{name}, directions alike", name, tuple(sought(sizes, False))))
-        found.append(Model(f"{name}, by direction", name, tuple(sought(sizes, True))))
+        ways = (
+            [("by direction", True)]
+            if found
+            else [("directions alike", False), ("by direction", True)]
+        )
+        for way, by_direction in ways:
+            stated = sought(sizes, by_direction)
+            numbers = tuple(each for each in stated if isinstance(each, Sought))
+            derived = tuple(each for each in stated if isinstance(each, Derived))
+            found.append(Model(f"{name}, {way}", name, numbers, derived))
     return found

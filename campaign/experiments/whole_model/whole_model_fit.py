@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -32,8 +32,9 @@ from campaign.experiments.any_motion.motions import Moved, never_moved
 from campaign.experiments.interface import say_at
 from campaign.experiments.whole_model.models import USUAL, Model, models
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
-from campaign.physics.friction.sought import Sizes
+from campaign.physics.friction.sought import Derived, Sizes
 from campaign.reason import Cause, Reason
+from campaign.text import words
 
 DELAYS = 5.0
 """Samples to either side between which the force's delay is looked for."""
@@ -50,16 +51,15 @@ DELAY_UNKNOWN = Cause(
 )
 HALF_BAND = Cause("half band differs", "half the band finds {shown}")
 LOOP_IN_DELAY = Cause("loop in the delay", "it takes what a loop makes of noise as well")
-COULOMB_AT_BOUND = Cause(
-    "Coulomb friction at bound", "it says how a Coulomb friction changes that went to its bound"
-)
-NO_STIFFNESS = Cause("no stiffness", "without a stiffness it means nothing")
+BASE_UNKNOWN = Cause("base unknown", "without a known {base} it means nothing")
 UNRESOLVED = Cause(
     "faster than rows", "{what} takes {milliseconds:.2g} ms, and rows show {resolved:.2g} ms"
 )
 FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
 STRONG = 10.0
 """Difference of BIC from which on one model is told from another."""
+SMALL = 1e-6
+"""Relative change of an unknown for the slope of what is derived from it."""
 WIDE = 5.0
 """How many times more or less than plain inverse dynamics the inertia may be."""
 
@@ -88,9 +88,10 @@ class Fit:
 
     @property
     def faster_than_rows(self) -> bool:
-        """Whether its bristles bend faster than rows show."""
-        below = (self.fit.estimates[n.name] for n in self.model.numbers if n.presliding)
-        return any(each.reason in UNRESOLVED for each in below)
+        """Whether what it has beyond a simpler model is faster than rows show."""
+        told = self.fit.estimates
+        own = (n for n in self.model.numbers if n.lasts is not None and n.lasts.replaced)
+        return any(told[each.name].reason in UNRESOLVED for each in own)
 
     @property
     def values(self) -> dict[str, float]:
@@ -227,7 +228,7 @@ def _fitted(
     other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
-    fit = _with_delay(_with_band(fit, again), doubt)
+    fit = _with_delay(with_bases(_with_band(fit, again), model), doubt)
     fit = resolved(fit, model, motions, filtering)
     say("blocks left out")
     forces = [
@@ -303,16 +304,17 @@ def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
     found["delay"] = Estimate.without_interval(
         "delay", delay.value, "s", LOOP_IN_DELAY(), method=METHOD
     )
-    dry = [name for name in found if name.startswith("coulomb")]
-    lost = [name for name in dry if found[name].origin is Origin.AT_BOUND]
-    of_it = [name.replace("coulomb", "static_over_coulomb") for name in lost]
-    for name in (*of_it, *(["stribeck_velocity"] if lost == dry else [])):
-        if name in found:
-            found[name] = _open(found[name], COULOMB_AT_BOUND())
-    stiffness = found.get("bristle_stiffness")
-    if stiffness is not None and stiffness.origin is not Origin.MEASURED:
-        for name in found.keys() & {"bristle_damping"}:
-            found[name] = _open(found[name], NO_STIFFNESS())
+    return replace(fit, estimates=found)
+
+
+def with_bases(fit: ModelFit, model: Model) -> ModelFit:
+    """Without what means nothing, as nothing is measured that it rests on."""
+    found = dict(fit.estimates)
+    for each in model.numbers:
+        bases = [found[name] for name in each.rests_on]
+        if bases and all(base.origin is not Origin.MEASURED for base in bases):
+            reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
+            found[each.name] = _open(found[each.name], reason)
     return replace(fit, estimates=found)
 
 
@@ -330,23 +332,16 @@ def resolved(
     turning = _turning(motions)
     found = dict(fit.estimates)
 
-    def refuse(names: Sequence[str], takes: float, what: str) -> None:
-        if takes >= shortest:
-            return
-        reason = UNRESOLVED(what=what, milliseconds=1e3 * takes, resolved=1e3 * shortest)
-        for name in names:
-            if name in found:
-                found[name] = _open(found[name], reason)
-
-    if "stribeck_velocity" in values:
-        ratios = [each.name for each in model.numbers if each.over]
-        slow = values["stribeck_velocity"]
-        refuse(("stribeck_velocity", *ratios), slow / turning, "passing it in a reversal")
-    if "bristle_stiffness" in values:
-        bent = float(model.options(values)["coulomb_torque"]) / values["bristle_stiffness"]
-        takes = math.sqrt(2.0 * bent / turning)
-        below = [each.name for each in model.numbers if each.presliding]
-        refuse(below, takes, "bending the bristles")
+    options = model.options(values)
+    for each in model.numbers:
+        if each.lasts is None:
+            continue
+        takes = each.lasts.time(options, turning)
+        if takes < shortest:
+            reason = UNRESOLVED(
+                what=each.lasts.what, milliseconds=1e3 * takes, resolved=1e3 * shortest
+            )
+            found[each.name] = _open(found[each.name], reason)
     return replace(fit, estimates=found)
 
 
@@ -390,35 +385,47 @@ def predicted(one: Fit, motions: Sequence[Motion], filtering: Filtering) -> tupl
     return tuple(Prediction(kept_times(each, filtering), *both) for each, *both in sides)
 
 
-def product(name: str, ratio: Estimate, base: Estimate, correlation: float) -> Estimate:
-    """A ratio times what it is a ratio to, by the delta method; not determined where one is not."""
-    value = ratio.value * base.value
-    if ratio.origin is not Origin.MEASURED or base.origin is not Origin.MEASURED:
-        which = ratio if ratio.origin is not Origin.MEASURED else base
-        reason = FACTOR_UNKNOWN(factor=which.name.replace("_", " "), reason=which.reason)
-        return Estimate.without_interval(
-            name, value, base.unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED
-        )
-    one = (ratio.standard_error or 0.0) / abs(ratio.value)
-    two = (base.standard_error or 0.0) / abs(base.value)
-    error = abs(value) * math.sqrt(max(one**2 + two**2 + 2.0 * correlation * one * two, 0.0))
-    # The wider of both intervals says how many deviations an interval has.
+def derived(one: Derived, values: Mapping[str, float], fit: ModelFit) -> Estimate:
+    """An option that follows from several unknowns, by the delta method.
+
+    It is not determined where one of these is not. values: of all unknowns (SI), by name.
+    """
+    value, told = one.value(values), fit.estimates
+    slopes = {name: _slope(one, values, name) for name in values}
+    slopes = {name: slope for name, slope in slopes.items() if slope != 0.0}
+    for name in slopes:
+        if told[name].origin is not Origin.MEASURED:
+            reason = FACTOR_UNKNOWN(factor=words(name), reason=told[name].reason)
+            return _open(Estimate.without_interval(one.name, value, one.unit, reason), reason)
+    moved = {name: slope * (told[name].standard_error or 0.0) for name, slope in slopes.items()}
+    variance = sum(each**2 for each in moved.values())
+    for (first, second), share in fit.correlation.items():
+        variance += 2.0 * share * moved.get(first, 0.0) * moved.get(second, 0.0)
+    error = math.sqrt(max(variance, 0.0))
+    # The widest interval of all says how many deviations an interval has.
     wide = max(
         (each.high - each.value) / each.standard_error
-        for each in (ratio, base)
+        for each in map(told.__getitem__, slopes)
         if each.high is not None and each.standard_error
     )
-    half = wide * error
+    freedom = [each for name in slopes if (each := told[name].freedom) is not None]
     made = Estimate(
-        name, value, base.unit, value - half, value + half, LEVEL, METHOD,
-        standard_error=error, freedom=base.freedom,
+        one.name, value, one.unit, value - wide * error, value + wide * error, LEVEL, METHOD,
+        standard_error=error, freedom=min(freedom, default=None),
     )  # fmt: skip
-    # Of one cause in both nobody knows whether it moves them together: sizes add.
+    # Of one cause in several nobody knows whether it moves them together: sizes add.
     sizes: dict[str, float] = {}
-    for each, other in ((ratio, base), (base, ratio)):
-        for part in each.systematic:
-            moved = abs(other.value) * (part.standard_uncertainty or 0.0)
-            sizes[part.source] = sizes.get(part.source, 0.0) + moved
+    for name, slope in slopes.items():
+        for part in told[name].systematic:
+            size = abs(slope) * (part.standard_uncertainty or 0.0)
+            sizes[part.source] = sizes.get(part.source, 0.0) + size
     for source, size in sizes.items():
         made = shifted_by(made, source, size)
     return made
+
+
+def _slope(one: Derived, values: Mapping[str, float], name: str) -> float:
+    """How much it changes with an unknown: a central difference."""
+    step = SMALL * abs(values[name]) or SMALL
+    low, high = (one.value({**values, name: values[name] + way * step}) for way in (-1.0, 1.0))
+    return (high - low) / (2.0 * step)

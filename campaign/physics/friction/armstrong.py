@@ -39,11 +39,23 @@ from campaign.physics.friction.interface import (
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of, sign_of
+from campaign.physics.friction.sought import (
+    BENDING,
+    REVERSE,
+    Lasting,
+    Sizes,
+    Sought,
+    Stated,
+    curve,
+    stiffness,
+)
 from campaign.physics.friction.stribeck import in_direction, mean_viscous
 from campaign.physics.step_function import AN_INSTANT, Motion
 from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, Time, Torque
 
 CURVE = ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
+MOST_LAG = 0.05
+"""s; every step within it is one number of the state."""
 TORQUE, WAY, RECOVERS, DWELL, DELAYED, OWN = 0, 1, 2, 3, 4, 5
 """The state: torque; direction of sliding, 0 when stuck; the share of Ts - Tc that D lacks, as it
 broke away or began to stick; time stuck; |v| of a lag ago; then |v| as steps end, oldest first."""
@@ -79,7 +91,7 @@ class ArmstrongOptions(FrictionOptions):
     """What differs in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: of the spring while it sticks."""
-    memory_lag: Time = Field(default=0.0, ge=0, le=0.05)
+    memory_lag: Time = Field(default=0.0, ge=0, le=MOST_LAG)
     """tau_L: how late the torque answers to the rate."""
     dwell_time: Time = Field(gt=0, le=1e6)
     """gamma: time at rest after which half of the static friction has come back."""
@@ -202,6 +214,20 @@ def _small_signal(options: ArmstrongOptions) -> SmallSignal:
     return SmallSignal(stuck=spring, stuck_compensation=spring)
 
 
+def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+    late = Lasting("the memory lag", lambda options, turning: options["memory_lag"])
+    lag = Sought(
+        "memory_lag", "memory_lag", "s", "How late the torque answers to the rate.",
+        0.0, MOST_LAG, 0.2 * MOST_LAG, REVERSE, lasts=late,
+    )  # fmt: skip
+    dwell = Sought(
+        "dwell_time", "dwell_time", "s", "Time at rest after which half of stiction is back.",
+        1e-3, 1e3, 0.1, "rest for different times before it breaks away", logarithmic=True,
+        rests_on=("bristle_stiffness",), lasts=BENDING,
+    )  # fmt: skip
+    return (*curve(sizes, by_direction=by_direction), stiffness(sizes), lag, dwell)
+
+
 FRICTION = FrictionModel(
     name="armstrong",
     summary="static: a spring at rest, a curve with memory and dwell time (Eq. 3.5 to 3.7)",
@@ -214,4 +240,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "memory_lag", "dwell_time"),
     small_signal=_small_signal,
     fastest=lambda options: options.memory_lag,
+    sought=_sought,
 )

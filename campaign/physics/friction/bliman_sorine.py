@@ -19,6 +19,7 @@ trapezoidal one, of second order in the step.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -35,11 +36,25 @@ from campaign.physics.friction.interface import (
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of
+from campaign.physics.friction.sought import (
+    BENDING,
+    PRESLIDE,
+    STATIC,
+    Derived,
+    Sizes,
+    Sought,
+    Stated,
+    line,
+    static,
+    stiffness,
+)
 from campaign.physics.friction.stribeck import in_direction, mean_viscous
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, RotationalStiffness, Torque
 
 CURVE = ("coulomb_torque", "static_torque", "viscous_friction")
+LEAST_PEAK = 1.01
+"""Ts over Tc, at least, that is looked for in motions."""
 LEAST = 1e-12
 """Of Ts: the slow part's torque has to be more than nothing to be divided by."""
 
@@ -144,6 +159,28 @@ def _stored_energy(options: BlimanSorineOptions, state: Array) -> float:
     return float(0.5 * state[0] ** 2 / options.bristle_stiffness)
 
 
+def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+    """The slow stiffness as a share of the most with which friction has a peak."""
+    peak = static(BENDING, by_direction=by_direction, ratio=(LEAST_PEAK, STATIC[1]), start=1.3)
+    ratios = [each.name for each in peak if isinstance(each, Sought)]
+
+    def slow_stiffness(values: Mapping[str, float]) -> float:
+        most = min(1.0 - 1.0 / values[name] for name in ratios)
+        return values["slow_share"] * values["bristle_stiffness"] * most
+
+    share = Sought(
+        "slow_share", "", "", "Slow stiffness, over the most with which friction has a peak.",
+        1e-3, 0.99, 0.3, PRESLIDE, logarithmic=True, rests_on=("bristle_stiffness",),
+        lasts=BENDING,
+    )  # fmt: skip
+    slow = Derived(
+        "slow_stiffness", "slow_stiffness", "N m/rad", "Stiffness of the slow part.", PRESLIDE,
+        slow_stiffness,
+    )  # fmt: skip
+    own = line(sizes, by_direction=by_direction)
+    return (*own, *peak, stiffness(sizes), share, slow)
+
+
 FRICTION = FrictionModel(
     name="bliman-sorine",
     summary="dynamic: two Dahl models, with a peak over the angle after a reversal (Eq. 3.12)",
@@ -156,4 +193,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "slow_stiffness"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,
+    sought=_sought,
 )

@@ -32,7 +32,7 @@ from campaign.physics.elementary import exp, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.path import decayed, parts_of, sign_of
-from campaign.physics.friction.sought import SLIDE, Sizes, Sought, curve, stiffness
+from campaign.physics.friction.sought import SLIDE, Sizes, Sought, Stated, curve, stiffness
 from campaign.physics.friction.stribeck import (
     CURVE,
     CurveOptions,
@@ -137,7 +137,7 @@ def _stored_energy(options: GmsOptions, state: Array) -> float:
     return float(0.5 * np.sum(state[: len(stiffnesses)] ** 2 / stiffnesses))
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> tuple[Sought, ...]:
+def _sought(sizes: Sizes, by_direction: bool) -> Stated:
     """A lag s(v) / C that is between a millionth and a thousand times that of a whole stroke."""
     usual = sizes.torque * sizes.rate / sizes.travel
     attraction = Sought(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 
 from campaign.axis_kind import speaking_of, spoken_of
 from campaign.options import Options
-from campaign.physics.friction.sought import Sizes, Sought
+from campaign.physics.friction.sought import Sizes, Stated
 from campaign.units import TORQUE, Phase, Quantity
 
 Array = NDArray[np.float64]
@@ -162,8 +162,7 @@ class FrictionModel:
             options, besides what `small_signal` says; None: none.
         no_compensation: why it cannot compensate, for a reader; "" where it can.
         sought: the parameters that motions identify, from the friction's sizes, each direction with
-            its own (True) or both alike; those of a base come before their multiples. None: it is
-            not identified.
+            its own (True) or both alike. None: it is not identified.
     """
 
     name: str
@@ -181,7 +180,7 @@ class FrictionModel:
     dry: DryFriction | None = None
     fastest: Callable[[Any], float] | None = None
     no_compensation: str = ""
-    sought: Callable[[Sizes, bool], Sequence[Sought]] | None = None
+    sought: Callable[[Sizes, bool], Stated] | None = None
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""

@@ -24,6 +24,7 @@ from campaign.physics.compiled import inlined
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import Array, DryFriction, FrictionModel, SmallSignal
 from campaign.physics.friction.path import sign_of
+from campaign.physics.friction.sought import SLIDE_SLOWER, Lasting, Sizes, Sought, Stated, curve
 from campaign.physics.friction.stribeck import (
     CURVE,
     CurveOptions,
@@ -83,6 +84,16 @@ def steady_state(options: KarnoppOptions, velocity: Array) -> Array:
     return torque
 
 
+def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+    passing = Lasting("passing the band", lambda options, turning: options["zero_band"] / turning)
+    band = Sought(
+        "zero_band", "zero_band", "rad/s", "Rate below which it is brought to rest and held.",
+        1e-4 * sizes.rate, sizes.rate, 0.05 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
+        lasts=passing,
+    )  # fmt: skip
+    return (*curve(sizes, by_direction=by_direction), band)
+
+
 FRICTION = FrictionModel(
     name="karnopp",
     summary="static: Stribeck friction with a band of rates in which it stops and holds",
@@ -103,4 +114,5 @@ FRICTION = FrictionModel(
         "within its band it is the torque that acts on the load, which a controller does not know; "
         "outside it is 'stribeck'"
     ),
+    sought=_sought,
 )

@@ -25,7 +25,7 @@ from campaign.physics.friction.interface import Array, FrictionModel, Presliding
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.sought import PRESLIDE, Sizes, Sought, bristles
+from campaign.physics.friction.sought import BENDING, PRESLIDE, Sizes, Sought, Stated, bristles
 from campaign.physics.friction.stribeck import (
     curve_parameters,
     curve_torque,
@@ -96,11 +96,11 @@ def _small_signal(options: FadingOptions) -> SmallSignal:
     return SmallSignal(stuck=bristles, stuck_compensation=bristles)
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> tuple[Sought, ...]:
+def _sought(sizes: Sizes, by_direction: bool) -> Stated:
     fading = Sought(
         "damping_velocity", "damping_velocity", "rad/s", "Rate at which sigma1 has fallen to 37 %.",
         1e-4 * sizes.rate, 10.0 * sizes.rate, 0.1 * sizes.rate, PRESLIDE, logarithmic=True,
-        presliding=True,
+        lasts=BENDING,
     )  # fmt: skip
     return (*bristles(sizes, by_direction=by_direction), fading)
 

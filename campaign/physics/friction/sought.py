@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 STATIC = (0.05, 3.0)
 """Static friction over Coulomb friction; real axes have less than 1."""
 MOST_VISCOUS = 5.0
 """Viscous over Coulomb friction at the fastest rate, at least up to which it is looked for."""
 SLIDE = "slide at more, and further apart, speeds"
+SLIDE_SLOWER = "slide at more, and slower, speeds"
 REVERSE = "reverse more often"
 PRESLIDE = "stay below breakaway: `presliding_multisine` measures it"
 
@@ -35,16 +38,32 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Sought:
-    """A parameter of a model.
+class Lasting:
+    """How long it takes in a reversal what a parameter says.
 
     Attributes:
-        name: of the unknown.
-        key: of the options; dotted within a table.
+        what: takes that long, for a reader.
+        time: s, from the model's options (SI) and the acceleration of reversals (rad/s^2).
+        replaced: whether the model without it is a simpler one, once it is too fast to be seen.
+    """
+
+    what: str
+    time: Callable[[Mapping[str, Any], float], float]
+    replaced: bool = False
+
+
+@dataclass(frozen=True)
+class Sought:
+    """An unknown of a model.
+
+    Attributes:
+        key: of the option that it is; dotted within a table; "" where options are derived from it.
         low, high, start: between which it is looked for, and where first (SI).
         advice: what motion tells more of it.
-        over: key that it is a multiple of; "" where it is SI by itself.
-        presliding: whether only motion below breakaway tells it.
+        rests_on: unknowns of which one at least has to be measured for it to mean anything.
+        lasts: how long what it says takes in a reversal; None where it is seen between reversals.
+        below_one, about_one: of a ratio, what it says where its interval lies below one or has it.
+        leading: whether it is told in a sentence.
     """
 
     name: str
@@ -56,11 +75,44 @@ class Sought:
     start: float
     advice: str
     logarithmic: bool = False
-    over: str = ""
-    presliding: bool = False
+    rests_on: tuple[str, ...] = ()
+    lasts: Lasting | None = None
+    below_one: str = ""
+    about_one: str = ""
+    leading: bool = False
 
 
-def line(sizes: Sizes, *, by_direction: bool) -> tuple[Sought, ...]:
+@dataclass(frozen=True)
+class Derived:
+    """An option of a model that follows from several unknowns.
+
+    Attributes:
+        value: SI, from those of the unknowns by name.
+    """
+
+    name: str
+    key: str
+    unit: str
+    meaning: str
+    advice: str
+    value: Callable[[Mapping[str, float]], float]
+
+
+Stated = Sequence[Sought | Derived]
+
+PASSING = Lasting(
+    "passing it in a reversal", lambda options, turning: options["stribeck_velocity"] / turning
+)
+BENDING = Lasting(
+    "bending the bristles",
+    lambda options, turning: math.sqrt(
+        2.0 * options["coulomb_torque"] / options["bristle_stiffness"] / turning
+    ),
+    replaced=True,
+)
+
+
+def line(sizes: Sizes, *, by_direction: bool) -> Stated:
     """Coulomb and viscous friction."""
     mean = sizes.torque
     largest = max(0.5 * sum(sizes.viscous), 0.02 * mean / sizes.rate)
@@ -75,7 +127,7 @@ def line(sizes: Sizes, *, by_direction: bool) -> tuple[Sought, ...]:
             Sought(
                 f"coulomb{tail}", f"{prefix}coulomb_torque", "N m",
                 f"Dry friction of fast sliding{told}.",
-                0.02 * mean, 20.0 * mean, start, REVERSE, logarithmic=True,
+                0.02 * mean, 20.0 * mean, start, REVERSE, logarithmic=True, leading=True,
             ),
             Sought(
                 f"viscous{tail}", f"{prefix}viscous_friction", "N m s/rad",
@@ -86,24 +138,57 @@ def line(sizes: Sizes, *, by_direction: bool) -> tuple[Sought, ...]:
     return tuple(found)
 
 
-def curve(sizes: Sizes, *, by_direction: bool) -> tuple[Sought, ...]:
-    """Coulomb, static and viscous friction, and the rate between them."""
-    # One direction may rise to its Coulomb friction, and the other fall to it.
-    static = tuple(
-        Sought(
-            f"static_over_coulomb{tail}", f"{prefix}static_torque", "",
-            f"Static friction over Coulomb friction{told}; below 1 where none stands out.",
-            *STATIC, 0.9, "slide at more, and slower, speeds", over=f"{prefix}coulomb_torque",
+def product(*names: str) -> Callable[[Mapping[str, float]], float]:
+    """Of unknowns, for what follows from them."""
+    return lambda values: math.prod(values[name] for name in names)
+
+
+def static(
+    lasts: Lasting,
+    *,
+    by_direction: bool,
+    ratio: tuple[float, float] = STATIC,
+    start: float = 0.9,
+) -> Stated:
+    """Static friction of each direction, as a ratio to Coulomb friction."""
+    found: list[Sought | Derived] = []
+    for prefix, tail, told in _ways(by_direction):
+        name, base = f"static_over_coulomb{tail}", f"coulomb{tail}"
+        where = f"In the {tail[1:]} direction static" if tail else "Static"
+        rises = f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
+        open_ = (
+            f"{where} friction is not told from Coulomb friction: there is no Stribeck part that "
+            "this motion could identify."
         )
-        for prefix, tail, told in _ways(by_direction)
-    )  # fmt: skip
+        found += [
+            Sought(
+                name, "", "",
+                f"Static friction over Coulomb friction{told}; below 1 where none stands out.",
+                *ratio, start, SLIDE_SLOWER, rests_on=(base,), lasts=lasts,
+                below_one=rises, about_one=open_,
+            ),
+            Derived(
+                f"static_torque{tail}", f"{prefix}static_torque", "N m",
+                f"Friction at the onset of sliding{told}.", SLIDE_SLOWER, product(name, base),
+            ),
+        ]  # fmt: skip
+    return tuple(found)
+
+
+def curve(sizes: Sizes, *, by_direction: bool) -> Stated:
+    """Coulomb, static and viscous friction, and the rate between them."""
     slow = Sought(
         "stribeck_velocity", "stribeck_velocity", "rad/s",
         "Rate over which friction goes from static to Coulomb.",
-        1e-4 * sizes.rate, sizes.rate, 0.1 * sizes.rate, "slide at more, and slower, speeds",
-        logarithmic=True,
+        1e-4 * sizes.rate, sizes.rate, 0.1 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
+        rests_on=tuple(f"coulomb{tail}" for _, tail, _ in _ways(by_direction)), lasts=PASSING,
     )  # fmt: skip
-    return (*line(sizes, by_direction=by_direction), *static, slow)
+    # One direction may rise to its Coulomb friction, and the other fall to it.
+    return (
+        *line(sizes, by_direction=by_direction),
+        *static(PASSING, by_direction=by_direction),
+        slow,
+    )
 
 
 def stiffness(sizes: Sizes) -> Sought:
@@ -111,7 +196,7 @@ def stiffness(sizes: Sizes) -> Sought:
     soft = sizes.torque / sizes.travel
     return Sought(
         "bristle_stiffness", "bristle_stiffness", "N m/rad", "Stiffness of presliding.",
-        soft, 1e7 * soft, 1e3 * soft, PRESLIDE, logarithmic=True, presliding=True,
+        soft, 1e7 * soft, 1e3 * soft, PRESLIDE, logarithmic=True, lasts=BENDING,
     )  # fmt: skip
 
 
@@ -120,11 +205,12 @@ def damping(sizes: Sizes) -> Sought:
     thick = sizes.torque / sizes.rate
     return Sought(
         "bristle_damping", "bristle_damping", "N m s/rad", "Damping of presliding.",
-        1e-6 * thick, 1e4 * thick, thick, PRESLIDE, logarithmic=True, presliding=True,
+        1e-6 * thick, 1e4 * thick, thick, PRESLIDE, logarithmic=True,
+        rests_on=("bristle_stiffness",), lasts=BENDING,
     )  # fmt: skip
 
 
-def bristles(sizes: Sizes, *, by_direction: bool) -> Sequence[Sought]:
+def bristles(sizes: Sizes, *, by_direction: bool) -> Stated:
     """A Stribeck curve with bristles."""
     return (*curve(sizes, by_direction=by_direction), stiffness(sizes), damping(sizes))
 
