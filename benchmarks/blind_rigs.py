@@ -46,7 +46,7 @@ from campaign.experiments.interface import TestData, options_of, result_of
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
-from campaign.protocol.follow import follow
+from campaign.protocol.stage_trials import follow
 from campaign.recording import Channel, Outcome, Recording
 from campaign.resources import protocols_folder
 from campaign.result import Finding

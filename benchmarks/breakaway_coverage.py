@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.document import table
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
@@ -114,7 +114,7 @@ def of_bench(name: str, seeds: int) -> tuple[str, ...]:
     bench, experiment = benches()[name], experiments()["breakaway"]
     assert experiment.fit is not None
     assert experiment.measure is not None
-    with speaking_of(bench.sides):
+    with axis_terms(bench.sides):
         try:
             chosen = experiment.fit(experiment.options(), bench)
         except ValueError as error:

@@ -15,8 +15,8 @@ from pathlib import Path
 from scipy.stats import binomtest
 
 from benchmarks.document import table
-from campaign.references.judged import Verdict
-from tests.comparing.laboratory import PLATFORM, compared, simulated
+from campaign.references.verdict import Verdict
+from tests.comparison.laboratory import PLATFORM, compared, simulated
 
 TOGETHER = 5
 """Pairs of a job, which are simulated side by side."""

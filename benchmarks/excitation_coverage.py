@@ -21,7 +21,7 @@ from typing import cast
 from scipy.stats import binomtest
 
 from benchmarks.document import table
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.physics.bench import Bench
 from tests.estimation.coverage import holds
@@ -109,7 +109,7 @@ def responses(seed: int) -> dict[str, Held]:
 
 
 def told_of(on: Bench, done: Sequence[Done]) -> list[Estimate]:
-    with speaking_of(on.sides):
+    with axis_terms(on.sides):
         try:
             found = asked("frequency_response", done)
         except ValueError as error:

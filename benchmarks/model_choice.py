@@ -19,7 +19,7 @@ import numpy as np
 from campaign.estimation.inverse.motion import Filtering, motion_of_position
 from campaign.experiments.any_motion.motions import Moved
 from campaign.experiments.whole_model.whole_model_fit import Whole, find
-from campaign.physics.friction_along import Along
+from campaign.physics.friction_response import Along
 
 LINE: dict[str, Any] = {
     "coulomb_torque": 2.0, "viscous_friction": 0.5, "negative": {"coulomb_torque": 2.3},

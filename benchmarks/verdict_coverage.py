@@ -27,7 +27,7 @@ from campaign.estimation.objective import Objective
 from campaign.experiments import experiments
 from campaign.protocol import load_protocol
 from campaign.protocol.schema import Test
-from campaign.published.calibrated import FOLDER, calibration_part
+from campaign.published.calibration_covariance import FOLDER, calibration_part
 from campaign.published.values import published_values
 from campaign.resources import protocols_folder
 

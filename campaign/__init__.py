@@ -9,7 +9,7 @@ from campaign.errors import ArchiveWarning
 if TYPE_CHECKING:
     from os import PathLike
 
-    from campaign.access import RunView
+    from campaign.api import RunView
 
 __version__ = "0.1.0"
 __all__ = ["ArchiveWarning", "__version__", "open"]
@@ -35,6 +35,6 @@ def open(  # noqa: A001 (it is `campaign.open`, as there are `gzip.open` and `h5
     Raises UsageError when there is no such run, ArchiveError when it cannot be read; both are
     `campaign.errors.CampaignError`.
     """
-    from campaign.access import open_view
+    from campaign.api import open_view
 
     return open_view(run, results, strict=strict, measure_anew=measure_anew)

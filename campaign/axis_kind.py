@@ -1,8 +1,8 @@
-"""How the axis of a bench moves, and what that makes of units and words.
+"""Rotary and linear axes: their units and terms.
 
 The equations of a rotary and of a linear axis are the same in SI numbers, with m for rad, N for N m
 and kg for kg m^2. So the program is written in the words of a rotary axis; what is read from files
-and told to people passes through here. `speaking_of` says whose axis is meant.
+and told to people passes through here. `axis_terms` says whose axis is meant.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Sides:
 
 
 BOTH_ROTARY = Sides()
-_SPOKEN_OF: ContextVar[Sides] = ContextVar("axis", default=BOTH_ROTARY)
+_SIDES: ContextVar[Sides] = ContextVar("axis", default=BOTH_ROTARY)
 
 
 def sides_in(tree: Any) -> Sides:
@@ -58,20 +58,20 @@ def sides_in(tree: Any) -> Sides:
 
 
 @contextmanager
-def speaking_of(sides: Sides) -> Iterator[None]:
+def axis_terms(sides: Sides) -> Iterator[None]:
     """Whatever is read and told inside is about a bench with these sides."""
-    token = _SPOKEN_OF.set(sides)
+    token = _SIDES.set(sides)
     try:
         yield
     finally:
-        _SPOKEN_OF.reset(token)
+        _SIDES.reset(token)
 
 
-def each_speaking_of(sides: Sides, items: Iterable[Item]) -> Iterator[Item]:
+def each_in_axis_terms(sides: Sides, items: Iterable[Item]) -> Iterator[Item]:
     """What makes `items` speaks of a bench with these sides; who takes them does not."""
     iterator = iter(items)
     while True:
-        with speaking_of(sides):
+        with axis_terms(sides):
             try:
                 item = next(iterator)
             except StopIteration:
@@ -79,14 +79,14 @@ def each_speaking_of(sides: Sides, items: Iterable[Item]) -> Iterator[Item]:
         yield item
 
 
-def spoken_of() -> Sides:
+def current_sides() -> Sides:
     """The sides of the bench that is meant here."""
-    return _SPOKEN_OF.get()
+    return _SIDES.get()
 
 
 def is_linear() -> bool:
     """Whether the axis that is meant here is linear."""
-    return _SPOKEN_OF.get().load is AxisKind.LINEAR
+    return _SIDES.get().load is AxisKind.LINEAR
 
 
 # Units --------------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ _UNITS = {
 reader is shown for what a reader is shown."""
 
 
-def unit_here(unit: str) -> str:
+def axis_unit(unit: str) -> str:
     """The unit that stands for one of a rotary axis, of the axis that is meant here.
 
     What has no angle and no torque in it stays. Not for phases: those are angles of no axis.
@@ -185,13 +185,13 @@ _TEXT_UNITS = tuple(
 """Where the number before them, if any, is the same: SI units alone."""
 
 
-def words_here(text: str) -> str:
+def in_axis_terms(text: str) -> str:
     """A text for people, in the words of the axis that is meant here."""
     if not text or not is_linear():
         return text
     for pattern, linear in _TEXT_UNITS:
         text = pattern.sub(linear, text)
-    if _SPOKEN_OF.get().motor is AxisKind.ROTARY:
+    if _SIDES.get().motor is AxisKind.ROTARY:
         text = _OF_MOTOR.sub(_KEPT, text)
     for pattern, word in _PATTERNS:
         text = pattern.sub(partial(_like, word), text)

@@ -1,4 +1,4 @@
-"""The vocabulary of channels: what a name in a recording means, in one place.
+"""Names of channels: meaning, unit and label of each.
 
 A backend that calls a quantity by its name here is understood by every analysis; `campaign kinds
 channels` lists them. Names that are not here stay allowed: they are archived with what their

@@ -1,4 +1,4 @@
-"""An option that is one of several tables, told apart by a word in them.
+"""An option that is one of several tables, selected by a key.
 
 Which tables there are is looked up when a file is validated, not when the class is made: the kinds
 of another package are then imported only for who names them, and can themselves be imported first.

@@ -1,4 +1,4 @@
-"""What installed packages name under this program's entry point groups, without importing any.
+"""Names under this program's entry point groups, without importing packages.
 
 One package whose metadata cannot be read costs its own kinds and nobody else's, which is why each
 distribution is read by itself.

@@ -1,4 +1,4 @@
-"""Every error a user can cause or meet, and the exit code each one means.
+"""Errors that a user can cause or meet, each with its exit code.
 
 The codes are part of the public interface (`docs/commands.md`):
 

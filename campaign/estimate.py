@@ -1,4 +1,4 @@
-"""A number that somebody will rely on, and a part of a recording: nouns that rooms share."""
+"""Estimates: a number with its interval, origin and systematic parts."""
 
 from __future__ import annotations
 

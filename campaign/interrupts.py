@@ -1,4 +1,4 @@
-"""Ctrl-C outside of a run: the program is left at once, or unwinds what it has begun.
+"""Ctrl-C outside of a run: immediate exit, or orderly cleanup.
 
 An exception out of a signal handler breaks whatever it meets: an import that turns it into another
 error, a weak reference's callback that drops it. So the program is left at once wherever there is

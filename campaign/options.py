@@ -1,4 +1,4 @@
-"""The base of everything a user writes in TOML, and of everything `campaign kinds` lists.
+"""Base classes of everything written in TOML and listed by `campaign kinds`.
 
 A friction model, a compensation method, an experiment, a backend and a bench each declare what
 they accept as one `Options` class: fields with a physical quantity from `campaign.units`, a

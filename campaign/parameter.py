@@ -1,4 +1,4 @@
-"""Parameters: the numbers of a rig that an analysis identifies, and what they rest on."""
+"""Parameters: identified numbers of a rig, and their basis."""
 
 from __future__ import annotations
 

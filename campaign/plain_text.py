@@ -1,4 +1,4 @@
-"""Text from elsewhere, fit for a terminal or for a page."""
+"""Untrusted text made safe for a terminal or a page."""
 
 from __future__ import annotations
 

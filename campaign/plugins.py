@@ -1,4 +1,4 @@
-"""The kinds of a room by name, each imported when somebody asks for it and not before.
+"""Kinds by name, imported on first use.
 
 A new experiment, friction model, compensation method, backend or format is one file in its room,
 or one installed package that names itself under an entry point group such as

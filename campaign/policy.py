@@ -1,4 +1,4 @@
-"""What a run does besides its trials: about faults, to let the bench cool down, with samples.
+"""Run policy: faults, cool-down, kept samples.
 
 The protocol writes a policy (`[faults]`, `[rest]`, `keep`), the runner follows it, the archive
 keeps every decision it led to.

@@ -1,4 +1,4 @@
-"""Worker processes: how they start, and how they end with their parent."""
+"""Worker processes: their start, and their end with the parent."""
 
 from __future__ import annotations
 

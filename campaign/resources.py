@@ -1,4 +1,4 @@
-"""Where the protocols, benches and templates that come with the program are.
+"""Locations of shipped protocols, benches and templates.
 
 In a wheel they lie beside the code, under `campaign/_shipped`; in a checkout they are the
 top-level folders. Nothing is ever looked up in the working directory: a template is code.

@@ -1,4 +1,4 @@
-"""What an analysis found: tables, figures and findings, as data.
+"""Results of an analysis as data: tables, figures, findings.
 
 Experiments make these; the report draws them. Values are SI with their unit beside them; `display`
 is the unit a reader is shown, and the report converts. Nothing here knows HTML or matplotlib.

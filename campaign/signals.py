@@ -1,4 +1,4 @@
-"""What is commanded over time: rate commands, torque ramps and base motion, as data.
+"""Commands over time as data: rate, torque ramp, base motion.
 
 A signal is a frozen description that every room can read: a protocol writes it, a plan checks its
 extremes, the simulator samples it and a controller receives its parameters. The unit of its value

@@ -1,4 +1,4 @@
-"""One hash of all the source files that a package's code comes from.
+"""One hash of a package's source files.
 
 An archive keeps it beside a plug-in's version, and machine code is kept under it: a version says
 what somebody meant to release, the hash what was there.

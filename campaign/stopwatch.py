@@ -1,4 +1,4 @@
-"""Where the time of a run goes: kinds of work, measured where they are done.
+"""Time of a run by kind of work.
 
 A `Stopwatch` is handed to whoever works; `UNTIMED` in its place costs next to nothing. Work inside
 of other work counts as its own only, so all of a thread's seconds count once.

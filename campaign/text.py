@@ -1,4 +1,4 @@
-"""Numbers, units and names as people read them."""
+"""Numbers, units and names as text."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from campaign.axis_kind import words_here
+from campaign.axis_kind import in_axis_terms
 
 MOST_DIGITS = 9
 """that a number with an interval is shown with."""
@@ -148,7 +148,7 @@ QUANTITIES = {
 
 def quantity_words(quantity: str) -> str:
     """`coulomb_torque` as `Coulomb friction Tc`, `breakaway_torque` as `breakaway torque`."""
-    return words_here(QUANTITIES.get(quantity, quantity.replace("_", " ")))
+    return in_axis_terms(QUANTITIES.get(quantity, quantity.replace("_", " ")))
 
 
 _SAID_BY_THE_FIELD = ("friction", "compensation")
@@ -165,7 +165,7 @@ def path_words(path: str) -> str:
         parts = parts[1:]
         if parts[0] in _SAID_BY_THE_FIELD and len(parts) > 2:
             parts = parts[1:]
-    return words_here(" ".join(" ".join(parts).replace("_", " ").split()))
+    return in_axis_terms(" ".join(" ".join(parts).replace("_", " ").split()))
 
 
 def nearest(word: object, names: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""What is asked of a bench: Task and Trial, and how an experiment asks for one.
+"""Task and Trial: what a bench is to do, and how an experiment requests it.
 
 A Trial is everything a backend needs to execute one atomic thing; what comes back is a Recording
 (`campaign.recording`). Neither knows where protocols come from, how samples are made, or where
@@ -140,7 +140,7 @@ class Trial(Options):
         truth: SHA-256 of the bench that is simulated in place of `bench`, which nobody who plans or
             analyses the trial is told; empty: it is `bench` itself. See `physics.truth`.
         recording: where its samples come from, when it was executed elsewhere: files with their
-            SHA-256, rows, columns and what is made of them; see `campaign.importing.described`.
+            SHA-256, rows, columns and what is made of them; see `campaign.importing.description`.
             Empty for a trial that a backend of its own executes.
     """
 

@@ -1,4 +1,4 @@
-"""What a unit may look like, and what it is worth: a small grammar over a table of its own.
+"""Grammar and values of units.
 
     unit    = ["1"] factor { separator factor }
     factor  = ( name | "(" unit ")" ) [ power ]

@@ -1,4 +1,4 @@
-"""Text quantities to SI and back.
+"""Text quantities to SI, and back.
 
 Inside the program every number is SI. Text such as ``"18 deg/s^2"`` becomes a float when a
 protocol or a bench is validated, and becomes text in a reader's unit again on the page. What a
@@ -18,7 +18,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
-from campaign.axis_kind import AxisKind, Sides, spoken_of, unit_here
+from campaign.axis_kind import AxisKind, Sides, axis_unit, current_sides
 from campaign.unit_grammar import Unit, parse_unit, respelled
 
 
@@ -49,8 +49,8 @@ class Quantity:
 
     @property
     def here(self) -> Quantity:
-        """What this is of the axis that is meant (`axis_kind.speaking_of`)."""
-        return self.of(spoken_of())
+        """What this is of the axis that is meant (`axis_kind.axis_terms`)."""
+        return self.of(current_sides())
 
     def of(self, sides: Sides) -> Quantity:
         """What this is of a bench whose axis and motor are of these kinds."""
@@ -225,8 +225,8 @@ def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
 
     `unit` and `display` are those of a rotary axis, such as rad/s and deg/s.
     """
-    shown = unit_here(display)
-    return f"{convert(value, unit_here(unit), shown):{form}} {shown}"
+    shown = axis_unit(display)
+    return f"{convert(value, axis_unit(unit), shown):{form}} {shown}"
 
 
 def angle_here(value: float, form: str = ".3g") -> str:
@@ -241,7 +241,7 @@ def rate_here(value: float, form: str = ".3g") -> str:
 
 def shown_here(value: float, unit: str, display: str) -> float:
     """A number (SI) in the unit that a reader is shown; see `in_words`."""
-    return float(convert(value, unit_here(unit), unit_here(display)))
+    return float(convert(value, axis_unit(unit), axis_unit(display)))
 
 
 def _quantity(

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import pytest
 
-from campaign.access.analysis import AnalysedTest, analyse_run
+from campaign.api.analysis import AnalysedTest, analyse_run
 from campaign.archive import RunReader
 from campaign.experiments.interface import Experiment
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.pdf import keeps_pdf
 from campaign.report.page.drawings import Drawing, Overview
 

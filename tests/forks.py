@@ -85,7 +85,7 @@ if environment is not None:
     sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
     if "campaign" in sys.modules:  # as if it were imported now, with these packages
         campaign.entry_points.installed.cache_clear()
-        campaign.physics.compiled._IMPORTED_AT = time.time()
+        campaign.physics.compilation._IMPORTED_AT = time.time()
 sys.argv = ["campaign", *arguments]
 sys.orig_argv = [sys.executable, "-m", "campaign", *arguments]
 def run():

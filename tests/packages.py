@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.physics.compiled import cache_folder
+from campaign.physics.compilation import cache_folder
 from tests.forks import LIBRARIES, MODULES, forks_of
 
 ROOT = Path(__file__).parents[1]

@@ -15,31 +15,31 @@ from campaign.axis_kind import (
     BOTH_ROTARY,
     AxisKind,
     Sides,
-    each_speaking_of,
+    axis_terms,
+    axis_unit,
+    current_sides,
+    each_in_axis_terms,
+    in_axis_terms,
     is_linear,
     sides_in,
-    speaking_of,
-    spoken_of,
-    unit_here,
-    words_here,
 )
 from campaign.backends.serial import _info
 from campaign.estimate import Estimate, Systematic
 from campaign.experiments import experiments
-from campaign.experiments.preparing.axis_units import of_its_axis
+from campaign.experiments.post_processing.axis_units import in_axis_units
 from campaign.experiments.shared.motion_series import kind_of
 from campaign.experiments.stabilization.hull_motion import SeriesMotion, ShipMotion
 from campaign.identify.tables import systematic
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import facts_of
-from campaign.physics.known import number_at
+from campaign.physics.bench_knowledge import number_at
 from campaign.physics.limit_watch import LimitWatch
 from campaign.physics.limits import margins
 from campaign.protocol.limit_check import in_display_units
 from campaign.protocol.problems import find_faults
 from campaign.reason import Reason
-from campaign.report.content.opening import _answer
+from campaign.report.content.first_screen import _answer
 from campaign.report.content.references import References
 from campaign.report.content.tables import remarks
 from campaign.report.content.truth import _bias
@@ -199,7 +199,7 @@ def test_what_is_known_of_its_values_is_in_their_units() -> None:
 
 def test_options_are_read_in_the_units_of_the_axis_that_is_meant() -> None:
     options = experiments()["step_response"].options
-    with speaking_of(LEAD):
+    with axis_terms(LEAD):
         valid = find_faults(options, {"step": "5 mm/s"})
         wrong = find_faults(options, {"step": "5 deg/s"})
     assert not isinstance(valid, list)
@@ -213,7 +213,7 @@ def test_a_measured_motion_of_the_hull_may_be_a_travel_and_no_ship_rolls_a_carri
     table = {"kind": "series", "file": TextFile("a.csv", "time,value\n0,0\n9,1\n"), "value": "mm"}
     with pytest.raises(ValueError, match="no unit of a motion"):
         SeriesMotion.model_validate(table)
-    with speaking_of(LEAD):
+    with axis_terms(LEAD):
         motion = SeriesMotion.model_validate(table)
         assert (kind_of("mm"), kind_of("m/s^2")) == ("angle", "acceleration")
         with pytest.raises(ValueError, match="position: mm"):
@@ -243,11 +243,11 @@ def test_each_unit_has_one_of_the_same_size_in_SI() -> None:
 
 def test_numbers_in_sentences_are_converted_and_not_renamed() -> None:
     assert rate_here(0.005) == "0.286 deg/s"
-    with speaking_of(LEAD):
+    with axis_terms(LEAD):
         assert rate_here(0.005) == "5 mm/s"
         assert angle_here(0.15, ".2g") == "1.5e+02 mm"
-        assert unit_here("N m s/rad") == "N s/m"
-        assert unit_here("Hz") == "Hz"
+        assert axis_unit("N m s/rad") == "N s/m"
+        assert axis_unit("Hz") == "Hz"
 
 
 @pytest.mark.parametrize(
@@ -267,15 +267,15 @@ def test_numbers_in_sentences_are_converted_and_not_renamed() -> None:
     ],
 )
 def test_words_of_a_linear_axis(rotary: str, linear: str) -> None:
-    assert words_here(rotary) == rotary
-    with speaking_of(LEAD):
-        assert words_here(rotary) == linear
-        assert words_here(linear) == linear
+    assert in_axis_terms(rotary) == rotary
+    with axis_terms(LEAD):
+        assert in_axis_terms(rotary) == linear
+        assert in_axis_terms(linear) == linear
 
 
 def test_a_linear_motor_has_a_force_constant() -> None:
-    with speaking_of(DIRECT):
-        assert words_here("torque constant") == "force constant"
+    with axis_terms(DIRECT):
+        assert in_axis_terms("torque constant") == "force constant"
 
 
 def test_a_page_calls_a_source_as_its_axis_does() -> None:
@@ -288,7 +288,7 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
     )
     remark = "Of unknown size, and in no interval: force constant."
     assert _answer(test, None, References({}, {}, ())).remarks == (remark,)  # type: ignore[arg-type]
-    with speaking_of(DIRECT):
+    with axis_terms(DIRECT):
         assert list(remarks(table)) == [remark]
         assert systematic(found) == "force constant unknown"
         assert "(largest systematic part: force constant)" in _bias(
@@ -302,8 +302,8 @@ def test_who_is_spoken_of_ends_with_what_was_said() -> None:
         for _ in range(2):
             yield is_linear()
 
-    assert [(each, is_linear()) for each in each_speaking_of(LEAD, told())] == [(True, False)] * 2
-    assert spoken_of() == BOTH_ROTARY
+    assert [(each, is_linear()) for each in each_in_axis_terms(LEAD, told())] == [(True, False)] * 2
+    assert current_sides() == BOTH_ROTARY
     assert sides_in({}) == sides_in(None) == sides_in({"axis": {"kind": "rotary"}}) == BOTH_ROTARY
 
 
@@ -319,9 +319,9 @@ def test_a_result_is_told_in_its_axis_units_and_phases_stay_angles() -> None:
     figure = Figure("f", "Torque", "The torque.", "A torque.", (Panel(*axes, ()),))
     words = Conclusion(("Torque ", Amount(torque, "N m"), Amount(margin, "deg")))
     result = Result((table,), (figure,), notes=("A torque.",), conclusions=(words,))
-    assert of_its_axis(result) is result
-    with speaking_of(LEAD):
-        told = of_its_axis(result)
+    assert in_axis_units(result) is result
+    with axis_terms(LEAD):
+        told = in_axis_units(result)
     own = told.tables[0]
     assert [(c.unit, c.display, c.label) for c in own.columns] == [
         ("N", "N", "Force"),

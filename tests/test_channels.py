@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.trial_file import TrialFile
 from campaign.axis_kind import BOTH_ROTARY
 from campaign.backends import sim

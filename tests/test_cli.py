@@ -25,7 +25,7 @@ from campaign.errors import (
     ProtocolError,
     UsageError,
 )
-from campaign.execution.naming import typed
+from campaign.execution.run_reference import typed
 from campaign.resources import protocols_folder
 
 HEAVY = ("h5py", "jinja2", "matplotlib", "numba", "numpy", "pandas", "scipy", "tree_sitter")

@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 import campaign
-from campaign.access.estimates import findings_table
+from campaign.api.estimates import findings_table
 from campaign.archive import open_run
 from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def run(folder: Path) -> campaign.access.RunView:
+def run(folder: Path) -> campaign.api.RunView:
     return campaign.open(results=folder / "results")
 
 

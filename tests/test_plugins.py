@@ -100,7 +100,7 @@ print(json.dumps([names, there, before, model.summary, kinds()]))
         "import grease_film.model",
         "import campaign.physics.friction.interface",
         "import campaign.physics.friction",
-        "import campaign.physics.compiled",
+        "import campaign.physics.compilation",
         "import campaign.physics.bench",
         "import campaign.physics.compensation.friction_model",
         "import campaign.experiments",

@@ -53,7 +53,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("campaign/archive/writing/run_lock.py", "_lock"): 'if os.name == "nt":',
     ("campaign/archive/writing/remnants.py", "_in_use"): 'if os.name == "nt"',
     ("campaign/signing/tool.py", "_kill"): 'os.name == "posix"',
-    ("campaign/physics/compiled.py", "distrust"): 'os.name != "posix"',
+    ("campaign/physics/compilation.py", "distrust"): 'os.name != "posix"',
     ("campaign/report/formats/pdf.py", "_is_root"): 'os.name == "posix"',
     ("campaign/report/formats/pdf.py", "_end_all"): 'os.name == "posix"',
     ("campaign/device/line.py", "PtyStream.__init__"): "this system has no pseudo-terminals",

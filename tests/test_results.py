@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 import campaign
-from campaign.access.results import results_of
+from campaign.api.results import results_of
 from campaign.archive import open_run
 from campaign.archive.layout.results import results_path
 from campaign.archive.layout.results_text import from_text, to_text
@@ -70,7 +70,7 @@ def alone(run: Path) -> Path:
     return run
 
 
-def everything(found: campaign.access.Results) -> str:
+def everything(found: campaign.api.Results) -> str:
     """All of it, arrays included; but for the figure that a report chose to open with."""
     arrays: dict[str, np.ndarray] = {}
 
@@ -272,7 +272,7 @@ def test_damaged_results_are_told_by_verify(run):
 
 
 def test_an_analysis_that_failed_is_a_problem_and_costs_no_other(run, monkeypatch):
-    from campaign.access import analysis
+    from campaign.api import analysis
 
     def broken(*_: object) -> Result:
         raise ValueError("no recording is of use")
@@ -288,7 +288,7 @@ def test_conclusions_are_sentences_and_conditions_may_be_called_anything(run):
     said = Conclusion(("The error is ", Amount(found, "mrad"), "."))
     findings = (Finding.of(found, {"test": "mine", "value": 3.0}),)
     opened = campaign.open(run)
-    from campaign.access.analysis import analyse_run
+    from campaign.api.analysis import analyse_run
     from campaign.experiments import experiments
     from campaign.published.scoreboard import Scoreboard
 

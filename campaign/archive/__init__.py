@@ -6,11 +6,11 @@ format is described in `docs/archive-format.md`. Importing this package does not
 
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.listing import find_run, find_runs, list_runs
-from campaign.archive.reading.opening import open_run
+from campaign.archive.reading.open_run import open_run
+from campaign.archive.reading.run_list import find_run, find_runs, list_runs
 from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.summary import RunSummary
-from campaign.archive.writing.naming import new_run_name, reserved_name
+from campaign.archive.writing.run_names import new_run_name, reserved_name
 from campaign.archive.writing.writer import RunWriter, TrialWriter
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Calls into a backend: each has a time limit, its answer is checked, and its faults are named.
+"""Calls into a backend: time limit, checked answer, named faults.
 
 A backend may be the code of anybody. Whatever it raises is a BackendError here that names its
 package; an error of this program's own backends stays what it is, a bug. A call that exceeds its

@@ -1,4 +1,4 @@
-"""A rig that nothing here can reach: trials are handed out as files, recordings handed in.
+"""The `files` backend: trials go out as files, recordings come back as files.
 
 A person plays what lies in a folder on whatever controller there is, and puts the recording beside
 it. That is read by the layout of a mapping, held against what was asked, and refused by name or
@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field, JsonValue, field_validator
 
 from campaign.backends.handover import checks
+from campaign.backends.handover.acceptance import Refused, as_asked, not_completed
 from campaign.backends.handover.columns import first_mapping, layout_of, read_layouts
 from campaign.backends.handover.excitation import (
     excitation,
@@ -25,15 +26,7 @@ from campaign.backends.handover.excitation import (
     write_csv,
     write_mat,
 )
-from campaign.backends.handover.judging import Refused, as_asked, not_completed
-from campaign.backends.handover.pages import (
-    Row,
-    attempt_page,
-    columns_file,
-    first_page,
-    manifest,
-)
-from campaign.backends.handover.places import (
+from campaign.backends.handover.handover_folder import (
     MANIFEST,
     PAGE,
     RETURNED,
@@ -46,7 +39,14 @@ from campaign.backends.handover.places import (
     read_json,
     write_text,
 )
-from campaign.backends.handover.returned import (
+from campaign.backends.handover.pages import (
+    Row,
+    attempt_page,
+    columns_file,
+    first_page,
+    manifest,
+)
+from campaign.backends.handover.returned_recording import (
     ColumnsError,
     OtherRateError,
     Returned,
@@ -54,9 +54,9 @@ from campaign.backends.handover.returned import (
 )
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.errors import ProtocolError, UsageError
-from campaign.importing.described import file_used
+from campaign.importing.derived_channels import sufficient
+from campaign.importing.description import file_used
 from campaign.importing.interface import RecordingError
-from campaign.importing.made import sufficient
 from campaign.importing.mapping import Layout, MappingError
 from campaign.link.refusal import Refusal
 from campaign.options import Options

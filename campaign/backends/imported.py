@@ -1,4 +1,4 @@
-"""Recordings that were made elsewhere, served from their files: `campaign import`.
+"""The backend of imported recordings: served from their files (`campaign import`).
 
 A trial says itself where its samples come from, and this reads them. A file that is not what it was
 when the plan was made ends its trial as a fault.
@@ -13,9 +13,9 @@ from contextlib import ExitStack
 import numpy as np
 
 from campaign.backends.interface import BackendKind, Source, StopFlag
-from campaign.importing.described import Described
+from campaign.importing.description import Described
 from campaign.importing.interface import RecordingError
-from campaign.importing.opened import OpenedFiles
+from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader, paths_unchanged
 from campaign.options import Options
 from campaign.recording import Ending, Event, Fault, Outcome, Recorder, SafeState

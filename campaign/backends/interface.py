@@ -1,4 +1,4 @@
-"""What a backend is: it executes trials, each into its own recorder, and makes its bench safe."""
+"""The interface of a backend: it executes trials and makes its bench safe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motion of the hull: a second device beside the controller, small enough to be any.
+"""The interface of a hull motion device beside the controller.
 
 The thesis puts the platform on a six-degree-of-freedom table. Here is what such a table has to do,
 and the one of a rehearsal, whose motion the rehearsal controller emulates together with the bench.

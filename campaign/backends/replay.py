@@ -1,4 +1,4 @@
-"""Archived recordings served to today's runner: raw data under a new protocol's analysis.
+"""The `replay` backend: archived recordings under a new protocol.
 
 A planned trial is answered by an archived one of the same bench and the same task; only the
 measuring window may differ, since it is the analysis' business. Every archived trial is served

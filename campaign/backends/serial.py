@@ -1,4 +1,4 @@
-"""A servo controller on a serial port or a TCP connection, by `docs/serial-protocol.md`."""
+"""The `serial` backend: a servo controller on a serial port or TCP (docs/serial-protocol.md)."""
 
 from __future__ import annotations
 

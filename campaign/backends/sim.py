@@ -1,4 +1,4 @@
-"""The simulated bench: executes a trial with the engine of `campaign.physics`."""
+"""The `sim` backend: trials on the engine of `campaign.physics`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One simulated trial: its outputs made channels, watched, and handed to its recorder."""
+"""One simulated trial: outputs as channels, limit checks, recorder."""
 
 from __future__ import annotations
 

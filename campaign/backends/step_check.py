@@ -1,4 +1,4 @@
-"""How much a simulated trial changes when it is simulated once more, at half the step."""
+"""Step check: a simulated trial repeated with half the step."""
 
 from __future__ import annotations
 

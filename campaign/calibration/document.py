@@ -1,4 +1,4 @@
-"""A calibration as TOML: the result, and the bench with the fitted values put in."""
+"""A calibration result as TOML, and the bench file with fitted values."""
 
 from __future__ import annotations
 

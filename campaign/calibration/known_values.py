@@ -1,4 +1,4 @@
-"""What a calibration leaves known of the bench: cells, intervals, correlations."""
+"""What a calibration determines of the bench: cells, intervals, correlations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well a calibration predicts what it was not fitted to: one value of a condition at a time."""
+"""Leave-one-out validation of a calibration over the values of a condition."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bench with given unknowns reproduces: its tests are simulated and analysed in memory."""
+"""Residuals of a bench with given unknowns: simulation and analysis in memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.axis_kind import sides_in, speaking_of
+from campaign.axis_kind import axis_terms, sides_in
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import residuals, restricted
@@ -23,7 +23,7 @@ from campaign.experiments.interface import (
     bench_of,
     with_named_tables,
 )
-from campaign.experiments.preparing.axis_units import of_its_axis
+from campaign.experiments.post_processing.axis_units import in_axis_units
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
 from campaign.protocol.schema import Test
@@ -214,8 +214,8 @@ class Simulation:
         first = finished[0].trial
         data = TestData(name, test.entry.kind, first.options, finished)
         try:
-            with speaking_of(sides_in(data.trials[0].trial.bench)):
-                findings = of_its_axis(experiment.analyse(with_named_tables(data))).findings
+            with axis_terms(sides_in(data.trials[0].trial.bench)):
+                findings = in_axis_units(experiment.analyse(with_named_tables(data))).findings
         except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
             problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
             findings = ()

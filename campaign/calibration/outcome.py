@@ -1,4 +1,4 @@
-"""A whole calibration: check, search, uncertainty, leave-one-out."""
+"""A complete calibration: checks, search, uncertainty, leave-one-out."""
 
 from __future__ import annotations
 

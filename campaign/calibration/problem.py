@@ -1,4 +1,4 @@
-"""From a protocol's `[calibration]` to a problem to solve: every mistake is said, and where."""
+"""From a protocol's `[calibration]` to a problem; every mistake has its place."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from campaign.calibration.targets import (
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.estimation.unknowns import Unknown
 from campaign.physics.bench import Bench
-from campaign.physics.known import number_at
+from campaign.physics.bench_knowledge import number_at
 from campaign.protocol import Protocol
 from campaign.protocol.calibration import Calibration, CalibrationOptions, CalibrationParameter
 from campaign.protocol.positions import Keys

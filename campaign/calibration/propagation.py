@@ -1,4 +1,4 @@
-"""What a calibration leaves open of the numbers that its bench reproduces.
+"""Uncertainty of reproduced numbers that results from the calibration.
 
 The covariance of the unknowns is carried to each published cell by simulation: the bench is moved
 by one standard deviation both ways along each principal axis of the covariance, and everything is

@@ -1,4 +1,4 @@
-"""The unknowns of a bench: which of its fields they drive, and how people are told them."""
+"""The unknowns of a bench: their fields, bounds and names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The published cells a bench is fitted to, and what a deviation from each of them counts."""
+"""The published cells that a bench is fitted to, and the weight of each deviation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The program's own options, and what can be typed to plan and to execute.
+"""Options of the program, and the commands that plan and execute.
 
 What is asked of archives is in `archive_commands`, of a rig by its runs in `rig_commands`, what is
 done once in `setup_commands`, and what is done at a bench in `bench_commands`: each adds its

@@ -1,4 +1,4 @@
-"""What can be typed to read archived runs: report, compare, index, export, list, show ..."""
+"""Commands that read archived runs: report, compare, index, export, list, show."""
 
 from __future__ import annotations
 

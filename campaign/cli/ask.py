@@ -1,4 +1,4 @@
-"""Asking a person: before the first motion of a real bench, and for every operator step."""
+"""Questions to a person: before the first motion of a real bench, and at operator steps."""
 
 from __future__ import annotations
 

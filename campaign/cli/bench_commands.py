@@ -1,4 +1,4 @@
-"""What can be typed at a bench: look at it, stand in for its controller, stop it."""
+"""Commands at a bench: status, emulated controller, stop."""
 
 from __future__ import annotations
 

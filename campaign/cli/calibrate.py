@@ -1,4 +1,4 @@
-"""`campaign calibrate`: fit a bench's unknowns to published cells, and write what came of it."""
+"""`campaign calibrate`: fit a bench's unknowns to published cells."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.physics.complete import PURPOSES
 from campaign.protocol import Protocol, load_protocol
-from campaign.protocol.lacking import check_benches
+from campaign.protocol.missing_values import check_benches
 from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
 

@@ -1,4 +1,4 @@
-"""`campaign check`: the loops of a bench, and what else to know of it before anything moves."""
+"""`campaign check`: loops and facts of a bench before anything moves."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from campaign.physics.bench_facts import Fact, facts_of
 from campaign.physics.complete import PURPOSES, CompleteBench, complete, lacking
 from campaign.physics.linear_friction import Regime
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import loops_of
 from campaign.physics.open_loop import Mode
+from campaign.physics.plan_loops import loops_of
 from campaign.protocol.bench_file import load_bench
 from campaign.protocol.plan_tree import margins_tree
 from campaign.text import number

@@ -1,4 +1,4 @@
-"""`--executor`: trials executed by a Dask cluster in place of this machine's own processes."""
+"""`--executor`: trials on a Dask cluster."""
 
 from __future__ import annotations
 

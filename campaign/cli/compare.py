@@ -1,4 +1,4 @@
-"""`campaign compare`: which numbers of runs differ, by how much, and how sure that is."""
+"""`campaign compare`: differing numbers of runs, with their significance."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pathlib import Path
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_line, print_note, print_table
-from campaign.comparing.comparison import Against, Comparison, compare_runs
-from campaign.comparing.judging import Pair
-from campaign.comparing.page import write_comparison
-from campaign.comparing.tables import (
+from campaign.comparison.finding_pairs import Pair
+from campaign.comparison.page import write_comparison
+from campaign.comparison.run_comparison import Against, Comparison, compare_runs
+from campaign.comparison.tables import (
     bare_differing,
     bench_lines,
     change_of,
@@ -26,7 +26,7 @@ from campaign.comparing.tables import (
 from campaign.errors import ExitCode, worst_exit_code
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
-from campaign.references.judged import Verdict
+from campaign.references.verdict import Verdict
 from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit

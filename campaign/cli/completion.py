@@ -1,4 +1,4 @@
-"""What the shell offers at Tab: runs, protocols, kinds. Quick and silent, whatever is wrong."""
+"""Shell completion of runs, protocols and kinds; silent on errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the trials of a plan cost a backend that computes their samples: for `campaign plan`."""
+"""The cost of planned trials on a computing backend, for `campaign plan`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command that reads an archive says of its damage, and the exit code that follows."""
+"""Messages and exit code for damage of an archive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`campaign device`: a controller to rehearse against, until Ctrl-C."""
+"""`campaign device`: a controller emulator, until Ctrl-C."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`campaign doctor`: what this installation is, what is wrong with it, and what to do."""
+"""`campaign doctor`: the installation, its problems, and what to do."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _plug_ins() -> Iterator[Finding]:
 
 
 def _cache() -> Iterator[Finding]:
-    from campaign.physics.compiled import distrusted
+    from campaign.physics.compilation import distrusted
     from campaign.physics.machine_code import WIDTHS, folder, is_made
 
     where = folder()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from campaign.access import RunView
+from campaign.api import RunView
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note

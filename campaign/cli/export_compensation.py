@@ -1,4 +1,4 @@
-"""`campaign export-compensation`: a compensation of a bench as code for a controller."""
+"""`campaign export-compensation`: a compensation of a bench as controller code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`campaign fingerprint`: state which bench it is that something is known of."""
+"""`campaign fingerprint`: the fingerprint of a bench."""
 
 from __future__ import annotations
 

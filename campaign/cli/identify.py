@@ -1,4 +1,4 @@
-"""`campaign identify`: a rig's parameters from archived runs, with what they rest on."""
+"""`campaign identify`: parameters of a rig from archived runs."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rich.text import Text
 
-from campaign.access.sentences import of_unknown_size
+from campaign.api.conclusion_sentences import of_unknown_size
 from campaign.archive.layout.files import why, write_atomically
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
@@ -177,7 +177,7 @@ def _write_bench(path: Path, text: str) -> None:
 
 
 def _say(found: Identification) -> None:
-    with speaking_of(found.bench.sides):
+    with axis_terms(found.bench.sides):
         for section in found.sections:
             if section.result is None:
                 _wrapped(f"{section.model.name}: not identified: {section.problem}")

@@ -1,4 +1,4 @@
-"""`campaign import`: recordings from elsewhere become a run like any other."""
+"""`campaign import`: recordings from elsewhere as a run."""
 
 from __future__ import annotations
 

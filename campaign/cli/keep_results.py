@@ -1,8 +1,8 @@
-"""What a report found, kept as data beside the run: `RUN-results.nxs`."""
+"""Keeping results of a report as data beside the run: `RUN-results.nxs`."""
 
 from __future__ import annotations
 
-from campaign.access.results import results_of
+from campaign.api.results import results_of
 from campaign.archive import RunReader
 from campaign.archive.layout.results import results_path
 from campaign.archive.reading.results_file import read_any_results

@@ -1,4 +1,4 @@
-"""`campaign kinds`: what protocols and benches can name, each option with unit and meaning."""
+"""`campaign kinds`: kinds of protocols and benches, each option with unit and meaning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bench that was stopped from outside: who did it is shown, and a person lets it go on."""
+"""A latched bench: who stopped it, and its release by a person."""
 
 from __future__ import annotations
 

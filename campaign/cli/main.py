@@ -1,4 +1,4 @@
-"""Running a command, and the one place where an error becomes a message and an exit code."""
+"""Running a command, and turning errors into messages and exit codes."""
 
 from __future__ import annotations
 

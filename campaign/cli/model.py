@@ -1,4 +1,4 @@
-"""`campaign model`: friction models alone, at a sinusoidal rate: a picture and its numbers."""
+"""`campaign model`: friction models at a sinusoidal rate, as picture and numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from campaign.errors import UsageError
 from campaign.options import Options
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
-from campaign.physics.friction_along import Along
+from campaign.physics.friction_response import Along
 from campaign.protocol.bench_file import bench_source
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults

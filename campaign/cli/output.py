@@ -1,4 +1,4 @@
-"""Printing: rich on a terminal, plain lines elsewhere. No text from a file is read as markup.
+"""Printing: rich on a terminal, plain lines elsewhere; no markup from files.
 
 What a file, a line or a command line has brought must not command the terminal. Two doors see to
 it, whoever prints: inside of `plain_streams`, whatever is written to standard output or standard

@@ -1,4 +1,4 @@
-"""`campaign plan`: what `campaign run` would do, as a page of text or as JSON."""
+"""`campaign plan`: what `campaign run` would do, as text or JSON."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from campaign.archive import new_run_name
-from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of
-from campaign.cli.chosen import chosen_lines
+from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
+from campaign.cli.chosen_options import chosen_lines
 from campaign.cli.cost import Cost, cost_lines, costs
 from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
@@ -229,7 +229,7 @@ def _print_details(
         broken = "  BROKEN" if use.margin.broken else ""
         share = f"{use.margin.fraction:4.0%} of the {use.margin.called} limit"
         print_line(f"  {share}: {value} of {bound} in {plan.trials[use.trial - 1].name}{broken}")
-    with speaking_of(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
+    with axis_terms(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
         _print_chosen(test)
     for loss in losses:
         print_line(f"  without {loss['channel']}: no {loss['no']}")

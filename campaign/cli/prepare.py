@@ -1,4 +1,4 @@
-"""From what was typed to a plan and a backend: everything that happens before anything moves."""
+"""From the command line to a plan and a backend."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from campaign.errors import ArchiveError, ProtocolError, UsageError
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
-from campaign.protocol.lacking import check_benches
+from campaign.protocol.missing_values import check_benches
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.schema import Protocol
 from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
@@ -221,7 +221,7 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         for name in names
     )
     if kind.name == IMPORT:
-        from campaign.importing.described import Described
+        from campaign.importing.description import Described
 
         described = Described.model_validate(trial.recording, context={"si": True})
         there = ", ".join(each.name for each in described.channels)

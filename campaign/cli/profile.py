@@ -1,4 +1,4 @@
-"""`campaign run --profile`: where the time of a run went, on standard error."""
+"""`campaign run --profile`: time by kind of work, on standard error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`campaign report`: the page, its tables and its figures, from an archive alone.
+"""`campaign report`: page, tables and figures from an archive.
 
 What makes a page is imported within the functions: other processes analyse in the meantime.
 """
@@ -75,7 +75,7 @@ def _page(
     """The page of what processes have begun to analyse, and what is told of it."""
     from campaign.cli.damage import say_damaged
     from campaign.cli.keep_results import written_results
-    from campaign.execution.naming import reference
+    from campaign.execution.run_reference import reference
     from campaign.experiments import experiments
     from campaign.report.build import build_report
     from campaign.report.formats import chosen_formats
@@ -137,7 +137,7 @@ def _command(path: Path, *, measure_anew: bool) -> str:
     A page goes to others, whom no folder of this machine concerns: of an absolute path only the
     name is told, and that its folder must be.
     """
-    from campaign.execution.naming import reference
+    from campaign.execution.run_reference import reference
 
     elsewhere = path.is_absolute()
     words = ["campaign report", quote(path.stem) if elsewhere else reference(path)]

@@ -1,4 +1,4 @@
-"""`campaign rerun`: one archived trial again on the simulated bench, compared bit by bit."""
+"""`campaign rerun`: one archived trial simulated again, compared bit by bit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from campaign.cli.prepare import find_backend, open_backend
 from campaign.cli.session import Session, execute
 from campaign.errors import ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
-from campaign.execution.comparison import changes, differences
+from campaign.execution.recording_difference import changes, differences
 from campaign.execution.written_order import in_written_order
 from campaign.physics import truth
 from campaign.physics.bench import Bench

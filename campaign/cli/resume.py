@@ -1,4 +1,4 @@
-"""`campaign resume`: go on with a run that was interrupted, killed or ended by a fault."""
+"""`campaign resume`: continue an interrupted, killed or faulted run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.cluster import HERE, Where
-from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
+from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_warnings

@@ -1,4 +1,4 @@
-"""What can be typed to learn of a rig from its runs: identify it, follow it over time."""
+"""Commands about a rig over its runs: identify, trend."""
 
 from __future__ import annotations
 

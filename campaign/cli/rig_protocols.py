@@ -1,4 +1,4 @@
-"""`campaign init DIR --bench FILE`: protocols that work for a rig of one's own."""
+"""`campaign init DIR --bench FILE`: protocols for a rig."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of, words_here
-from campaign.cli.chosen import chosen_lines
+from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
+from campaign.cli.chosen_options import chosen_lines
 from campaign.cli.output import print_line, print_note
 from campaign.cli.plan import in_short
 from campaign.errors import CampaignError, UsageError
@@ -106,7 +106,7 @@ def _check_fit(test: _Test, bench: Bench) -> None:
     experiment = experiments()[test.kind]
     try:
         if experiment.fit is not None:
-            with speaking_of(bench.sides):
+            with axis_terms(bench.sides):
                 experiment.fit(experiment.options(), bench)
     except (ValueError, ArithmeticError) as error:
         raise UsageError(f"{bench.name}: no {test.name} fits it: {error}") from None
@@ -139,8 +139,8 @@ def _stabilize(bench: Bench) -> tuple[_Test, ...]:
 
 
 def _page(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
-    with speaking_of(bench.sides):
-        return words_here(_text(bench, name, what, tests))
+    with axis_terms(bench.sides):
+        return in_axis_terms(_text(bench, name, what, tests))
 
 
 def _text(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
@@ -168,7 +168,7 @@ def _with_reasons(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     for test in plan.tests:
         trials = [plan.trials[number - 1] for number in test.numbers[:1]]
-        with speaking_of(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
+        with axis_terms(sides_in(trials[0].bench) if trials else BOTH_ROTARY):
             reasons = "".join(_comments(chosen_lines(test)))
         mark = f'name = "{test.name}"\n'
         text = text.replace(f"[[test]]\n{mark}", f"{reasons}[[test]]\n{mark}")

@@ -1,4 +1,4 @@
-"""`campaign run`: prepare, check, ask where something real moves, execute, seal."""
+"""`campaign run`: prepare, check, ask, execute, seal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion, say_by_hand
 from campaign.cli.cluster import HERE, Where
-from campaign.cli.compiling import compiling_meanwhile, wait_until_compiled
+from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Prepared, Request, find_backend, prepare
 from campaign.cli.profile import print_profile

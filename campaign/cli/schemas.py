@@ -1,4 +1,4 @@
-"""`campaign schema`, and what `campaign init` leaves so that editors find schemas."""
+"""`campaign schema`, and the schema files of `campaign init`."""
 
 from __future__ import annotations
 

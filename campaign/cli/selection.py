@@ -1,4 +1,4 @@
-"""Which runs `campaign list` shows."""
+"""Selection of runs for `campaign list`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `run` and `resume` have in common: execute, seal, say how it ended, report if asked."""
+"""Common part of `run` and `resume`: execute, seal, summarize, report."""
 
 from __future__ import annotations
 
@@ -35,9 +35,8 @@ from campaign.execution.executors import (
     OpenExecutor,
     process_executor,
 )
-from campaign.execution.measuring import Measuring
-from campaign.execution.naming import how_to_go_on, reference, typed
 from campaign.execution.outcome import RunOutcome
+from campaign.execution.run_reference import how_to_go_on, reference, typed
 from campaign.execution.runner import run_plan
 from campaign.execution.safety import (
     NOT_SAFE,
@@ -50,6 +49,7 @@ from campaign.execution.safety import (
 from campaign.execution.stages import Stages, refusal_of
 from campaign.execution.stop import NOTHING_BEGUN, GuardianPipes, StopSwitch
 from campaign.execution.supervision import Supervision
+from campaign.execution.trial_metrics import Measuring
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy

@@ -1,4 +1,4 @@
-"""What can be typed once: see the kinds, compile, begin a folder, bring files forward."""
+"""Setup commands: kinds, warmup, init, doctor."""
 
 from __future__ import annotations
 

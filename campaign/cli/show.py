@@ -1,4 +1,4 @@
-"""`campaign show`: what a run was, how it went, and what became of it."""
+"""`campaign show`: description, course and outcome of a run."""
 
 from __future__ import annotations
 

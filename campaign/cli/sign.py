@@ -1,4 +1,4 @@
-"""`campaign sign`, and the signature that `run --sign` and `resume --sign` make at their end."""
+"""`campaign sign`, and the signature of `run --sign` and `resume --sign`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from campaign.archive.writing.run_lock import RunLock
 from campaign.cli.ask import somebody_is_there
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ArchiveError, CampaignError, ExitCode, UsageError
-from campaign.execution.naming import reference
+from campaign.execution.run_reference import reference
 from campaign.interrupts import unwinding
 
 WHAT_IT_PROVES = "proves who, not when"
@@ -40,7 +40,7 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
             f"{sealed}: is not sealed, and only a sealed run is signed; "
             f"`campaign resume {reference(sealed)}` goes on to its end"
         )
-    from campaign.archive.verifying.verification import verify_run
+    from campaign.archive.verification.verify_run import verify_run
 
     _check_free(sealed, replace=replace)
     signing.check_key(key)  # before all of a large run is read
@@ -115,7 +115,7 @@ def _check_free(sealed: Path, *, replace: bool) -> None:
 
 def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
     """The new signature is made before an old one is touched."""
-    from campaign.archive.verifying.statement import run_statement
+    from campaign.archive.verification.statement import run_statement
 
     made = signing.sign(run_statement(sealed), key, ask=somebody_is_there())
     _check_free(sealed, replace=replace)

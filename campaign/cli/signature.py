@@ -1,4 +1,4 @@
-"""What `verify` says about the signature of a run."""
+"""The signature of a run in the output of `verify`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from campaign import signing
 from campaign.archive.layout.signature_file import has_signature, read_signature, signature_path
-from campaign.archive.verifying.statement import run_statement
+from campaign.archive.verification.statement import run_statement
 from campaign.cli.sign import WHAT_IT_PROVES
 from campaign.errors import ArchiveError, UsageError
 

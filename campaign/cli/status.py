@@ -1,4 +1,4 @@
-"""`campaign status`: how a controller is, who holds it, and whether somebody has stopped it."""
+"""`campaign status`: state of a controller, its holder, its latch."""
 
 from __future__ import annotations
 

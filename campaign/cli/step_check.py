@@ -1,4 +1,4 @@
-"""`campaign run --check-step`: what simulating each trial at half its step has changed."""
+"""`campaign run --check-step`: the effect of half the step on each trial."""
 
 from __future__ import annotations
 

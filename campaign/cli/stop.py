@@ -1,4 +1,4 @@
-"""`campaign stop`: the panic stop. It opens the port itself, whoever has it, and sends SAFE."""
+"""`campaign stop`: the panic stop, independent of the program that holds the port."""
 
 from __future__ import annotations
 

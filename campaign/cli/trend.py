@@ -1,4 +1,4 @@
-"""`campaign trend`: do a rig's numbers drift over its runs, have they jumped, do they follow?"""
+"""`campaign trend`: drift, jumps and correlations of a rig's numbers over its runs."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from campaign.identify import experiments_by_model
 from campaign.interrupts import unwinding
 from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
-from campaign.trending.page import write_trends
-from campaign.trending.tables import detectable_words, headline, not_judged, sentences
-from campaign.trending.trends import JUMP, TREND, Trends, Verdict, follow
+from campaign.trends.page import write_trends
+from campaign.trends.rig_trends import JUMP, TREND, Trends, Verdict, follow
+from campaign.trends.tables import detectable_words, headline, not_judged, sentences
 
 WIDTH = 80
 """Columns of a terminal that is not wide."""

@@ -1,4 +1,4 @@
-"""`campaign verify`: whether archives are, to the last byte, what was written."""
+"""`campaign verify`: integrity of archives, byte by byte."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from campaign.archive import find_runs
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words
 from campaign.archive.reading.results_file import holds_results, read_any_results
-from campaign.archive.verifying.result import Verification
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.result import Verification
+from campaign.archive.verification.verify_run import verify_run
 from campaign.cli.output import error_console, print_json, print_line, print_note
 from campaign.cli.signature import Checked, Wanted, check_signature
 from campaign.errors import ArchiveError, ExitCode

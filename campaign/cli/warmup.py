@@ -1,4 +1,4 @@
-"""`campaign warmup`: compile the engine before anybody waits for it."""
+"""`campaign warmup`: compile the engine ahead."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from campaign.errors import ExitCode
 def warm_up() -> ExitCode:
     """Make all machine code that the shipped benches need; say what, how long, and where it is."""
     from campaign.execution.first_start import Helpers, make_all
-    from campaign.physics.compiled import distrusted
+    from campaign.physics.compilation import distrusted
     from campaign.physics.machine_code import WIDTHS, Made, folder, is_made
 
     compiled: list[Made] = []

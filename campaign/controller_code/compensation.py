@@ -1,4 +1,4 @@
-"""A compensation of a bench as the sampled controller has it: numbers, states, step functions."""
+"""A compensation of a bench as a sampled controller has it: numbers, states, steps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from campaign.physics.complete import CompleteBench
 from campaign.physics.friction_elements import Interface
 from campaign.physics.lanes import Lane, Lanes, together
 from campaign.physics.rows import KEPT_CURRENT
-from campaign.physics.sampled import _compensate, _rates
+from campaign.physics.sampled_controller import _compensate, _rates
 from campaign.signals import Zero
 from campaign.trial import Task
 

@@ -1,4 +1,4 @@
-"""Step functions in C: the Python that the engine compiles, statement by statement.
+"""Translation of compiled step functions from Python to C.
 
 A step function is plain Python of numbers (`campaign.physics.step_function`), and so is all that it
 calls, down to the exponential. Each function becomes a C function for each set of argument types;

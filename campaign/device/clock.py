@@ -1,4 +1,4 @@
-"""The controller's clock: in step with the wall's, faster by a factor, or that of its messages."""
+"""The clock of the emulated controller: wall time, scaled, or message-driven."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the parameters that a host has set to a trial on the simulated bench, or why not."""
+"""From parameters set by a host to a trial on the simulated bench."""
 
 from __future__ import annotations
 

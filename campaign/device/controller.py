@@ -1,4 +1,4 @@
-"""The controller: commands in, answers and records out. It has no input or output of its own.
+"""The emulated controller: commands in, answers and records out, no I/O.
 
 What a command does to the state is `campaign.wire.statemachine`; here is what it does besides.
 """

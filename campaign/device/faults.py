@@ -1,4 +1,4 @@
-"""Faults on demand: what `--fault NAME[=VALUE][@trial=N][@time=T]` can say."""
+"""Faults on demand: `--fault NAME[=VALUE][@trial=N][@time=T]`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The latch: once somebody else than its host has stopped the controller, nothing arms any more.
+"""The latch: after a stop by another host the controller refuses to arm.
 
 It is in lasting memory, here a file, before anybody is told of it. A controller that cannot
 remember does not know whether it was stopped, so it starts latched. A missing file is no memory:

@@ -1,4 +1,4 @@
-"""The line to the controller: TCP connections, or a pseudo-terminal. Nothing here blocks."""
+"""Connections of the emulated controller: TCP or a pseudo-terminal, nonblocking."""
 
 from __future__ import annotations
 

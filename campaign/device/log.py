@@ -1,4 +1,4 @@
-"""What the controller did, line by line, for whoever judges afterwards: one JSON object each."""
+"""Log of the emulated controller: one JSON object a line."""
 
 from __future__ import annotations
 

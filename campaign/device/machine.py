@@ -1,4 +1,4 @@
-"""What the controller moves: the simulated axis, its drive, and the trial it is in."""
+"""The plant of the emulated controller: axis, drive, current trial."""
 
 from __future__ import annotations
 

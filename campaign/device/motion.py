@@ -1,4 +1,4 @@
-"""One trial in motion: what is due goes into the ring, and faults strike at their time."""
+"""One trial in motion: due samples go into the ring, faults occur at their time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bad line: bytes that get lost, doubled, swapped or changed on their way."""
+"""A noisy line: bytes lost, doubled, swapped or changed."""
 
 from __future__ import annotations
 

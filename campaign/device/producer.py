@@ -1,4 +1,4 @@
-"""A trial's samples, simulated in a thread ahead of the clock, by the `sim` backend itself."""
+"""Samples of a trial, simulated in a thread ahead of the clock."""
 
 from __future__ import annotations
 

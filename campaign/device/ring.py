@@ -1,4 +1,4 @@
-"""The controller's ring buffer: the records of one trial until the host has them."""
+"""The controller's ring buffer: records of one trial until the host has them."""
 
 from __future__ import annotations
 

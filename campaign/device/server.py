@@ -1,4 +1,4 @@
-"""The controller on its line: one loop that reads, lets the controller work, and writes."""
+"""The loop of the emulated controller: read, work, write."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who holds the line, and what was asked and answered last."""
+"""The session of the emulated controller: its holder and its last exchange."""
 
 from __future__ import annotations
 

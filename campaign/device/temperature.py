@@ -1,4 +1,4 @@
-"""How warm the motor's winding is: one thermal mass, heated by the current, cooled by the room."""
+"""Winding temperature: one thermal mass, heated by current, cooled by ambient."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiling the simulation before anybody waits for it."""
+"""Compiling the simulation ahead."""
 
 from __future__ import annotations
 

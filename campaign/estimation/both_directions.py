@@ -1,4 +1,4 @@
-"""Mean of both directions of a velocity map, whose points are of the same trials."""
+"""Mean of both directions of a velocity map measured in the same trials."""
 
 from __future__ import annotations
 

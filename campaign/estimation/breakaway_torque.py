@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from campaign.estimate import Estimate
-from campaign.estimation.autocorrelated import Array, FitErrors, errors_of
+from campaign.estimation.autocorrelated_errors import Array, FitErrors, errors_of
 from campaign.estimation.intervals import shifted_by, student, with_error
 from campaign.estimation.relative_rate import mean, slides_from, slope
 from campaign.reason import Cause

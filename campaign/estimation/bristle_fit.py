@@ -1,4 +1,4 @@
-"""Least squares of the curve of bristles to the binned rate of a torque ramp.
+"""Least-squares fit of the bristle curve to the binned rate of a torque ramp.
 
 The parameters are logarithms, so that stiffness and torque stay positive and their intervals
 suit them: ln stiffness and ln of all torque; of a second interface ln stiffness and ln torque; last
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.autocorrelated import FitErrors, errors_of
+from campaign.estimation.autocorrelated_errors import FitErrors, errors_of
 from campaign.estimation.presliding_curve import (
     Interface,
     angle_derivatives,

@@ -1,4 +1,4 @@
-"""How an open loop goes on above its sweep: gain margins that were not reached.
+"""Extrapolation of an open loop above its sweep, for gain margins.
 
 Far above its corners any rational loop with one more pole than zeros, and a delay, is the start of
 

@@ -1,4 +1,4 @@
-"""a - R b of two independent estimates: the one interval that difference and ratio follow from.
+"""Interval of a - R b for two independent estimates: difference and ratio.
 
 The interval for the difference is that of R = 1. The interval for the ratio holds every R for which
 the interval of a - R b holds 0 (Fieller, Journal of the Royal Statistical Society B 16, 1954), so

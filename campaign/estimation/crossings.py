@@ -1,4 +1,4 @@
-"""Where a measured curve passes a level, as far as its noise lets one say so."""
+"""Crossings of a level by a noisy measured curve."""
 
 from __future__ import annotations
 

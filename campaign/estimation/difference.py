@@ -1,4 +1,4 @@
-"""Two findings of the same quantity: their difference, its share of the first, and the p value.
+"""Difference of two findings of one quantity: size, share, p value.
 
 Differences are of the second minus the first, which is the reference.
 """

@@ -1,4 +1,4 @@
-"""The first elastic mode in a torque-to-rate response: a resonance beside an antiresonance.
+"""The first elastic mode of a torque-to-rate response: resonance and antiresonance.
 
 An elastic part hung on the load multiplies the smooth response of the rigid axis by
 

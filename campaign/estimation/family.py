@@ -1,4 +1,4 @@
-"""Several decisions of one page as one family.
+"""Decisions of one page as one family (Benjamini and Hochberg).
 
 Benjamini and Hochberg (Journal of the Royal Statistical Society B 57, 1995): of what is declared,
 at most a share of `RATE` is expected to be false, for tests that are independent or positively

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
-from campaign.estimation.autocorrelated import errors_of
+from campaign.estimation.autocorrelated_errors import errors_of
 from campaign.estimation.intervals import SINGLE_VALUE, with_error
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The angle in which friction forgets a reversal, from the recording of one."""
+"""Angle over which friction forgets a reversal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The judgement that every parameter of a rig passes before it is a finding.
+"""Admission of a parameter: is it determined, and physically possible?
 
 A parameter is *determined* where its interval is narrow against its value, or against what matters
 on this rig. It is *possible* where a rig can have it. One that may be zero and cannot be negative

@@ -1,4 +1,4 @@
-"""A second interface that the noise of a ramp's rate hides from the fit of a single one.
+"""A second slipping interface that the noise of a ramp hides from a single fit.
 
 An interface that is stiffer and slips first changes the rate of the early part of a ramp only.
 Where that part is not resolved by the gyro, the curve of one interface fits as well. Its stiffness
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.autocorrelated import whitened
+from campaign.estimation.autocorrelated_errors import whitened
 from campaign.estimation.bristle_fit import BristleFit
 from campaign.estimation.intervals import student
 from campaign.estimation.presliding_curve import (

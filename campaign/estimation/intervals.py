@@ -1,4 +1,4 @@
-"""Intervals of means: over repeats, and over the samples of one autocorrelated recording.
+"""Intervals of means: over repeats, and over one autocorrelated recording.
 
 All are Student's t intervals. What a repetition would not change (a wrong torque constant, say) is
 in none of them: that is the systematic part of an estimate.

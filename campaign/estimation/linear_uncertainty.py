@@ -1,4 +1,4 @@
-"""How well residuals determine the parameters of a fit: intervals, correlations, what stays open.
+"""Intervals, correlations and undetermined directions of a least-squares fit.
 
 Linearised at the optimum; parameters are shares of their ranges (`unknowns`), and the residuals'
 deviations are taken as independent.

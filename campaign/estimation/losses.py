@@ -1,4 +1,4 @@
-"""How a squared residual counts, as `scipy.optimize.least_squares` has it, for our own sums.
+"""Robust losses, as in `scipy.optimize.least_squares`.
 
 Residuals are in standard deviations: at about one the robust losses begin to curb them.
 """

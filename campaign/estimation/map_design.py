@@ -1,4 +1,4 @@
-"""At which speeds a velocity map tells most of Equation 4.6, once it is roughly known.
+"""Optimal speeds of a velocity map for Equation 4.6 from rough parameters.
 
 A point at speed v adds j jᵀ to the information of the parameters, with j the derivative of the
 torque by each of them over the torque's deviation; their covariance C, the inverse, loses

@@ -1,4 +1,4 @@
-"""Least squares from several starts, each kept; Ctrl-C keeps the best point seen.
+"""Least squares from several starts; Ctrl-C keeps the best point.
 
     objective = Objective(unknowns, residuals)
     found = search(objective, Settings(starts=8))

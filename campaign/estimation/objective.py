@@ -1,4 +1,4 @@
-"""A costly residual function over the unit cube, with its derivatives; evaluations are counted.
+"""A costly residual function over the unit cube, with derivatives and a counter.
 
 What is costly is handed in, e.g. a simulation of trials that is held against what was measured.
 """

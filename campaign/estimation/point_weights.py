@@ -1,4 +1,4 @@
-"""How much each point of a curve counts: deviations of windows, and what lies between points."""
+"""Weights of the points of a curve: window scatter and scatter between points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where one more value will lie among repetitions.
+"""Prediction interval of one more value among repetitions.
 
 The interval of a mean says where the mean is. One further value scatters as a single trial does; it
 is to be held against their distribution. (`published.draws` does that for a published value.)
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, exponential, student
-from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.reason import Cause
 
 Array = NDArray[np.float64]

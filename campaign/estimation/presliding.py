@@ -1,4 +1,4 @@
-"""Presliding stiffness from a slow torque ramp (section 4.3.3), by the rate at which it bends.
+"""Presliding stiffness from a slow torque ramp (section 4.3.3).
 
 A straight chord through the curve of torque over angle is always too low as an estimate of sigma0,
 so the curve itself is fitted. It is not fitted to angles: an encoder has few counts in presliding,
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Kind, Origin
-from campaign.estimation.autocorrelated import MISFIT
+from campaign.estimation.autocorrelated_errors import MISFIT
 from campaign.estimation.bristle_fit import (
     Array,
     BristleFit,

@@ -1,4 +1,4 @@
-"""Torque over angle below breakaway, in closed form, and its inverse.
+"""Torque over angle below breakaway in closed form, and its inverse.
 
 Where sliding is slow, s(v) is Ts and the bristle equation dz/dq = 1 - sigma0 z / Ts has a closed
 form: T = Tb (1 - exp(-sigma0 q / Tb)). Interfaces in parallel add such curves; each slips at its

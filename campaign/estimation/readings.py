@@ -1,4 +1,4 @@
-"""Mean and deviation of a few readings, of a sensor whose count may be as large as they scatter.
+"""Mean and deviation of few readings of a quantized sensor.
 
 Rounding to a count adds the variance count^2/12 where readings scatter over several counts, and
 anything from nothing to a quarter of a count squared where they do not (Sheppard's corrections and

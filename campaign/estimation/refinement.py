@@ -1,4 +1,4 @@
-"""Where a measured frequency response should be looked at more closely."""
+"""Frequencies at which a measured response needs more points."""
 
 from __future__ import annotations
 

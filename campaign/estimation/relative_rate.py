@@ -1,4 +1,4 @@
-"""The rate of the load relative to the hull as a reader can see it, from sensors that count.
+"""Rate of the load relative to the hull, from quantized sensors.
 
 A difference of encoder counts is a row of spikes, each one count per sample high. A straight line
 through a window of counts has the slope of the motion: it is the same backwards in time, so that

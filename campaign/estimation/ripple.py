@@ -1,4 +1,4 @@
-"""Friction's ripple over position: found in long runs, and taken out of short windows.
+"""Position-dependent ripple of friction: fitted to long runs, removed from short windows.
 
 T = dry(v) (1 + Re(z exp(i N q))) + sigma2 v, with N periods per revolution of the angle q. A window
 that is short against a period sees one place of it, whatever its length in time, and no repetition

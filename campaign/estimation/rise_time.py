@@ -1,4 +1,4 @@
-"""The rise time of one noisy step, with its interval: where levels may be crossed, for all we know.
+"""Rise time of one noisy step, with its interval.
 
 Around each level the response is a parabola, fitted to its neighbours. Wherever that is as close to
 the level as its standard error allows, the level may be crossed; the ends of those times are the

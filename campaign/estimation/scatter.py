@@ -1,4 +1,4 @@
-"""How far numbers scatter, with intervals: chi-square for independent normal values."""
+"""Scatter of numbers with chi-square intervals."""
 
 from __future__ import annotations
 

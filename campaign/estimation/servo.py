@@ -1,4 +1,4 @@
-"""What the response of a closed servo loop says about it: bandwidth and stability margins.
+"""Bandwidth and stability margins from the response of a closed servo loop.
 
 Each is an estimate. Its interval holds the noise of the points; the part of interpolation between
 them is the same in every repetition of the sweep and stands beside it, as a systematic part.

@@ -1,4 +1,4 @@
-"""Stabilization error of a recording, and of several trials: how still the load stayed.
+"""Stabilization error of a recording, and of several trials.
 
 It is the standard deviation s of the pointing error, about the mean of the whole record. Under a
 sinusoidal motion each half cycle has one reversal, and so tells s once. Intervals are taken in
@@ -22,7 +22,7 @@ from campaign.estimation.intervals import (
     ratio,
     with_error,
 )
-from campaign.estimation.sampled import LOST
+from campaign.estimation.sampled_curve import LOST
 from campaign.reason import Cause, Reason
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Whether a window of sliding is steady: what its rate and torque vary by beyond their sensors.
+"""Whether a window of sliding is steady within its sensors' resolution.
 
 The rate decides. Friction bends over the rate, so that its mean over a rate that varies by a share
 s (1 sigma) is off by up to s^2 of Ts - Tc (half of the curve's second derivative, at its largest).

@@ -1,4 +1,4 @@
-"""Stretches of a recording in which a rate is steady: found in the data, where nobody planned any.
+"""Stretches of a recording with a steady rate, found in the data.
 
 A recording is cut into short blocks. A stretch grows from block to block as long as each new mean
 rate agrees with those it has, within a share of it and what noise explains; it is then cut off at

@@ -1,4 +1,4 @@
-"""What a step response is described by: rise time, settling time, overshoot, what error stays."""
+"""Step response: rise time, settling time, overshoot, remaining error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction of steady sliding over speed (Equation 4.6), fitted by weighted least squares.
+"""Weighted least-squares fit of steady friction over speed (Equation 4.6).
 
 One direction at a time, all numbers positive: T = Tc + (Ts - Tc) exp(-(v / vs)^delta) + sigma2 v.
 Ts is not forced above Tc: real axes with Ts < Tc exist.

@@ -1,4 +1,4 @@
-"""Where a measured curve passes a threshold: the value with its interval, or a bound.
+"""Where a measured curve crosses a threshold: interval, or bound.
 
 An error is measured at some changes of a parameter, each with its own scatter; between them it is a
 straight line. Wherever the line stands beyond the threshold by more than its scatter it surely has

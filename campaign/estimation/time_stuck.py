@@ -1,4 +1,4 @@
-"""Share of the time in which the load moves with the hull, by a rate that the sensors resolve.
+"""Share of time in which the load sticks, within sensor resolution.
 
 Stuck is where the relative rate is below a threshold: a share of the largest rate of the hull.
 Rates are smoothed until what the sensor cannot tell apart is below that threshold, and a share is

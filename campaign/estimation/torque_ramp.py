@@ -1,4 +1,4 @@
-"""A torque ramp from rest in short bins: the form in which presliding is fitted."""
+"""A torque ramp from rest in short bins, for the presliding fit."""
 
 from __future__ import annotations
 

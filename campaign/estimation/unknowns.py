@@ -1,4 +1,4 @@
-"""Unknowns between bounds, and the unit cube in which a fit moves.
+"""Bounded unknowns, and the unit cube of a fit.
 
 A point of the cube has one share for each unknown: 0 at its lower bound, 1 at its upper one. So all
 unknowns are of like size, and a step, a bound and an interval mean the same for each.

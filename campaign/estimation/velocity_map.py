@@ -1,4 +1,4 @@
-"""Static friction parameters from a friction-velocity map, with intervals that hold.
+"""Static friction parameters from a friction-velocity map.
 
 A point is the mean of a window, whose own deviation is known, and it deviates from the next point
 by more: friction changes from trial to trial, and what is left of its ripple over position is no
@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.extrapolated import extrapolated
+from campaign.estimation.extrapolation import extrapolated
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
 from campaign.estimation.least_squares import Array, profile_limit, refuse_too_few

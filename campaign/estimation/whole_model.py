@@ -1,4 +1,4 @@
-"""A model that is simulated, fitted to several recordings at once, with intervals that hold.
+"""Fit of a simulated model to several recordings at once, with intervals.
 
 What simulates is handed in: a friction model along measured motions, a whole bench. The search from
 several starts is that of calibrations (`multi_start`), and so is what counts as being at a bound.

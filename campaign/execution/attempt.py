@@ -1,4 +1,4 @@
-"""Executing trials once, in a worker thread, each into its own file of the archive."""
+"""One attempt at trials, in a worker thread, each into its own file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.archive.layout.journal import utc_now
-from campaign.archive.reading.measured import Measure
+from campaign.archive.reading.archived_metrics import Measure
 from campaign.backends import calls
 from campaign.backends.calls import HEARTBEAT, Call
 from campaign.backends.interface import Backend, ExecutesTogether

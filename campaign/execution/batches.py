@@ -1,4 +1,4 @@
-"""Which trials are executed together: those of one group, as far as a look ahead finds them."""
+"""Trials that are executed together: one group within the lookahead."""
 
 from __future__ import annotations
 

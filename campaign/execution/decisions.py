@@ -1,4 +1,4 @@
-"""What the protocol's policy makes of a trial that failed, and when the bench has to rest."""
+"""Decisions after a failed trial by policy, and rests of the bench."""
 
 from __future__ import annotations
 

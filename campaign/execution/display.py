@@ -1,4 +1,4 @@
-"""Showing progress: a live line on a terminal, now and then a plain line elsewhere."""
+"""Progress display: a live line on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Batch executors: worker threads of this process, or worker processes for large simulated runs.
+"""Executors of batches: threads, or processes for large simulated runs.
 
 A worker thread writes journal entries itself. A worker process writes trial files and measures
 them; it returns the journal entries with each trial's end, and the parent writes them.
@@ -28,9 +28,9 @@ from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.backends.interface import Backend, Timed
 from campaign.errors import ArchiveError
 from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
-from campaign.execution.measuring import Measuring
 from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
+from campaign.execution.trial_metrics import Measuring
 from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
 from campaign.policy import Keeping

@@ -1,4 +1,4 @@
-"""Compiling the engine once per installation, while there is something else to do.
+"""Compiling the engine once per installation.
 
 In one process numba compiles one function at a time, so what is made beside that has a process of
 its own, which fills the cache: `python -m campaign.execution.first_start WIDTH [engine]`.

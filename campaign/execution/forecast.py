@@ -1,4 +1,4 @@
-"""How long a run will still take, from what it has done so far."""
+"""Remaining time of a run from its progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parent of a program that moves a bench: it says so when that program dies or falls silent.
+"""The guardian: the parent process of a program that moves a bench.
 
 Run by its path, with nothing but the standard library: `guardian.py COMMAND...`. It starts the
 command with three pipe ends, which `VARIABLE` names: where signals are read, where they are

@@ -1,4 +1,4 @@
-"""Who stands at the bench: answers what the run asks, and is why its pauses are waited for."""
+"""Prompts to the operator at the bench, and the time they take."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a run ended, and the exit code that says so."""
+"""The outcome of a run and its exit code."""
 
 from __future__ import annotations
 

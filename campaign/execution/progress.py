@@ -1,4 +1,4 @@
-"""How far a run is, as data. A display is any function that takes a Progress."""
+"""Progress of a run as data; a display is a function of it."""
 
 from __future__ import annotations
 

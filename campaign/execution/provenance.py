@@ -1,4 +1,4 @@
-"""What an archive says about where a run comes from: versions, machine, command, revision."""
+"""Provenance in an archive: versions, machine, command, revision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between every backend and the archive: what a trial's samples have to pass.
+"""The supervising recorder between a backend and the archive.
 
 The first sample that breaks what a trial promises is kept, as evidence; nothing that comes after it
 is. The trial's own stop flag is set, so that its backend ends it, and how the trial ended is
@@ -18,7 +18,7 @@ from pydantic import JsonValue
 from campaign.backends.interface import Source
 from campaign.channels import missing
 from campaign.errors import ArchiveError
-from campaign.execution.judging import (
+from campaign.execution.sample_checks import (
     STEP,
     Announced,
     Verdict,

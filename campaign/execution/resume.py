@@ -1,4 +1,4 @@
-"""Going on with a run: whether it can be, what of it is done, and what has changed since."""
+"""Whether and how a run continues: finished trials and changes since."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from campaign.archive import PlannedTrial, RunHeader, RunReader
 from campaign.archive.layout.journal import Decision, TrialFinished, parse_journal
-from campaign.archive.writing.resuming import RESUMABLE
+from campaign.archive.writing.resume_run import RESUMABLE
 from campaign.errors import UsageError
 from campaign.execution.provenance import shaping
 from campaign.protocol import PlannedStage

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import utc_now
-from campaign.archive.reading.measured import Measure
+from campaign.archive.reading.archived_metrics import Measure
 from campaign.backends.interface import Backend, KnowsCost
 from campaign.execution.attempt import Conditions
 from campaign.execution.executors import OpenExecutor, thread_executor

@@ -1,4 +1,4 @@
-"""Bringing the bench to rest however a run ends, and saying first when nobody saw that it is."""
+"""Bringing the bench to rest at the end of a run, confirmed or not."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from campaign.backends import calls
 from campaign.backends.interface import Backend
 from campaign.entry_points import one_line
 from campaign.errors import BackendError, CampaignError, ExitCode
-from campaign.execution.naming import how_to_go_on
+from campaign.execution.run_reference import how_to_go_on
 from campaign.recording import SafeState
 
 SAFE = "safe state confirmed: the bench is at rest with its drive off"

@@ -1,4 +1,4 @@
-"""How timely samples are handed over: the wall clock beside the bench's."""
+"""Latency of delivered samples: wall clock against bench clock."""
 
 from __future__ import annotations
 

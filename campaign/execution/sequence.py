@@ -1,4 +1,4 @@
-"""The order of things during a run: trials, retries, rests, steps of the operator, stops.
+"""The sequence of a run: trials, retries, rests, operator steps, stops.
 
 Decisions are made in one thread, between trials; only the trials themselves are executed elsewhere
 (`executors.py`). Each decision is in the journal before it is acted upon.
@@ -16,8 +16,8 @@ from campaign.execution.attempt import Executed
 from campaign.execution.batches import Batches
 from campaign.execution.decisions import Responses, Rests, extremes
 from campaign.execution.executors import BatchExecutor, WorkerLostError
+from campaign.execution.external_stop import OutsideWatch
 from campaign.execution.operator_prompts import Attendance, SetUp
-from campaign.execution.outside import OutsideWatch
 from campaign.execution.progress import Ledger
 from campaign.execution.safety import Ended, make_safe
 from campaign.execution.stages import Stages

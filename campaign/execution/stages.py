@@ -1,4 +1,4 @@
-"""Later stages of a run: when they are asked which trials follow, and what becomes of the answer.
+"""Later stages of a run: when trials follow, and their execution.
 
 A stage is asked once all trials of its point have ended for good; its answer is in the journal
 before the first of its trials begins. Stages are asked in one order, that of their points' last
@@ -15,10 +15,10 @@ from dataclasses import replace
 from typing import Protocol
 
 from campaign.archive import ArchivedTrial
-from campaign.archive.layout.followed import trials_followed
+from campaign.archive.layout.followup_trials import trials_followed
 from campaign.archive.layout.journal import TrialsFollowed, utc_now
-from campaign.archive.reading.measured import Measure
-from campaign.axis_kind import each_speaking_of
+from campaign.archive.reading.archived_metrics import Measure
+from campaign.axis_kind import each_in_axis_terms
 from campaign.backends import calls
 from campaign.backends.interface import Backend
 from campaign.channels import missing
@@ -32,7 +32,7 @@ from campaign.experiments.interface import (
     bench_of,
     options_of,
 )
-from campaign.protocol.follow import Followed, Refusal, TooMuchError, follow
+from campaign.protocol.stage_trials import Followed, Refusal, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
 from campaign.trial import Role, Trial, canonical_json
@@ -169,7 +169,7 @@ class Stages:
         data = TestData(first.test, first.kind, first.options, archived)
         bench = bench_of(first)
         asked = declared.trials(options_of(experiment, first.options), bench, data)
-        requests = each_speaking_of(bench.sides, asked)
+        requests = each_in_axis_terms(bench.sides, asked)
         return follow(stage, experiment, requests, first, self._next, self._refusal)
 
     def _measured(self, trial: TrialData) -> TrialData:

@@ -1,4 +1,4 @@
-"""Stopping a run from outside: once asks, twice insists.
+"""Requests to stop a run: the first asks, the second insists.
 
 Nothing is raised where the program happens to stand: an exception out of a signal handler can be
 lost, for instance in a weak reference's callback, or break what it interrupts. The handler notes

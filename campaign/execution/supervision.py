@@ -1,4 +1,4 @@
-"""How trials are watched: what is known of the backend, how patient one is, and who looks on."""
+"""Supervision of trials: backend facts, time limits, observers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the runner needs of an archive, as two small interfaces (`campaign.archive` has them)."""
+"""The archive as the runner needs it: two small interfaces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import Entry
-from campaign.archive.reading.measured import Measure
+from campaign.archive.reading.archived_metrics import Measure
 from campaign.estimate import Estimate
 from campaign.policy import KEEP_ALL, Keeping
 from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState

@@ -1,4 +1,4 @@
-"""The order of a bench's tables as its file has it.
+"""Order of a bench's tables as in its file.
 
 The archive keeps trees by their content, whose keys have no order; but torques of several
 interfaces are added in the order in which the file names them, which decides their last bits.

@@ -1,4 +1,4 @@
-"""Breakaway against the rate of the applied force: the faster the push, the lower the peak.
+"""Breakaway force against the rate of the applied force.
 
 A torque ramp acts on the free load from outside, as an ideal force would: there is no drive. The
 breakaway torque is the largest friction before the load slides. Static models know no rate; in the
@@ -18,7 +18,7 @@ from pydantic import Field
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.relative_rate import STOP_FACTOR
-from campaign.estimation.sampled import at_sample, bracketed, peak
+from campaign.estimation.sampled_curve import at_sample, bracketed, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of

@@ -1,4 +1,4 @@
-"""Friction lag: friction over a rate that swings above zero, in loops around the Stribeck curve.
+"""Friction lag: loops of friction over a positive, oscillating rate.
 
 The rate never changes its sign, so the contact always slides. Friction is larger while the rate
 rises than while it falls, because the state of the contact follows the rate with a delay; the
@@ -18,7 +18,7 @@ from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import of_repeats, shifted_by
-from campaign.estimation.sampled import LOST, SAMPLES, drop_interval_if_deterministic
+from campaign.estimation.sampled_curve import LOST, SAMPLES, drop_interval_if_deterministic
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of

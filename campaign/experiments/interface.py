@@ -1,4 +1,4 @@
-"""What an experiment is: options, how they become trials, and what their recordings say."""
+"""The interface of an experiment: options, trials, measurement, analysis."""
 
 from __future__ import annotations
 
@@ -10,14 +10,22 @@ from typing import Any, Protocol, TypeVar, cast
 
 from pydantic_core import to_json
 
-from campaign.axis_kind import BOTH_ROTARY, Sides, sides_in, speaking_of
+from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, sides_in
 from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
-from campaign.experiments.preparing.axis_units import estimate_here, of_its_axis
-from campaign.experiments.preparing.draws import draws_of, merged
-from campaign.experiments.preparing.swept_tables import table_names
-from campaign.experiments.preparing.unusable import doubt, doubted, not_measured, notes_on
+from campaign.experiments.post_processing.axis_units import (
+    estimate_in_axis_terms,
+    in_axis_units,
+)
+from campaign.experiments.post_processing.draws import draws_of, merged
+from campaign.experiments.post_processing.recording_checks import (
+    doubt,
+    doubted,
+    not_measured,
+    notes_on,
+)
+from campaign.experiments.post_processing.swept_tables import table_names
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError
@@ -255,8 +263,8 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
     that sweeps the seed of its bench's scatter each draw is analysed by itself. Metrics of trials
     of other kinds, which a model may suit, are those of other analyses, and not used.
     """
-    with speaking_of(_sides(data)):
-        return of_its_axis(_result_of(experiment, data))
+    with axis_terms(_sides(data)):
+        return in_axis_units(_result_of(experiment, data))
 
 
 def _sides(data: TestData) -> Sides:
@@ -339,7 +347,7 @@ def metrics(
     What was not determined is not archived, and comes back as such. Raises what `measure` raises.
     """
     found = data.estimates or measure(data)
-    return Metrics({each.name: estimate_here(each) for each in found})
+    return Metrics({each.name: estimate_in_axis_terms(each) for each in found})
 
 
 class Metrics(dict[str, Estimate]):
@@ -359,8 +367,8 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
         raise ValueError(wrong.reason.text)
     if experiment.measure is None:
         return ()
-    with speaking_of(sides_in(data.trial.bench)):
-        return tuple(map(estimate_here, experiment.measure(data)))
+    with axis_terms(sides_in(data.trial.bench)):
+        return tuple(map(estimate_in_axis_terms, experiment.measure(data)))
 
 
 def _own(experiment: Experiment, data: TrialData) -> TrialData:

@@ -1,4 +1,4 @@
-"""Moving the axis to an angle, or to and fro to warm it up: a trial like others, not analysed."""
+"""Moving the axis to an angle, or to and fro as a warm-up; not analyzed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import Field
 
 from campaign.channels import RELATIVE_ANGLE
 from campaign.estimation.intervals import of_series, shifted_by
-from campaign.estimation.sampled import shifted
+from campaign.estimation.sampled_curve import shifted
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.common import failures_note

@@ -1,4 +1,4 @@
-"""Presliding hysteresis: friction over small sinusoidal displacements, and the energy it takes.
+"""Presliding hysteresis: friction over small displacements, and lost energy.
 
 Below breakaway friction depends on displacement rather than on rate: it follows the displacement
 like a spring that yields, and comes back on another branch. The area of the loop is the energy lost
@@ -19,7 +19,7 @@ from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.shared import conclusion_parts as parts
-from campaign.experiments.shared import fitting_ramps
+from campaign.experiments.shared import default_ramps
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
@@ -317,7 +317,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     measure=_measure,
-    fit=fitting_ramps.presliding,
+    fit=default_ramps.presliding,
     perturbs_bench=True,
     requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

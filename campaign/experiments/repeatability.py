@@ -1,4 +1,4 @@
-"""Repeatability of the friction-velocity map: how far its parameters scatter from set to set.
+"""Repeatability of the parameters of a friction-velocity map.
 
 The whole map is measured several times, on different days or simply again. Each map is fitted on
 its own, in both directions; every parameter then has a mean and a relative standard deviation over
@@ -18,11 +18,11 @@ from campaign.estimation.intervals import of_repeats
 from campaign.estimation.scatter import relative_scatter
 from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import doubts
-from campaign.experiments.friction_map import fitting
+from campaign.experiments.friction_map import default_options
 from campaign.experiments.friction_map.conclusions import repeatability_conclusions
 from campaign.experiments.friction_map.curves import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
-from campaign.experiments.friction_map.repeated import (
+from campaign.experiments.friction_map.repeated_maps import (
     MapSet,
     overlay_figure,
     scatter_figure,
@@ -218,7 +218,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=measure,
     needs_samples=False,
-    fit=fitting.velocity_map,
+    fit=default_options.velocity_map,
     warnings=map_warnings,
     requires=REQUIRED,
     can_use=CAN_USE,

@@ -1,4 +1,4 @@
-"""Stick-slip: the load pulled through a spring whose far end moves at a constant rate.
+"""Stick-slip: the load on a spring whose far end moves at a constant rate.
 
 The load sticks while the spring is wound up, breaks loose at the static torque, overtakes the
 spring because sliding friction is smaller, and sticks again (Figure 2.12).
@@ -16,7 +16,7 @@ from pydantic import Field
 from campaign.channels import COMMAND, DRIVE_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_repeats, shifted_by
-from campaign.estimation.sampled import LOST, SAMPLES, bracketed, peak, upward_crossings
+from campaign.estimation.sampled_curve import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of

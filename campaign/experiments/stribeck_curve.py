@@ -1,4 +1,4 @@
-"""The Stribeck curve, measured: friction of steady sliding at many constant speeds.
+"""Stribeck curve: friction of steady sliding at many constant speeds.
 
 The load is moved at each speed exactly as prescribed, without a drive, in both directions. Once the
 bristles have settled, the friction torque lies on the curve that the model promises for steady
@@ -17,7 +17,7 @@ from pydantic import Field
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_series
-from campaign.estimation.sampled import drop_interval_if_deterministic, largest
+from campaign.estimation.sampled_curve import drop_interval_if_deterministic, largest
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of

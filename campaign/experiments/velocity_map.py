@@ -1,4 +1,4 @@
-"""Friction-velocity map: the drive torque of constant-velocity runs, and its Stribeck fit.
+"""Friction-velocity map: drive torque at constant velocities, with a Stribeck fit.
 
 Each trial runs out at one speed and back at the same, so it ends where it began and needs no
 homing. Steady sliding needs no drive but friction (Eq. 4.1 without acceleration), so the mean drive
@@ -8,14 +8,14 @@ torque over a settled window, less J times the residual acceleration, is one poi
 from __future__ import annotations
 
 from campaign.channels import COMMAND
-from campaign.experiments.friction_map import fitting
-from campaign.experiments.friction_map.choice import STAGE
+from campaign.experiments.friction_map import default_options
 from campaign.experiments.friction_map.conclusions import map_conclusions
 from campaign.experiments.friction_map.figures import example_figure
 from campaign.experiments.friction_map.map_fit import stretches_found
 from campaign.experiments.friction_map.map_result import one_map
 from campaign.experiments.friction_map.model import MODEL, identified
 from campaign.experiments.friction_map.pilot import PilotedMapOptions, trials
+from campaign.experiments.friction_map.pilot_choice import STAGE
 from campaign.experiments.friction_map.points import measure
 from campaign.experiments.friction_map.runs import (
     CAN_USE,
@@ -60,7 +60,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=measure,
     needs_samples=False,
-    fit=fitting.velocity_map,
+    fit=default_options.velocity_map,
     warnings=map_warnings,
     requires=REQUIRED,
     can_use={COMMAND: "command in the figure of one point", **CAN_USE},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from campaign.access import TrialView
+from campaign.api import TrialView
 from campaign.export.interface import ExportKind
 from campaign.plain_text import on_a_page
 from campaign.recording import Recording

@@ -1,4 +1,4 @@
-"""What a format is: it writes one trial's recording into one file."""
+"""The interface of an export format: one recording into one file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.access import TrialView
+from campaign.api import TrialView
 from campaign.recording import Recording
 
 

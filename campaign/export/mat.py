@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.access import TrialView
+from campaign.api import TrialView
 from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind

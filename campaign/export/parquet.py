@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from campaign.access import TrialView
+from campaign.api import TrialView
 from campaign.archive.reading.damage_words import in_words
 from campaign.errors import UsageError
 from campaign.export.interface import ExportKind

@@ -1,4 +1,4 @@
-"""A run into a folder of files: one per recording, and the table of trials beside them."""
+"""A run as a folder of files: one per recording, and a table of trials."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from campaign.access import RunView, TrialView
-from campaign.access.tables import trials_table
+from campaign.api import RunView, TrialView
+from campaign.api.tables import trials_table
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import FILE, damaged_csv, lost_trials
 from campaign.archive.reading.sound_samples import sound_part

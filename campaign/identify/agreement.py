@@ -1,4 +1,4 @@
-"""Whether methods that found the same number from other parts of the motion agree."""
+"""Agreement of methods that estimate one number from different motion."""
 
 from __future__ import annotations
 

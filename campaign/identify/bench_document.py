@@ -1,4 +1,4 @@
-"""The rig's bench file with what was identified: values, intervals, origins, and where from."""
+"""The bench file with identified values, intervals and origins."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from campaign import __version__
-from campaign.axis_kind import speaking_of, unit_here
+from campaign.axis_kind import axis_terms, axis_unit
 from campaign.errors import CampaignError
 from campaign.estimate import Estimate
 from campaign.identify.compensations import identified_compensations, without_identified
 from campaign.identify.identification import Identification, Section
-from campaign.identify.written import amount, known_of
+from campaign.identify.toml_numbers import amount, known_of
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.physics.friction import coulomb, friction_models
@@ -41,7 +41,7 @@ def bench_text(found: Identification, command: str) -> str:
     known: dict[str, Any] = {}
     correlations: list[list[Any]] = []
     sliding = _of_sliding(found.sections)
-    with speaking_of(found.bench.sides):
+    with axis_terms(found.bench.sides):
         for section in found.sections:
             filled = _going(section, sliding)
             for parameter in filled.values():
@@ -198,7 +198,7 @@ def _written(estimate: Estimate) -> Any:
 def _value(value: Any, unit: str) -> Any:
     if not isinstance(value, float):
         return value
-    return amount(value, unit_here(unit))
+    return amount(value, axis_unit(unit))
 
 
 def _correlations(section: Section, filled: Mapping[str, Parameter]) -> Iterator[list[Any]]:

@@ -1,4 +1,4 @@
-"""Compensations with identified values: of each that a bench has, a twin that holds them.
+"""Identified twins of a bench's compensations.
 
 A compensation has a model of all friction together, however many interfaces a rig has, so that it
 takes what goes to no interface of the bench: the curve of sliding, in both directions. The twin
@@ -22,7 +22,7 @@ from typing import Any
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Identification, Section
-from campaign.identify.written import amount, known_of
+from campaign.identify.toml_numbers import amount, known_of
 from campaign.parameter import Parameter
 from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
 from campaign.physics.loop import at_load

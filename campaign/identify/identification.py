@@ -1,4 +1,4 @@
-"""A rig identified from a run: every model that its trials suffice for, and what changed since."""
+"""Identification of a rig: every suitable model, and changes against a run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
@@ -27,7 +27,7 @@ from campaign.physics.bench import Bench
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
-from campaign.references.judged import Judged, with_verdicts
+from campaign.references.verdict import Judged, with_verdicts
 from campaign.result import Result
 
 FRICTION = "friction."
@@ -172,7 +172,7 @@ def _options(
         trees[str(name)][str(keys[0])] = override.value
         texts[str(name)] = override.text
     found: dict[str, Any] = {}
-    with speaking_of(bench.sides):
+    with axis_terms(bench.sides):
         for name, tree in trees.items():
             made = find_faults(known[name].model.options, tree)
             if isinstance(made, list):

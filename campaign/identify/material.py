@@ -1,4 +1,4 @@
-"""Which trials of which run are meant: `RUN`, or one of its tests as `RUN:TEST`."""
+"""The trials that `RUN` or `RUN:TEST` refers to."""
 
 from __future__ import annotations
 

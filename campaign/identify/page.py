@@ -1,4 +1,4 @@
-"""The identification as a folder: one self-contained page, its tables and figures, and JSON."""
+"""The identification as a folder: page, tables, figures, JSON."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from campaign import __version__
-from campaign.access.estimates import row_of
-from campaign.access.sentences import remarks, sentence
-from campaign.axis_kind import speaking_of, words_here
+from campaign.api.conclusion_sentences import remarks, sentence
+from campaign.api.estimates import row_of
+from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
 from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
 from campaign.report.article import write_article
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.figures import draw, series_of
 from campaign.report.formats.interface import Format
 from campaign.report.page.article import Article, Part, problems_part
+from campaign.report.page.article_page import Making
 from campaign.report.page.folder import ShownFigure
-from campaign.report.page.making import Making
 from campaign.report.page.pieces import Items, Paragraph, Piece
 from campaign.report.palette import Look, looks_of_page
 from campaign.result import Figure, Result
@@ -74,7 +74,7 @@ def article_of(found: Identification, command: str, bench: str = "") -> Article:
     """What the identification says."""
     making = _Making(looks=_looks(found))
     chosen, header = found.chosen, found.chosen.run.header
-    with speaking_of(found.bench.sides):
+    with axis_terms(found.bench.sides):
         parts = tuple(_parts(found, making))
     lede = f"Parameters of the rig from {chosen.name}"
     if found.validation:
@@ -136,7 +136,7 @@ def _found(
 def next_measurement(found: Identification) -> str:
     """About what methods disagree, and what to measure next to halve the widest interval."""
     widest_one = widest(found.parameters)
-    with speaking_of(found.bench.sides):
+    with axis_terms(found.bench.sides):
         advice = [] if widest_one is None else [_advice(widest_one)]
     return " ".join([*disagreements(found.sections), *advice])
 
@@ -151,7 +151,7 @@ def _advice(parameter: Parameter) -> str:
     parts = [part for part in estimate.systematic if part.standard_uncertainty]
     parts.sort(key=lambda part: -(part.standard_uncertainty or 0.0))
     if parts and 2.0 * estimate.systematic_uncertainty > scatter:
-        source = words_here(parts[0].source)
+        source = in_axis_terms(parts[0].source)
         cure = CURES.get(parts[0].source, f"know the {source} better")
         return (
             f"{begin} Most of it is systematic ({source}), and no longer recording makes that "

@@ -1,15 +1,15 @@
-"""Tables that every identification has: the parameters on one page, and what changed."""
+"""Tables of every identification: parameters and changes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from campaign.axis_kind import words_here
+from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.family import RATE
 from campaign.identify.identification import Section
-from campaign.references.judged import Judged
+from campaign.references.verdict import Judged
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit, words
 from campaign.units import convert
@@ -115,6 +115,6 @@ def systematic(estimate: Estimate, display: str = "") -> str:
         return f"{float(convert(size, estimate.unit, display)) if display else size:.2g}"
 
     return ", ".join(
-        f"{words_here(part.source)} {shown(part.standard_uncertainty)}"
+        f"{in_axis_terms(part.source)} {shown(part.standard_uncertainty)}"
         for part in estimate.systematic
     )

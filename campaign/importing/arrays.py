@@ -1,4 +1,4 @@
-"""Named arrays of a file as tables: vectors of one length stand together, with a clock if one is.
+"""Named arrays of a file as tables: equal lengths form a table with its clock.
 
 MAT and HDF5 files have no tables. What was recorded together has one length; a matrix is a column
 for each of its narrow side.

@@ -1,4 +1,4 @@
-"""What a cell of a text file may be: a number in either notation, a unit, a name with a unit."""
+"""Cells of a text file: numbers in either notation, units, names with units."""
 
 from __future__ import annotations
 

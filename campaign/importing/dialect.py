@@ -1,4 +1,4 @@
-"""How a text file writes its table: encoding, separator, decimal sign, and where its rows begin.
+"""Dialect of a text table: encoding, separator, decimal sign, first row.
 
 Nothing is taken for granted of the first line. A way of reading is tried on the end of a sample,
 where the rows are, and followed upwards; what is above is heading. The way that makes most of the

@@ -1,4 +1,4 @@
-"""What a file from elsewhere holds: named columns on clocks, with what the file says of them.
+"""Contents of an imported file: named columns on clocks.
 
 Nothing is converted here and nothing is guessed: a unit is text, a number what was written.
 """

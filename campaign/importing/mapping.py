@@ -1,4 +1,4 @@
-"""What a mapping says: which columns are which channels, and which files are which trials.
+"""The mapping file: columns to channels, files to trials.
 
 A mapping is a protocol whose tests were executed elsewhere: `[columns.NAME]` tells how columns
 become channels, `[[test.recording]]` which files a test has in place of trials. What stands there

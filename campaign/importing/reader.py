@@ -1,4 +1,4 @@
-"""Samples of a described recording: read again from its files, block by block."""
+"""Samples of a described recording, read block by block."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from campaign.importing.defects import Defect, find
 from campaign.importing.defects.clock import EvenClock, even_clock
 from campaign.importing.defects.samples import continuous
-from campaign.importing.described import Cells, ClockUsed, Described, Made, file_used
+from campaign.importing.description import Cells, ClockUsed, Described, Made, file_used
 from campaign.importing.interface import ROWS, Array, RecordingError
-from campaign.importing.opened import OpenedFiles
+from campaign.importing.open_files import OpenedFiles
 from campaign.recording import Channel, Recording
 
 AT_ONCE = 2_000_000

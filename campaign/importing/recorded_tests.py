@@ -1,4 +1,4 @@
-"""A protocol whose tests were executed elsewhere: each test's recordings in place of its trials."""
+"""A protocol of imported recordings in place of planned trials."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from pydantic import JsonValue
 
 from campaign.errors import Problem, ProtocolError
 from campaign.estimate import Window
-from campaign.importing.cutting import Stretch
-from campaign.importing.described import Described
-from campaign.importing.describing import describe
+from campaign.importing.derived_channels import RigFacts, sufficient
+from campaign.importing.description import Described
 from campaign.importing.interface import RecordingError
-from campaign.importing.made import RigFacts, sufficient
+from campaign.importing.mapped_trials import describe
 from campaign.importing.mapping import Layout, MappingError, RecordingEntry, layouts, recordings_of
-from campaign.importing.opened import OpenedFiles
+from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader
+from campaign.importing.trial_rows import Stretch
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Origin, Within
 from campaign.protocol.problems import allowed, shown

@@ -1,4 +1,4 @@
-"""Rows of a text table as numbers: quickly where all is as expected, cell by cell where not.
+"""Rows of a text table as numbers: a fast path, and cell by cell.
 
 A row that is not like the others is refused by line and column; it is never padded, and never moves
 the cells of the others. Memory holds one block, however long the file is.

@@ -1,4 +1,4 @@
-"""Taking the records of a running trial: every sample is right, or is NaN and said to be lost."""
+"""Collecting the records of a running trial; a lost sample is NaN and noted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The host's side of the relay: starts it, hands it frames, takes what comes from the port."""
+"""The host's side of the relay: start, frames out, frames in."""
 
 from __future__ import annotations
 

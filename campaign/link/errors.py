@@ -1,4 +1,4 @@
-"""What can go wrong in a session. None of these reaches a user: each becomes an Ending."""
+"""Errors of a session; each becomes an Ending."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who a host is, in the words that a controller keeps and tells to whoever asks."""
+"""The identity of a host, as a controller keeps and reports it."""
 
 from __future__ import annotations
 

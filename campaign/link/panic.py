@@ -1,4 +1,4 @@
-"""What a controller's latch means: somebody stopped the bench from outside."""
+"""A controller's latch as seen by the host."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the relay and its parent say to each other: one byte of kind, four of length, a payload."""
+"""Messages between relay and parent: kind (1 byte), length (4 bytes), payload."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The port a controller hangs on: a serial device, or TCP written as `socket://HOST:PORT`."""
+"""The port of a controller: a serial device, or TCP as `socket://HOST:PORT`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Records in order: what has come of a trial, what is missing, and what has to be asked for again.
+"""Ordered records of a trial: received, missing, to be requested again.
 
 A device numbers everything that it records in a trial in one sequence. Here the numbers are put in
 order, doubles are dropped, and a number that stays away is asked for again with growing patience.

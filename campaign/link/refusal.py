@@ -1,4 +1,4 @@
-"""What no controller on a cable can do: known from the plan alone, before anything is connected."""
+"""Plans that no controller can execute, refused before a connection."""
 
 from __future__ import annotations
 

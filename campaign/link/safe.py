@@ -1,4 +1,4 @@
-"""Frames that need no session, and watching for the answer that the bench is safe, and stays so.
+"""Frames without a session, and the wait for a confirmed safe state.
 
 The relay imports this: nothing heavy may be imported here.
 """

@@ -1,4 +1,4 @@
-"""A conversation with one controller: commands with answers, and whatever it says by itself."""
+"""A session with one controller: commands, answers, unsolicited messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one controller is set to for a trial, and what it says that it does not take."""
+"""Settings of a controller for a trial, and those it rejects."""
 
 from __future__ import annotations
 

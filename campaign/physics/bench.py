@@ -21,15 +21,15 @@ from pydantic import (
     model_validator,
 )
 
-from campaign.axis_kind import AxisKind, Sides, sides_in, speaking_of
+from campaign.axis_kind import AxisKind, Sides, axis_terms, sides_in
 from campaign.options import Options
+from campaign.physics.bench_knowledge import KnownOptions, known_in_si
 from campaign.physics.bench_paths import wrong_paths
 from campaign.physics.compensation import CompensationField
 from campaign.physics.friction import FrictionField
 from campaign.physics.friction.interface import FrictionOptions
 from campaign.physics.friction_paths import invalid
 from campaign.physics.gear import GearOptions
-from campaign.physics.known import KnownOptions, known_in_si
 from campaign.physics.preload import loading, with_preload
 from campaign.physics.scatter import VariationOptions, acting
 from campaign.physics.sensors import SensorsOptions
@@ -350,7 +350,7 @@ class Bench(Options):
         cls, tree: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
     ) -> Self:
         """Scatter, preload and what is known name what is there; all else would silently not be."""
-        with speaking_of(sides_in(tree)):
+        with axis_terms(sides_in(tree)):
             bench = handler(tree)
         preload = None if bench.gear is None else bench.gear.preload
         wrong = list(wrong_paths(tree, bench.friction, bench.variation, preload))

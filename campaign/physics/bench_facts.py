@@ -1,4 +1,4 @@
-"""What somebody new to a bench should know before trusting it: sizes that have to fit each other.
+"""Facts of a bench to check before use: sizes that must match.
 
 Each fact sets one size against another of the same unit, the smaller the share the better: a count
 against what has to be resolved, friction against what drives, one bandwidth against the next.
@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from campaign.axis_kind import speaking_of, unit_here, words_here
+from campaign.axis_kind import axis_terms, axis_unit, in_axis_terms
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, control_rate, lacking
 from campaign.physics.friction import friction_models
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import loops_of
+from campaign.physics.plan_loops import loops_of
 from campaign.physics.resolution import rate_of_one_count
 from campaign.physics.variation import of_its_day
 
@@ -64,11 +64,11 @@ class _Scale:
 
     def __call__(self, subject: str, value: float, against: float, unit: str, display: str) -> Fact:
         share = value / against
-        subject, unit, display = words_here(subject), unit_here(unit), unit_here(display)
+        subject, unit, display = in_axis_terms(subject), axis_unit(unit), axis_unit(display)
         if share <= self.fine:
             return Fact(subject, value, against, unit, display, "fine", "")
         word = self.words[0] if share <= self.usable else self.words[1]
-        return Fact(subject, value, against, unit, display, word, words_here(self.advice))
+        return Fact(subject, value, against, unit, display, word, in_axis_terms(self.advice))
 
 
 _COARSE = ("coarse", "too coarse")
@@ -122,7 +122,7 @@ _CURRENT_LOOP = _Scale(
 def facts_of(bench: Bench) -> tuple[Fact, ...]:
     """All that can be told of this bench, on its day; what it does not have is left out."""
     today = of_its_day(bench)
-    with speaking_of(bench.sides):
+    with axis_terms(bench.sides):
         found = (*_sensors(today), *_presliding(today), *_torques(today))
         return found if lacking(bench) else (*found, *_bandwidths(complete(bench)))
 

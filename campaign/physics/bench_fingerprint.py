@@ -1,4 +1,4 @@
-"""Which bench it is: a hash over the SI values that act on motion.
+"""Fingerprint of a bench: a hash of the SI values that affect motion.
 
 Left out is what acts on nothing: names, comments, limits, how well values are known, and whatever
 is absent, off or at its default, so that an optional field of a later program alters no bench. Each
@@ -17,8 +17,8 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
 from campaign.physics.bench import Bench
+from campaign.physics.bench_knowledge import FingerprintOptions
 from campaign.physics.friction.interface import Ripple
-from campaign.physics.known import FingerprintOptions
 from campaign.physics.scatter import VariationOptions
 from campaign.trial import canonical_json
 

@@ -1,4 +1,4 @@
-"""Whether what a bench says of scatter and preload leads to friction that it has."""
+"""Whether scatter and preload of a bench refer to existing friction."""
 
 from __future__ import annotations
 

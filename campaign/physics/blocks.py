@@ -1,4 +1,4 @@
-"""The arrays of one trial, or of a block of trials side by side, as the engine takes them.
+"""Arrays of one trial, or of several side by side, for the engine.
 
 The last axis has the lanes; w is their number. Inside the engine, the functions here give the same
 without that axis, as arrays of its numbers (`campaign.physics.vector`): each number has all lanes.
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.vector import (
     CACHE_LINE,
     by_lanes,
@@ -71,7 +71,7 @@ class Dry(NamedTuple):
 class Elements(NamedTuple):
     """Friction models by lanes, as plant or as compensation: k interfaces besides the dry ones.
 
-    Those that are alike are asked together, as one of g groups (`campaign.physics.alike`).
+    Equal ones are one of g groups, asked together (`campaign.physics.equal_interfaces`).
     """
 
     address: NDArray[np.uintp]  # (g,) compiled step functions, for this many lanes and interfaces

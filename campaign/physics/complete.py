@@ -1,4 +1,4 @@
-"""A bench of which everything is known that a simulation needs, and what one lacks to be it.
+"""Completeness of a bench for simulation, and its missing values.
 
 A bench is facts: whoever analyses recordings writes what is known. The equations of motion need
 more, and here is the one place that says what, and what each is for.

@@ -1,4 +1,4 @@
-"""Dry friction of all lanes, as the engine calls it: in the plant, and as a compensation.
+"""Dry friction of all lanes: in the plant, and as a compensation.
 
 `campaign.physics.dry_step` has the scheme; here its numbers are taken from where they stand. The
 functions that the engine calls are in the order in which it does:
@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from campaign.physics.blocks import Array, Dry, Elements, System
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.dry_step import Limits, Response, crossing, holding_line, step_of
 from campaign.physics.elementary import any_of, fma, sin, where
 from campaign.physics.friction_lines import AMPLITUDE, PERIODS, PHASE

@@ -1,4 +1,4 @@
-"""Dry friction over one step: sliding, stuck, or an event in between, to second order in the step.
+"""One step of dry friction: sliding, stuck, or an event, to second order.
 
 Dry friction is a set at rest, |T| <= Ts, and s(v) sgn(v) when sliding (Equation 4.6). Parallel dry
 interfaces share one relative rate, so they slide and stick together: the sum of their curves is
@@ -34,7 +34,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from campaign.physics.compiled import called
+from campaign.physics.compilation import called
 
 
 class Response(NamedTuple):

@@ -1,4 +1,4 @@
-"""exp, expm1, log, power, sin, cos and tanh whose bits do not depend on how they were compiled.
+"""exp, expm1, log, power, sin, cos, tanh with reproducible bits.
 
 A loop over lanes is compiled to SIMD instructions, its remainder and a single call to scalar ones.
 Mathematical libraries use another algorithm for a vector than for a number, and another one on
@@ -33,7 +33,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.vector import Vector, call_llvm, splat, vector_among
 
 _TO_INTEGER = 1.5 * 2.0**52

@@ -1,4 +1,4 @@
-"""The engine: advances loop, friction and controller step by step in compiled code.
+"""The engine: loop, friction and controller, step by step, compiled.
 
 Scheme: everything linear is exact (`campaign.physics.loop.discretise`). Each friction model is
 asked once per step for its torque as a straight line over the step, from the relative rate at the
@@ -31,7 +31,7 @@ from campaign.physics.blocks import (
     memory_of,
     system_of,
 )
-from campaign.physics.compiled import entry, inlined
+from campaign.physics.compilation import entry, inlined
 from campaign.physics.dry_friction import (
     add_line,
     dry_torque_as_it_begins,
@@ -74,7 +74,7 @@ from campaign.physics.rows import (
     RATE,
     RELATIVE_ANGLE,
 )
-from campaign.physics.sampled import sample
+from campaign.physics.sampled_controller import sample
 from campaign.physics.vector import (
     LANES,
     by_lanes,

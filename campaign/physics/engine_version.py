@@ -1,4 +1,4 @@
-"""Which engine computed a recording."""
+"""Version of the engine, archived with every recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction models made ready for the engine: those of one trial, and of several side by side."""
+"""Friction models prepared for the engine: of one trial, and of several."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.alike import alike, side_by_side
 from campaign.physics.blocks import Dry, Elements, by_lane, zeros
 from campaign.physics.complete import CompleteBench
+from campaign.physics.equal_interfaces import alike, side_by_side
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import DryFriction, FrictionOptions
 from campaign.physics.loop import Array, at_load, viscous_at_load

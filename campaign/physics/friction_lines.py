@@ -1,9 +1,9 @@
-"""Asking every friction model of a block for its torque line over a step."""
+"""Torque lines of all friction models of a block over a step."""
 
 from __future__ import annotations
 
 from campaign.physics.blocks import Array, Elements
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.elementary import fma, sin, where
 from campaign.physics.rows import (
     CHANGE,

@@ -1,4 +1,4 @@
-"""Paths to the friction parameters of a bench, and the tables that say something of each.
+"""Paths to friction parameters of a bench, and the tables that use them.
 
 `coulomb_torque` (or `*.coulomb_torque`) means every interface whose model declares it, and
 `load.coulomb_torque` that of one interface. In a table such a path is a key, or a key within the

@@ -1,4 +1,4 @@
-"""The gear between motor and load, as the bench's file describes it."""
+"""The gear between motor and load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The time grid of a simulation: its integration step, and how it fits recording and controller."""
+"""The time grid of a simulation: integration step, recording, controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trials made ready for the engine: one lane each, and several side by side."""
+"""Trials prepared for the engine: one lane each, several side by side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether measured samples keep a bench's limits: one judgement for simulation, host and C.
+"""Limit checks of measured samples, for simulation, host and C.
 
 Angle, drive torque and motor current are judged at every sample. The rate is not: a rate that is
 made by differencing an encoder shows one count of it as `resolution * sample_rate`, which may be
@@ -33,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, words_here
+from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
 from campaign.physics.bench import LimitsOptions
 from campaign.units import in_words
 
@@ -179,7 +179,7 @@ class LimitWatch:
     def _violation(
         self, watched: Watched, index: int, value: float, bound: float, time: float
     ) -> Violation:
-        with speaking_of(self._sides):
+        with axis_terms(self._sides):
             text = self._text(watched, value, bound, time)
         sample = self._seen + index
         return Violation(sample, index, watched.limit, watched.channel, value, bound, text)
@@ -191,5 +191,5 @@ class LimitWatch:
             mean = f" (mean of {self._count / self._sample_rate * 1e3:.4g} ms)"
         return (
             f"{watched.channel} reached {shown}{mean} at {time:.4g} s; "
-            f"the {words_here(watched.limit)} limit is {limit}"
+            f"the {in_axis_terms(watched.limit)} limit is {limit}"
         )

@@ -1,4 +1,4 @@
-"""Friction linearised in one of two regimes, as the load of a bench meets it.
+"""Friction linearized at rest or in sliding.
 
 Stuck: every interface in presliding, a spring and a damper. Sliding: every interface far above its
 Stribeck velocity, where only what grows with the rate is left. Between the two friction *falls*

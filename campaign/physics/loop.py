@@ -1,4 +1,4 @@
-"""The stabilization loop of Figure 5.3 as one linear system, without its friction.
+"""The stabilization loop of Figure 5.3 as a linear system without friction.
 
 Everything linear is one matrix: rigid axis, gear, motor with back-EMF, the current loop, viscous
 friction, and, where the controller is continuous, the rate loop, the filter of the relative rate

@@ -1,4 +1,4 @@
-"""How far a loop is from instability: crossover, margins and poles of its open loop L.
+"""Crossover, margins and poles of the open loop L.
 
 The closed loop is 1 / (1 + L). Every crossing of |L| = 1 and every crossing of the negative real
 axis counts, either way: the worst is the margin. All are computed on a frequency grid that follows

@@ -1,10 +1,10 @@
-"""The machine code that simulations need, made before anybody waits for it.
+"""Machine code for simulations, compiled ahead.
 
 The engine has four entry points, for one trial and for a block of LANES trials, with a plant and
 at a prescribed motion; each has one signature, whatever the bench. Friction models have functions
 of their own, compiled for the lanes of either, for the sizes that their options give, and for how
 many of a kind a bench has side by side: what a trial needs is made when it is made ready. All of it
-is kept on disk (`campaign.physics.compiled`), so it is made once per installation.
+is kept on disk (`campaign.physics.compilation`), so it is made once per installation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 from llvmlite import binding
 from numba.core import event
 
-from campaign.physics.compiled import cache_folder, is_kept_for_good
+from campaign.physics.compilation import cache_folder, is_kept_for_good
 from campaign.physics.complete import CompleteBench
 from campaign.physics.lanes import Lane, together
 from campaign.physics.simulate import simulate_together

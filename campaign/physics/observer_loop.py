@@ -1,4 +1,4 @@
-"""What a disturbance observer does to the linear loop: Equations 5.4 and 5.5 with a PI controller.
+"""Effect of a disturbance observer on the linear loop (Equations 5.4, 5.5).
 
 The thesis derives both for a rate controller that is one constant G_cv. A bench has a PI, and may
 give its observer an inertia J' of its own. Without delay and with an ideal current loop, with

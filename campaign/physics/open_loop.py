@@ -1,4 +1,4 @@
-"""The loop of a bench, opened at one place: linear, with every delay, filter and compensation.
+"""The open loop of a bench: linear, with delays, filters and compensation.
 
 The **rate loop** is opened at the error of the rate controller, r - w as the gyro reads w: one
 signal, the one that the gain Kpv multiplies and that the experiment `frequency_response` opens by

@@ -1,4 +1,4 @@
-"""The preload of the anti-backlash gear, and the friction it adds."""
+"""Preload of the anti-backlash gear, and its friction."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator
 
-from campaign.axis_kind import unit_here
+from campaign.axis_kind import axis_unit
 from campaign.options import Options
 from campaign.physics.friction_paths import (
     INTERFACE,
@@ -143,7 +143,7 @@ def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) 
     def more(parameter: str, value: float) -> float:
         raised = value + added.get(parameter, 0.0)
         if raised <= 0 < value:
-            unit = unit_here("N m")
+            unit = axis_unit("N m")
             raise ValueError(
                 f"a preload of {torque:g} {unit} leaves friction.{name} with a {parameter} of "
                 f"{raised:.4g} {unit}; raise preload.torque or lower its share"

@@ -1,4 +1,4 @@
-"""Limits that the sensors' resolution alone would break: what one count reads as beside them.
+"""Limits that the sensors' resolution alone would exceed.
 
 A sensor that toggles between two counts while its axis stands still must not end a trial. What one
 count comes to in the channel that a limit is watched in:

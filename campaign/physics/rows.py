@@ -1,4 +1,4 @@
-"""What the rows of the simulation's arrays mean: states, inputs, sensors, outputs.
+"""Meaning of the rows of simulation arrays: states, inputs, sensors, outputs.
 
 The loop's matrices, the engine and the friction models exchange arrays whose first axis has these
 rows, and whose last axis has the lanes: trials that are simulated at once, each with parameters of

@@ -1,4 +1,4 @@
-"""How the friction of a simulated bench scatters: what a bench says of it in `[variation]`."""
+"""Scatter of a bench's friction: the `[variation]` table."""
 
 from __future__ import annotations
 

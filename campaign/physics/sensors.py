@@ -1,4 +1,4 @@
-"""The sensors of a bench, as its file describes them."""
+"""The sensors of a bench."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Roll of a ship in irregular beam seas: a wave spectrum through a second-order roll response.
+"""Roll of a ship in irregular beam seas: wave spectrum and second-order response.
 
 Long-crested deep-water waves meet a ship without way from abeam. With f the frequency and w = 2 pi
 f, the one-sided spectra per hertz are

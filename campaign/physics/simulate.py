@@ -1,4 +1,4 @@
-"""Simulating tasks on benches, stretch by stretch, so that memory stays flat at any length.
+"""Simulation of tasks on benches, in stretches of bounded memory.
 
 Trials of one structure can be simulated together, in blocks of lanes; each one's samples are, to
 the bit, what they are when it is simulated alone.
@@ -17,7 +17,7 @@ from campaign.physics.engine import advance_block, advance_one
 from campaign.physics.grid import Grid, make_grid
 from campaign.physics.lanes import Lane, Lanes, together
 from campaign.physics.loop import Array
-from campaign.physics.prescribed import drive_block, drive_one
+from campaign.physics.prescribed_motion import drive_block, drive_one
 from campaign.physics.rows import OUT_FRICTION, OUTPUTS
 from campaign.physics.vector import LANES
 from campaign.trial import Task

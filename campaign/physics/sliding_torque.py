@@ -1,4 +1,4 @@
-"""The sliding torque of a dry friction model, and how the engine calls one it has never seen.
+"""Sliding torque of a dry friction model, and its call from the engine.
 
 It is plain Python of a few lines, for one interface of one trial, compiled as a step function is
 (`campaign.physics.step_function`), and has the same to call and to avoid::
@@ -23,7 +23,7 @@ from numba import carray
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from campaign.physics.compiled import compiled_callback
+from campaign.physics.compilation import compiled_callback
 from campaign.physics.rows import ASKED_DIRECTION, ASKED_SPEED, HAS, HAS_RATE, HAS_TORQUE
 from campaign.physics.step_function import SIGNATURE, own_name
 from campaign.physics.vector import MOST_ROWS

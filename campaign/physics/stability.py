@@ -1,4 +1,4 @@
-"""Whether the rate loop with a compensation is stable while it slides: how fast its modes grow.
+"""Stability of the sliding rate loop with a compensation.
 
 It is the loop of `open_loop`, closed. Dry friction is left out (sliding, it is a constant; stuck,
 it holds the load); viscous friction is in.

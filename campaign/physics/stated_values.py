@@ -1,4 +1,4 @@
-"""What a bench file states of a number that a test finds, and how well it says that it knows it."""
+"""Values and uncertainties that a bench file states for findings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from campaign.estimate import Estimate, Origin
 from campaign.physics.bench import Bench
-from campaign.physics.known import NORMAL_95, number_at
+from campaign.physics.bench_knowledge import NORMAL_95, number_at
 from campaign.physics.true_values import true_value
 
 LEVEL = 0.95

@@ -1,4 +1,4 @@
-"""Friction of steady sliding, summed over all interfaces of a bench, as the load meets it."""
+"""Friction of steady sliding, summed over the interfaces at the load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The integration step that a trial needs, from its bench and task alone: nothing is simulated.
+"""The integration step of a trial from its bench and task.
 
 Everything linear is exact at any step (`campaign.physics.loop.discretise`). What a step must
 resolve is friction with bristles, and what it excites. At the load, with sums over the interfaces

@@ -1,4 +1,4 @@
-"""The step function of a friction model, and how the engine calls one it has never seen.
+"""The step function of a friction model, and its call from the engine.
 
 A step function is plain Python of a few lines, for one interface of one trial::
 
@@ -33,7 +33,7 @@ from numba.core.errors import NumbaError
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from campaign.physics.compiled import compiled_callback, inlined
+from campaign.physics.compilation import compiled_callback, inlined
 from campaign.physics.elementary import where
 from campaign.physics.rows import (
     ANSWERS,

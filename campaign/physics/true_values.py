@@ -1,4 +1,4 @@
-"""What is true of a simulated bench: the numbers that an identification of it should find.
+"""True values of a simulated bench for findings.
 
 Torques are those at the load, summed over the interfaces, at the mean of their ripple over
 position, and with the preload and the scatter that the bench given has: `variation.of_its_day`,

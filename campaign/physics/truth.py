@@ -1,4 +1,4 @@
-"""The bench that is simulated, where it is another one than the bench that is stated.
+"""The simulated bench where it differs from the stated one.
 
 Whoever plans and analyses a trial knows the stated bench. Its controller, compensation and limits
 are software, and act on the truth as they act on a rig: with the stated inertia, the stated torque

@@ -1,4 +1,4 @@
-"""What a bench's friction is today: the day's drift, the scatter of one trial, the preload.
+"""Actual friction of a bench: drift of the day, scatter of a trial, preload.
 
 A real axis is never quite the axis of yesterday. A bench says how much its friction parameters
 scatter from day to day and from trial to trial; the draw depends on seeds and the day alone, so

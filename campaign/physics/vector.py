@@ -1,4 +1,4 @@
-"""Vectors of lanes: one number of each trial of a block, which compiled code treats as one number.
+"""Vectors of lanes: one number per trial of a block, as one value in compiled code.
 
 The engine is written as for a single trial. Compiled for a block, its numbers are vectors with a
 lane for each trial, and `a + b` adds lane by lane, in SIMD instructions of whatever width the

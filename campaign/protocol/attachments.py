@@ -1,4 +1,4 @@
-"""Files that the options of a test name, such as a measured series: read when the protocol is."""
+"""Files named by options of a test, read with the protocol."""
 
 from __future__ import annotations
 

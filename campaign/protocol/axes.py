@@ -1,4 +1,4 @@
-"""Validating a matrix: every path must lead somewhere, every value must be valid in its place."""
+"""Validation of a matrix: existing paths and valid values."""
 
 from __future__ import annotations
 

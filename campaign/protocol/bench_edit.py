@@ -1,4 +1,4 @@
-"""Writing into a bench's file what is known of it; comments and all else stay as they are."""
+"""Editing the `[known]` table of a bench file; all else stays unchanged."""
 
 from __future__ import annotations
 

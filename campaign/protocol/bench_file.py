@@ -1,4 +1,4 @@
-"""A bench on its own, from its TOML file or by the name of a shipped one."""
+"""A bench by itself, from its TOML file or a shipped name."""
 
 from __future__ import annotations
 

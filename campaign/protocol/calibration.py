@@ -1,4 +1,4 @@
-"""What a protocol says about fitting its bench: the `[calibration]` table."""
+"""The `[calibration]` table of a protocol."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One trial again and again, to see that the bench is still the same bench: `[check]`."""
+"""Repeated check trials of a run: `[check]`."""
 
 from __future__ import annotations
 

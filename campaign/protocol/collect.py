@@ -1,4 +1,4 @@
-"""Collecting the tests of a protocol and of everything it includes, before any is validated."""
+"""Tests of a protocol and its includes, before validation."""
 
 from __future__ import annotations
 

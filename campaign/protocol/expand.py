@@ -1,4 +1,4 @@
-"""From a test to its trials: every point, every repetition, in order, each with its own seed."""
+"""From a test to its trials: points, repetitions, order, seeds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from campaign.axis_kind import each_speaking_of, sides_in, speaking_of, words_here
+from campaign.axis_kind import axis_terms, each_in_axis_terms, in_axis_terms, sides_in
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError
@@ -20,7 +20,7 @@ from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_
 from campaign.protocol.points import Point, PointError, incomplete, points_of
 from campaign.protocol.schema import ExperimentKind, Test
 from campaign.protocol.stages import PlannedStage, most_of, planned_stages
-from campaign.protocol.told import told_point
+from campaign.protocol.swept_value_text import told_point
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 Names = tuple[str, ...]
@@ -137,7 +137,7 @@ def _no_stages(places: Sequence[_Place]) -> str:
 def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
     """The stages that may follow at a point. Raises PointError."""
     try:
-        with speaking_of(point.bench.sides):
+        with axis_terms(point.bench.sides):
             return list(planned_stages(test, point, seed))
     except (ValueError, ArithmeticError) as error:
         raise _refused(test, point, error) from None
@@ -148,9 +148,9 @@ def _warnings(test: Test, point: Point) -> list[str]:
     if test.experiment.warnings is None:
         return []
     try:
-        with speaking_of(point.bench.sides):
+        with axis_terms(point.bench.sides):
             warned = test.experiment.warnings(point.options, point.bench)
-            return [words_here(text) for text in warned]
+            return [in_axis_terms(text) for text in warned]
     except (ValueError, ArithmeticError) as error:
         raise _refused(test, point, error) from None
 
@@ -160,8 +160,8 @@ def _refused(test: Test, point: Point, error: Exception) -> PointError:
     if isinstance(error, IncompleteBenchError):
         return incomplete(test, error)
     where = f" at {point.label}" if point.values else ""
-    with speaking_of(point.bench.sides):
-        message = f"test '{test.entry.name}'{where}: {words_here(first_line(error))}"
+    with axis_terms(point.bench.sides):
+        message = f"test '{test.entry.name}'{where}: {in_axis_terms(first_line(error))}"
     return PointError([test.origin.problem((), "value", message)])
 
 
@@ -171,7 +171,7 @@ def _requests(
     """What the experiment asks for at a point, with bench and truth, checked as only a plan can."""
     try:
         asked = test.experiment.trials(point.options, point.bench)
-        for request in each_speaking_of(point.bench.sides, asked):
+        for request in each_in_axis_terms(point.bench.sides, asked):
             bench, tree = _bench_for(request, point, own_benches)
             name, names = request.task.compensation, ["none", *bench.compensation]
             if name not in names:
@@ -255,8 +255,8 @@ def _trial(
     options = place.point.options_tree if request.planned else place.point.written
     requires, can_use = channels_of(test.experiment, request)
     swept = {**place.point.values, **request.point}
-    with speaking_of(sides_in(place.bench_tree)):
-        note = words_here(request.note)
+    with axis_terms(sides_in(place.bench_tree)):
+        note = in_axis_terms(request.note)
         told = told_point(test.experiment.options, test.options, request.point)
     return Trial.model_construct(
         number=number,

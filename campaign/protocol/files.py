@@ -1,4 +1,4 @@
-"""Reading TOML files that somebody else wrote: any of them may be missing, huge or not TOML."""
+"""Reading untrusted TOML files."""
 
 from __future__ import annotations
 

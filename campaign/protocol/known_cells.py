@@ -1,4 +1,4 @@
-"""Whether the published cells that a bench says it was made from are there."""
+"""Existence of the published cells that a bench refers to."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from campaign.errors import Problem, UsageError
-from campaign.physics.known import KnownOptions
+from campaign.physics.bench_knowledge import KnownOptions
 from campaign.protocol.files import Origin, UnreadableError, looked_for, read_text
 from campaign.protocol.problems import shown
 from campaign.published.patterns import covers

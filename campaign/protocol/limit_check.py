@@ -1,4 +1,4 @@
-"""Refusing a plan that would break a limit, before anything moves."""
+"""Refusal of a plan that would exceed a limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a TOML file to a validated protocol: all that is wrong with it is said at once."""
+"""From a TOML file to a validated protocol, with all mistakes at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from campaign.axis_kind import sides_in, speaking_of
+from campaign.axis_kind import axis_terms, sides_in
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
@@ -53,7 +53,7 @@ from campaign.protocol.schema import (
     split_entry,
 )
 from campaign.protocol.truth_file import Truths
-from campaign.published.calibrated import FOLDER, file_name
+from campaign.published.calibration_covariance import FOLDER, file_name
 from campaign.text import nearest
 
 
@@ -207,7 +207,7 @@ class _Loader:
             folder = bench.file.parent
             self._report(*cell_problems(valid.known, bench_origin, folder))
         options = self._attached(draft, experiment, options)
-        with speaking_of(sides_in(tree)):
+        with axis_terms(sides_in(tree)):
             axes = self._axes(draft, experiment, options, known)
             self._options(draft, experiment, options, axes)
         if isinstance(entry, list) or known is None or tree is None or bench is None:
@@ -220,7 +220,7 @@ class _Loader:
         )
         self._compensation(test, known)
         if not is_large(axes, entry.repeat):
-            with speaking_of(sides_in(tree)):
+            with axis_terms(sides_in(tree)):
                 self._report(*value_problems(test))
         self._operator(test)
         return test

@@ -1,4 +1,4 @@
-"""Refusing a plan with an unstable loop before anything moves, and saying which loops are close."""
+"""Refusal of a plan with an unstable loop, and warnings for close ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from campaign.errors import LimitError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import complete
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import LoopUse, loops_of
+from campaign.physics.plan_loops import LoopUse, loops_of
 from campaign.protocol.plan import Plan, PlannedTest
 
 TWO_PI = 2.0 * math.pi

@@ -1,4 +1,4 @@
-"""The matrix of a test: what is swept, over which values, and their product."""
+"""The matrix of a test: swept paths, values, product."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan takes in memory, known before it is made: counted in whole numbers, not expanded.
+"""Memory of a plan, estimated before it is made.
 
 The bytes are measured (trial, margins, seed, place; a bench with its tree and its loops) and
 rounded up. What a protocol asks for beyond the bound is refused, whatever `--allow-large` says: a

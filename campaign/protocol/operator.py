@@ -1,4 +1,4 @@
-"""What a person must do to the bench: `[[test.operator]]`, rendered at each point of the matrix."""
+"""Operator steps: `[[test.operator]]`, rendered at each point."""
 
 from __future__ import annotations
 

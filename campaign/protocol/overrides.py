@@ -1,4 +1,4 @@
-"""What `--set dotted.path=value` on the command line means."""
+"""`--set dotted.path=value` on the command line."""
 
 from __future__ import annotations
 

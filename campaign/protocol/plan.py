@@ -1,4 +1,4 @@
-"""From a protocol to a plan: every trial resolved, numbered, seeded and held against the limits."""
+"""From a protocol to a plan: trials resolved, numbered, seeded, checked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.physics.complete import IncompleteBenchError
 from campaign.physics.limits import Margin, margins
-from campaign.physics.loops_used import LoopUse, loops_used
+from campaign.physics.plan_loops import LoopUse, loops_used
 from campaign.physics.resolution import CLOSE, resolution_margins
 from campaign.physics.truth import digest
 from campaign.policy import Policy
@@ -27,8 +27,8 @@ from campaign.protocol.expand import (
     seed_of,
     size_problem,
 )
-from campaign.protocol.lacking import not_predicted
 from campaign.protocol.matrix import LARGEST_PLAN, count_points
+from campaign.protocol.missing_values import not_predicted
 from campaign.protocol.points import PointError, first_point, incomplete
 from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import Protocol, Test

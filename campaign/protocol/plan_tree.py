@@ -1,4 +1,4 @@
-"""A plan as plain data, for `campaign plan --json`."""
+"""A plan as plain data for `campaign plan --json`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from campaign.physics.limits import Margin
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import LoopUse
+from campaign.physics.plan_loops import LoopUse
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest
 from campaign.protocol.stages import PlannedStage
 from campaign.trial import Most, Trial

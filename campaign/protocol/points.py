@@ -1,4 +1,4 @@
-"""The points of a test's matrix: options and bench with the swept values, validated."""
+"""Points of a matrix: validated options and benches."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import JsonValue, ValidationError
 
-from campaign.axis_kind import sides_in, speaking_of, words_here
+from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
 from campaign.errors import Problem
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -18,7 +18,7 @@ from campaign.protocol.matrix import Axis, points
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import validate
 from campaign.protocol.schema import Test, replaced
-from campaign.protocol.told import as_written
+from campaign.protocol.swept_value_text import as_written
 from campaign.trial import Tree, canonical_json
 
 
@@ -109,7 +109,7 @@ class _Cache:
                 tree = replaced(tree, axis.keys, axis.value(index))
             patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
             origin = Patched(self.test.origin, patches)
-            with speaking_of(sides_in(self.test.bench)):
+            with axis_terms(sides_in(self.test.bench)):
                 valid = validate(self.test.experiment.options, tree, origin)
             if isinstance(valid, list):
                 raise PointError(valid)
@@ -124,13 +124,13 @@ class _Cache:
             return options, tree, {}
         bench = self.bench(indices)[0]
         try:
-            with speaking_of(bench.sides):
+            with axis_terms(bench.sides):
                 chosen = fit(options, bench)
         except IncompleteBenchError as error:
             raise incomplete(self.test, error) from None
         except (ValueError, ArithmeticError) as error:
-            with speaking_of(bench.sides):
-                message = f"test '{self.test.entry.name}': {words_here(str(error))}"
+            with axis_terms(bench.sides):
+                message = f"test '{self.test.entry.name}': {in_axis_terms(str(error))}"
             raise PointError([self.test.origin.problem((), "value", message)]) from None
         if not chosen:
             return options, tree, {}
@@ -140,8 +140,8 @@ class _Cache:
             fitted = options.model_copy(update=values)
             # Who asks later which options were written must not be told of these.
             fitted.__pydantic_fields_set__.difference_update(values)
-            with speaking_of(bench.sides):
-                reasons = {name: words_here(choice.reason) for name, choice in chosen.items()}
+            with axis_terms(bench.sides):
+                reasons = {name: in_axis_terms(choice.reason) for name, choice in chosen.items()}
             self.known_fits[key] = fitted, fitted.model_dump(mode="json"), reasons
         return self.known_fits[key]
 

@@ -1,4 +1,4 @@
-"""Where the keys and values of a TOML text stand.
+"""Positions of keys and values in a TOML text.
 
 `tomllib` gives values without positions, so the text is parsed once more, by tree-sitter, and only
 when there is an error to point at.

@@ -1,4 +1,4 @@
-"""From what pydantic finds wrong to what a user can put right.
+"""From pydantic errors to messages for a user.
 
 A message says what stands there, what is allowed, and the nearest valid name for a typo.
 """
@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from campaign.axis_kind import sides_in, speaking_of, spoken_of, words_here
+from campaign.axis_kind import axis_terms, current_sides, in_axis_terms, sides_in
 from campaign.errors import Problem
 from campaign.protocol.files import Origin
 from campaign.protocol.positions import Aim, Keys
@@ -38,8 +38,8 @@ def find_faults(
 ) -> Model | list[Fault]:
     """`tree` as a `model`, or where it is wrong, before anybody knows where it came from."""
     # A bench says itself how it moves; options are read with the one of their test in mind.
-    sides = sides_in(tree) if "axis" in model.model_fields else spoken_of()
-    with speaking_of(sides):
+    sides = sides_in(tree) if "axis" in model.model_fields else current_sides()
+    with axis_terms(sides):
         faults = list(_loose_values(model, tree))
         try:
             valid = model.model_validate(dict(tree))
@@ -179,9 +179,9 @@ def _expected(shape: Shape | None) -> str:
     if shape is None:
         return ""
     if shape.quantity is not None:
-        quantity, meaning = shape.quantity.here, words_here(shape.meaning)
+        quantity, meaning = shape.quantity.here, in_axis_terms(shape.meaning)
         return f": {_a(quantity.name)} such as {quantity.example}; {meaning}"
-    return f": {words_here(shape.meaning)}" if shape.meaning else ""
+    return f": {in_axis_terms(shape.meaning)}" if shape.meaning else ""
 
 
 def _literals(expected: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a protocol file may contain, and what a loaded protocol is.
+"""The schema of a protocol file, and a loaded protocol.
 
 The options of a test depend on its kind, so they are validated by the experiment and only named
 here by exclusion: every key of a test that is not a field of `TestEntry`.

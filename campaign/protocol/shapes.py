@@ -1,4 +1,4 @@
-"""What may stand where: walking pydantic models along a path of keys.
+"""Walking pydantic models along a path of keys.
 
 pydantic's error locations contain tags of unions that no file contains, and name no alternatives;
 both follow from the declared types.

@@ -1,4 +1,4 @@
-"""The stages of a plan: trials that will follow from what others find, as far as it is known now.
+"""Stages of a plan: trials that depend on earlier results.
 
 A plan's own trials are the first stage of every test. What an experiment declares beyond them
 (`Experiment.stages`) is planned by point of the matrix: how many trials follow at most, how long

@@ -1,4 +1,4 @@
-"""The truth of a test: a second bench that is simulated, kept apart from all that is stated."""
+"""The truth of a test: a second, simulated bench, unknown to the analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a published cell for which nothing was found was tried in vain, or not tried at all.
+"""Published cells without a value: tried in vain, or not tried.
 
 A trial that failed must not let its cells leave the board, or a method that diverges would make it
 look better. Nor does it cost the cells of other places in the sweep.

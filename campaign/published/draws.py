@@ -1,4 +1,4 @@
-"""What a random bench shows over its seeds, and the place of a published value among that.
+"""Place of a published value among the draws of a random bench.
 
 The friction of a simulated bench scatters, and its seed says how (`[variation]` of the bench). A
 mean of ten readings that one seed gave is one draw; so is the mean that a document prints. How

@@ -1,4 +1,4 @@
-"""What a test brings to the scoreboard, and which of its findings speak to a published cell."""
+"""Findings of a test for published cells."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from campaign.physics.bench import Bench
-from campaign.published.calibrated import NOTHING, CalibrationPart
+from campaign.published.calibration_covariance import NOTHING, CalibrationPart
 from campaign.published.patterns import covers
 from campaign.published.provenance import NOTHING_ALTERED, Provenance
 from campaign.published.values import THESIS, Cell, Published, thesis

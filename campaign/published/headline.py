@@ -1,4 +1,4 @@
-"""What a whole scoreboard comes to: each published value once, by status."""
+"""Counts of a scoreboard: each published value once, by status."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the trials behind a finding ran on the bench that was described or calibrated.
+"""Whether trials ran on the described or calibrated bench.
 
 A status is what a bench says of itself, and that holds for one bench only. So the bench of every
 executed trial, as the archive keeps it, is held against the fingerprint that it states: whatever a

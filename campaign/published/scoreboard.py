@@ -1,4 +1,4 @@
-"""The scoreboard: every published cell a run speaks to, against what the run found."""
+"""The scoreboard: published cells against findings of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a reproduced number comes from: what its bench says of itself, if it is that bench."""
+"""Status of a reproduced number from the bench's origin."""
 
 from __future__ import annotations
 

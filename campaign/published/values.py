@@ -1,4 +1,4 @@
-"""Published values: the numbers of a source document, as data, and how their file is read.
+"""Published values of a source document, and their file.
 
 `campaign/published/thesis.toml` holds the thesis' tables; a laboratory may hand in its own file of
 the same form (`docs/published-values.md`). A table's rows and columns each add conditions, a

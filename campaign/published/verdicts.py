@@ -1,4 +1,4 @@
-"""What a comparison of a published number with a reproduced one comes to."""
+"""Verdicts on published and reproduced numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing an article: its page, its JSON, its tables and figures, and other formats of it."""
+"""Writing an article: page, JSON, tables, figures, other formats."""
 
 from __future__ import annotations
 

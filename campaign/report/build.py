@@ -1,4 +1,4 @@
-"""The report: one self-contained page, its tables and its figures, from an archived run alone."""
+"""The report: page, tables and figures from an archived run."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import NO_FILES, Document, document_of
 from campaign.report.content.references import Files
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
 from campaign.report.formats.as_json import report_json
 from campaign.report.formats.interface import Format, Written
 from campaign.report.formats.outline import outline
-from campaign.report.made_before import Formats, all_formats, made_before, remember
 from campaign.report.output import replaced_folder, write_files
 from campaign.report.page.damage_notice import Notice, told_on_page
 from campaign.report.page.drawings import Drawable, Key
@@ -35,6 +34,7 @@ from campaign.report.page.templates import Templates
 from campaign.report.page.trial_links import trial_links
 from campaign.report.page.trial_page import trial_pages
 from campaign.report.palette import variables
+from campaign.report.previous_report import Formats, all_formats, made_before, remember
 from campaign.report.processes import Workers
 
 FAILED = 200

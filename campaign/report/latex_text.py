@@ -1,4 +1,4 @@
-"""Text from elsewhere as LaTeX: it looks the same, and commands nothing.
+"""Untrusted text as LaTeX, without commands.
 
 What is written needs pdfLaTeX, LuaLaTeX or XeLaTeX with the T1 encoding and nothing else. A letter
 that T1 has not is named by its code point, so that no text of a run stops the typesetting.

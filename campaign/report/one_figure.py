@@ -1,4 +1,4 @@
-"""Figures of a report by themselves: as the report's folder has them, or for a paper's column."""
+"""Single figures of a report, also for a paper's column."""
 
 from __future__ import annotations
 

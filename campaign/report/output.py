@@ -1,4 +1,4 @@
-"""The report's folder: there whole or not at all, and never in place of somebody's other files."""
+"""Atomic replacement of a report's folder; other files stay untouched."""
 
 from __future__ import annotations
 

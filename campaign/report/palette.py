@@ -1,4 +1,4 @@
-"""Colours, dashes and marks: one look per series, told apart by colour-blind eyes and in grey.
+"""Colors, dashes and markers: distinct in greyscale and for color-blind readers.
 
 Each colour has a light page's and a dark page's value; both reach the 3:1 contrast that WCAG 2.1
 (1.4.11) asks of graphics, and text colours the 4.5:1 of 1.4.3.

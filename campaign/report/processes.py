@@ -1,4 +1,4 @@
-"""Tests analysed and drawn in several processes: they know nothing of each other.
+"""Analysis and drawing of tests in several processes.
 
 What comes back is what one process would have made, to the byte. A process that dies, or that
 cannot be begun, costs time: what it should have done is then done here.
@@ -25,13 +25,13 @@ from campaign.archive.reading.global_heap_check import Looked, known_heaps, told
 from campaign.trial import Tree
 
 if TYPE_CHECKING:
-    from campaign.access.analysis import TestAnalysis
-    from campaign.report.drawing.drawn import Drawn
+    from campaign.api.analysis import TestAnalysis
+    from campaign.report.drawing.drawing_files import Drawn
     from campaign.report.page.drawings import Drawable, Key
 
 WORTHWHILE = 200
 """Trials from which on more processes than one take less time than they cost to begin."""
-PRELOADED = ("campaign.report.preloaded",)
+PRELOADED = ("campaign.report.preload",)
 """What every process needs, imported once for all of them."""
 LARGE = 50_000_000
 """Bytes of a sealed run from which on it probably has as many trials."""
@@ -150,7 +150,7 @@ def _begin(handed: tuple[RunReader, Mapping[Looked, bool]]) -> None:
 
 
 def _find(test: Tree, measure_anew: bool) -> TestAnalysis:
-    from campaign.access.analysis import find
+    from campaign.api.analysis import find
     from campaign.experiments import experiments
 
     if _run is None:

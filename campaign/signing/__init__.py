@@ -3,8 +3,8 @@
 A signature proves who made it, with which key and for which purpose. It does not prove when.
 """
 
-from campaign.signing.checking import AllowedSigners, SignatureError, verify
-from campaign.signing.making import Signature, check_key, sign, sign_test_text
+from campaign.signing.signature_check import AllowedSigners, SignatureError, verify
+from campaign.signing.signature_file import Signature, check_key, sign, sign_test_text
 from campaign.signing.tool import check_tool
 
 __all__ = [

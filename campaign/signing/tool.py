@@ -1,4 +1,4 @@
-"""Running ssh-keygen: no shell, never a wait for ever, and a person is asked only at a terminal."""
+"""Running ssh-keygen: no shell, bounded time, prompts only at a terminal."""
 
 from __future__ import annotations
 

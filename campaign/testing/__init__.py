@@ -11,10 +11,10 @@ def test_backend(name: str) -> None:
 
 from __future__ import annotations
 
+from campaign.testing.backend_under_test import BackendUnderTest, Check, CheckFailedError
 from campaign.testing.checks import backend_checks
 from campaign.testing.kinds import known
 from campaign.testing.strict_recorder import StrictRecorder
-from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError
 
 __all__ = [
     "BackendUnderTest",

@@ -1,4 +1,4 @@
-"""The checks of a backend, each a function that can fail, and what they say of the interface."""
+"""Checks of a backend against the interface."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from campaign.backends.interface import Backend
 from campaign.errors import BackendError
 from campaign.recording import Array, Ending, Outcome, Recording, SafeState
-from campaign.testing.archiving import archived_as_recorded
-from campaign.testing.outside import keeps_a_stop_from_outside
+from campaign.testing.archive_check import archived_as_recorded
+from campaign.testing.backend_under_test import BackendUnderTest, Check, CheckFailedError, require
+from campaign.testing.external_stop_check import keeps_a_stop_from_outside
+from campaign.testing.parallel_check import executes_together_what_it_does_alone
 from campaign.testing.strict_recorder import StrictRecorder
-from campaign.testing.supervised import Disturb, got_through, supervised, with_narrow_limit
-from campaign.testing.together import executes_together_what_it_does_alone
-from campaign.testing.under_test import BackendUnderTest, Check, CheckFailedError, require
+from campaign.testing.supervised_backend import Disturb, got_through, supervised, with_narrow_limit
 from campaign.trial import Trial, canonical_json
 from campaign.units import factor
 

@@ -1,4 +1,4 @@
-"""Kinds that a test has at hand and nobody has installed."""
+"""Kinds of a test that are not installed."""
 
 from __future__ import annotations
 

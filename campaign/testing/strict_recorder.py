@@ -1,4 +1,4 @@
-"""A recorder that notes whatever a backend does against the interface."""
+"""A recorder that records violations of the interface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The channels that a device names among its features: `channel:gyro_rate`."""
+"""Channels named among a device's features: `channel:gyro_rate`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Consistent overhead byte stuffing: any bytes as bytes without a zero.
+"""Consistent overhead byte stuffing (COBS).
 
 S. Cheshire and M. Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on Networking
 7(2), 1999. Costs one byte, and one more per 254 bytes.

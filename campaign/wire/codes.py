@@ -1,4 +1,4 @@
-"""The numbers of the protocol: message types, states, refusals, outcomes, faults, formats.
+"""Numbers of the protocol: message types, states, refusals, outcomes, faults, formats.
 
 Every enumeration is one byte on the wire; `.text` is the same word as elsewhere in the program,
 e.g. `campaign.recording.Fault(Fault.OVER_TEMPERATURE.text)`.

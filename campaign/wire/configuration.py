@@ -1,4 +1,4 @@
-"""A trial as the named values that a controller is set to, and how such names make a tree again.
+"""A trial as named values for a controller, and back to a tree.
 
 Names are dotted paths; `docs/serial-protocol.md` lists them. All values are SI. `task.`,
 `controller.`, `limits.` and `compensation.` are every controller's business; `rehearsal.` is what

@@ -1,4 +1,4 @@
-"""Bytes of a message body: writing and reading numbers, texts and lists, with every check."""
+"""Fields of a message body: numbers, texts and lists with checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames: a header, a body and a checksum between two zero bytes.
+"""Frames: header, body and checksum between two zero bytes.
 
 A frame is `0x00 COBS(header body crc) 0x00`; the header is version u8, type u8, sequence u16; the
 checksum is CRC-32 (the one of Ethernet and zlib) over header and body; everything little-endian.

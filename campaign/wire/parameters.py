@@ -1,4 +1,4 @@
-"""Parameters: what SET carries. Named values, cut into messages, put together again, checked.
+"""Parameters of SET: named values in several messages, checked.
 
 A configuration is the list of all SET bodies since the device was idle, in order. Its CRC-32 goes
 with ARM, so nothing moves on parameters other than those the host meant.

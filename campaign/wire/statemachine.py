@@ -1,4 +1,4 @@
-"""What a device does with a command: tables and pure functions, mirrored by `firmware/`.
+"""Reactions of a device to commands: tables and pure functions, as in `firmware/`.
 
 States change by a command (`after`, `after_hello`), by the end of a trial (`after_end`) and by
 silence of the host (`after_silence`); nothing else changes them. `Numbering` tells a new command

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from campaign.archive import list_runs, open_run
 from campaign.archive.reading.sound_samples import whole_recording
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 
 MEMORY = 4 << 30  # bytes of address space: a size that is believed would end the process

@@ -9,7 +9,7 @@ import xarray
 from nexusformat.nexus import nxload
 
 from campaign.archive import PlannedTrial, RunStatus, RunWriter
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.default_plot import telling_trial
 from campaign.backends.sim import CHANNELS
 from campaign.recording import Ending, Outcome

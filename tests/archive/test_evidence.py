@@ -21,8 +21,8 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.sound_samples import whole_recording
-from campaign.archive.verifying.statement import run_statement
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.statement import run_statement
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import (

@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from campaign.archive import RunReader, open_run
-from campaign.archive.reading import global_heap_check, guarded
+from campaign.archive.reading import global_heap_check, safe_hdf5
 from campaign.errors import ArchiveError
 from tests.archive.test_kept import KEPT
 
@@ -25,7 +25,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.append(str(name))
         return file(name, *args, **kwargs)
 
-    monkeypatch.setattr(guarded.h5py, "File", counted)
+    monkeypatch.setattr(safe_hdf5.h5py, "File", counted)
     return names
 
 

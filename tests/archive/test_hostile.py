@@ -10,7 +10,7 @@ import pytest
 
 from campaign.archive import RunWriter, list_runs, open_run
 from campaign.archive.reading.sound_samples import whole_recording
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError, ExitCode
 from tests.archive.forging import (
     canonical,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
 from campaign.reason import Reason

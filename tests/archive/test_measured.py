@@ -15,8 +15,8 @@ import pytest
 
 from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.reading.measured import Measured
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.verification.verify_run import verify_run
 from campaign.estimate import Estimate, Systematic
 from campaign.policy import Keeping
 from campaign.reason import Cause, Reason

@@ -16,7 +16,7 @@ import pytest
 from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.reading.measured import Measured
+from campaign.archive.reading.archived_metrics import Measured
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason

@@ -9,8 +9,8 @@ import pytest
 
 from campaign.archive import RunWriter, open_run
 from campaign.archive.reading.summary import summarise
-from campaign.archive.verifying.statement import run_statement
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.statement import run_statement
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError, ExitCode
 from tests.archive.forging import put_integer
 from tests.archive.test_kept import KEPT

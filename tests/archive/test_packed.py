@@ -13,7 +13,7 @@ import pytest
 from campaign.archive import ArchivedTrial, RunWriter, open_run
 from campaign.archive.layout.journal import read_journal
 from campaign.archive.reading.folder import read_trial_file
-from campaign.archive.reading.packed import read_packed
+from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing import trial_writer
 from campaign.archive.writing.packed_file import copy_packed
 from campaign.archive.writing.sealed_file import SealedFile

@@ -14,7 +14,7 @@ import h5py
 import pytest
 
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.policy import Keeping
 from campaign.recording import Ending, Fault, Outcome

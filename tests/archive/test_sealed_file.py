@@ -12,7 +12,7 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL, read_journal
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.nexus import REQUIRED
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.errors import ArchiveError

@@ -11,8 +11,8 @@ import pytest
 from campaign.archive import RunStatus, RunWriter
 from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
 from campaign.archive.layout.run_folder import SEALING
-from campaign.archive.verifying.verification import verify_run
-from campaign.archive.writing import sealing
+from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing import seal_run
 from campaign.archive.writing.sealed_file import SealedFile
 from tests.archive.forging import canonical, sha256
 
@@ -25,7 +25,7 @@ def writer(tmp_path: Path, kit) -> Iterator[RunWriter]:
     """A run of three trials, of which nothing is copied yet: four attempts, the second failed."""
     trials = [kit.trial(number) for number in (1, 2, 3)]
     with pytest.MonkeyPatch.context() as late:
-        late.setattr(sealing.Sealer, "advance", lambda self: None)
+        late.setattr(seal_run.Sealer, "advance", lambda self: None)
         header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
         writer = RunWriter.create(tmp_path, header, trials)
         kit.record(writer, trials[0], 20)
@@ -42,13 +42,13 @@ def attempts(writer: RunWriter) -> list[TrialFinished]:
 
 
 @pytest.fixture
-def sealer(writer: RunWriter) -> Iterator[sealing.Sealer]:
-    sealer = sealing.Sealer(writer.folder)
+def sealer(writer: RunWriter) -> Iterator[seal_run.Sealer]:
+    sealer = seal_run.Sealer(writer.folder)
     yield sealer
     sealer.discard()
 
 
-def copied(sealer: sealing.Sealer) -> list[str] | None:
+def copied(sealer: seal_run.Sealer) -> list[str] | None:
     """What was copied of all that was added; None without a file."""
     for _ in range(4):  # more often than there are attempts
         sealer.advance()
@@ -86,9 +86,9 @@ def test_room_is_left_for_the_trials_to_the_byte(sealer, attempts, monkeypatch, 
 
     def disk_usage(path):
         asked.append(path)
-        return SimpleNamespace(free=sealing._FREE + 2 * attempts[0].bytes - short)
+        return SimpleNamespace(free=seal_run._FREE + 2 * attempts[0].bytes - short)
 
-    monkeypatch.setattr(sealing.shutil, "disk_usage", disk_usage)
+    monkeypatch.setattr(seal_run.shutil, "disk_usage", disk_usage)
     sealer.add(attempts[0])
     assert copied(sealer) == expected
     assert asked == [sealer._folder]
@@ -113,7 +113,7 @@ def test_after_a_failure_there_is_no_file_and_nothing_is_copied(sealer, attempts
 
 def test_the_file_that_was_begun_is_the_one_that_is_sealed(sealer, writer, attempts, monkeypatch):
     given = []
-    monkeypatch.setattr(sealing, "seal_folder", lambda *both: given.append(both))
+    monkeypatch.setattr(seal_run, "seal_folder", lambda *both: given.append(both))
     sealer.add(attempts[0])
     sealer.advance()
     sealer.seal()

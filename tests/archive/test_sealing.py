@@ -18,8 +18,8 @@ from campaign.archive.layout.header import PARTIAL
 from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
 from campaign.archive.layout.run_folder import SEALING
 from campaign.archive.reading.series import Series
-from campaign.archive.verifying.verification import verify_run
-from campaign.archive.writing import packed_file, sealed_entry, sealed_file, sealing
+from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing import packed_file, seal_run, sealed_entry, sealed_file
 from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
 from campaign.recording import ChannelInfo, Ending, Outcome
@@ -112,7 +112,7 @@ def test_a_copy_that_is_not_what_was_recorded_is_not_sealed(
     tmp_path, kit, monkeypatch, change, beside
 ):
     if not beside:
-        monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
+        monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: None)
     writer, trials = begin(tmp_path, kit)
     corrupt_copy(monkeypatch, change)
     for trial in trials:
@@ -185,7 +185,7 @@ def test_a_text_that_changed_between_writing_and_checking_is_found(
             put_text(opened, place, text_of(opened, place) + " ")
         real(part, file)
 
-    monkeypatch.setattr(sealing, "check_sealed", check)
+    monkeypatch.setattr(seal_run, "check_sealed", check)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
         kit.record(writer, trial, 50)
@@ -225,7 +225,7 @@ def test_whatever_is_not_as_it_was_written_is_not_sealed(tmp_path, kit, monkeypa
             change(opened)
         real(part, file)
 
-    monkeypatch.setattr(sealing, "check_sealed", check)
+    monkeypatch.setattr(seal_run, "check_sealed", check)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
         kit.record(writer, trial, 50)
@@ -240,7 +240,7 @@ def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, m
             exchange(opened["trial_00001"])
         real(part, file)
 
-    monkeypatch.setattr(sealing, "check_sealed", check)
+    monkeypatch.setattr(seal_run, "check_sealed", check)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
         kit.record(writer, trial, 50)
@@ -261,7 +261,7 @@ class Watched:
         self.at_the_end: list[str] = []
         self.failures: list[BaseException] = []
         self._to = self.beside
-        copy, seal_folder = sealed_file.SealedFile.copy, sealing.seal_folder
+        copy, seal_folder = sealed_file.SealedFile.copy, seal_run.seal_folder
 
         def copied(file, folder, finished, entry):
             if self.failures:
@@ -277,7 +277,7 @@ class Watched:
                 self._to = self.beside
 
         monkeypatch.setattr(sealed_file.SealedFile, "copy", copied)
-        monkeypatch.setattr(sealing, "seal_folder", sealed)
+        monkeypatch.setattr(seal_run, "seal_folder", sealed)
 
 
 ALL = ["trial_00001", "trial_00002", "trial_00003"]
@@ -346,17 +346,17 @@ def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, mon
     """Whether trials were copied beside the others, sooner or later, or by `seal` itself."""
     files = [written(tmp_path / "as it comes", kit, [1, 2, 3])]
     watched = Watched(monkeypatch)
-    advance = sealing.Sealer.advance
+    advance = seal_run.Sealer.advance
 
     def late(sealer):
         if 3 in sealer._first:
             advance(sealer)
 
     with monkeypatch.context() as held:
-        held.setattr(sealing.Sealer, "advance", late)
+        held.setattr(seal_run.Sealer, "advance", late)
         files.append(written(tmp_path / "as it can", kit, [1, 2, 3]))
     assert (watched.beside, watched.at_the_end) == (ALL[:2], ALL[2:])
-    monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
+    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: None)
     watched = Watched(monkeypatch)
     files.append(written(tmp_path / "at the end", kit, [1, 2, 3]))
     assert (watched.beside, watched.at_the_end) == ([], ALL)
@@ -405,7 +405,7 @@ def test_on_a_disk_that_is_nearly_full_nothing_is_copied_before_the_end(tmp_path
     writer, trials = begin(tmp_path, kit)
     with monkeypatch.context() as nearly_full:
         usage = SimpleNamespace(total=1 << 40, used=1 << 40, free=1 << 20)
-        nearly_full.setattr(sealing.shutil, "disk_usage", lambda path: usage)
+        nearly_full.setattr(seal_run.shutil, "disk_usage", lambda path: usage)
         for trial in trials:
             kit.record(writer, trial, 50)
     assert watched.beside == []
@@ -525,10 +525,10 @@ def test_beside_the_trials_is_copied_as_long_as_room_is_left_for_them(
     kit.record(writer, trial, 50)
     writer._sealer.discard()
     (finished,) = finished_in(writer)
-    free = sealing._FREE + 2 * finished.bytes - short
-    monkeypatch.setattr(sealing.shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
+    free = seal_run._FREE + 2 * finished.bytes - short
+    monkeypatch.setattr(seal_run.shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
     watched = Watched(monkeypatch)
-    sealer = sealing.Sealer(writer.folder)
+    sealer = seal_run.Sealer(writer.folder)
     sealer.add(finished)
     sealer.advance()
     assert watched.beside == copied
@@ -543,7 +543,7 @@ def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
     writer._sealer.discard()
     assert not (writer.folder / SEALING).exists()
     assert not [name for name in open_files(writer.folder) if SEALING in name]
-    sealer = sealing.Sealer(writer.folder)
+    sealer = seal_run.Sealer(writer.folder)
     watched = Watched(monkeypatch)
     sealer.add(*finished_in(writer))
     sealer.advance()
@@ -585,7 +585,7 @@ def test_a_later_attempt_that_completed_waits_for_the_end(tmp_path, kit, monkeyp
     writer._sealer.discard()
     first, second = finished_in(writer)
     watched = Watched(monkeypatch)
-    sealer = sealing.Sealer(writer.folder)
+    sealer = seal_run.Sealer(writer.folder)
     sealer.add(second)  # as if the journal had lost the first one
     sealer.advance()
     assert (watched.beside, first.attempt, second.attempt) == ([], 1, 2)
@@ -598,7 +598,7 @@ def test_a_run_that_has_not_ended_is_not_sealed(tmp_path, kit):
         kit.record(writer, trial, 50)
     writer.close()
     with pytest.raises(ArchiveError) as caught:
-        sealing.seal_folder(writer.folder)
+        seal_run.seal_folder(writer.folder)
     assert f"{writer.folder / JOURNAL}: the run has not ended; every" in str(caught.value)
     assert not list(tmp_path.glob("*.nxs*"))
     assert len(open_run(writer.folder).trials) == 3
@@ -609,7 +609,7 @@ def test_a_refusal_leaves_no_file_open(tmp_path, kit, monkeypatch, step):
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sealing.Sealer, "advance", lambda self: None)
+    monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: None)
     monkeypatch.setattr(sealed_file.SealedFile, step, fail)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
@@ -642,7 +642,7 @@ def test_a_folder_that_cannot_be_removed_harms_nobody(tmp_path, kit, monkeypatch
     def fail(folder):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(sealing, "remove_folder", fail)
+    monkeypatch.setattr(seal_run, "remove_folder", fail)
     writer, trials = begin(tmp_path, kit)
     for trial in trials:
         kit.record(writer, trial, 50)

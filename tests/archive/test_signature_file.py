@@ -16,8 +16,8 @@ from campaign.archive.layout.signature_file import (
     signature_path,
     write_signature,
 )
-from campaign.archive.verifying.statement import run_statement
-from campaign.archive.writing import resuming as resuming_module
+from campaign.archive.verification.statement import run_statement
+from campaign.archive.writing import resume_run as resuming_module
 from campaign.errors import ArchiveError, UsageError
 
 KEPT = Path(__file__).parent / "kept"

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs, open_run
-from campaign.archive.layout.followed import trials_followed, trials_in
+from campaign.archive.layout.followup_trials import trials_followed, trials_in
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 

@@ -14,9 +14,9 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.verifying import entries
-from campaign.archive.verifying.result import STRUCTURE, UNFINISHED
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification import entries
+from campaign.archive.verification.result import STRUCTURE, UNFINISHED
+from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.nexus import REQUIRED
 from campaign.recording import ChannelInfo, Ending, Fault, Outcome
 from tests.archive.forging import change_record, put_integer, put_text, reseal, text_of

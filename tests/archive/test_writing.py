@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from campaign.archive import RunWriter
 from campaign.archive.layout.storage import CHUNK, pack
-from campaign.archive.reading.measured import Measured
-from campaign.archive.reading.packed import read_packed
+from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.archive.writing.trial_writer import FolderWriter

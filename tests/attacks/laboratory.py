@@ -21,7 +21,7 @@ import pytest
 from typer.main import get_command
 
 from campaign.archive import RunReader, open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.backends import backends
 from campaign.cli import app, main
 from campaign.entry_points import installed

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from campaign.backends.handover.acceptance import FEWEST, GO_ON, _until_stopped
 from campaign.backends.handover.checks import (
     clipped,
     wrong_command,
     wrong_length,
     wrong_motion,
 )
-from campaign.backends.handover.judging import FEWEST, GO_ON, _until_stopped
-from campaign.backends.handover.returned import Returned
+from campaign.backends.handover.returned_recording import Returned
 from campaign.channels import info
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task, Trial

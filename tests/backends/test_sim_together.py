@@ -12,7 +12,7 @@ import pytest
 from campaign.archive import open_run
 from campaign.backends.interface import ExecutesTogether, KnowsCost
 from campaign.backends.sim import BACKEND, SimBackend, SimOptions
-from campaign.cli import compiling
+from campaign.cli import compile_engine
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
 from campaign.physics import simulate as simulate_module
@@ -194,7 +194,7 @@ def test_a_run_is_the_same_together_and_alone(
         return execute_together(backend, trials, *others)
 
     monkeypatch.setattr(SimBackend, "execute_together", counted)
-    monkeypatch.setattr(compiling, "WORTH_A_BLOCK", 0.0)
+    monkeypatch.setattr(compile_engine, "WORTH_A_BLOCK", 0.0)
     runs, sizes = [], []
     for fewest, workers in ((4, 1), (4, 2), (1000, 2)):
         monkeypatch.setattr(SimBackend, "fewest_together", fewest)

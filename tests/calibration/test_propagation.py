@@ -12,7 +12,7 @@ from campaign.calibration.document import result_text
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.propagation import principal_steps
 from campaign.experiments import experiments
-from campaign.published.calibrated import calibration_part
+from campaign.published.calibration_covariance import calibration_part
 
 from . import laboratory
 from .laboratory import BENCH, FREQUENCIES, PROTOCOL, problem, table, write

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.estimation.found_excitation import found_ramp, found_sine, found_step
+from campaign.estimation.excitation_detection import found_ramp, found_sine, found_step
 
 TIME = np.arange(4000) / 500.0
 

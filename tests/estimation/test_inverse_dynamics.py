@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from campaign.estimation.inverse.choosing import choose, held_out, structure
 from campaign.estimation.inverse.delay import find_delay
 from campaign.estimation.inverse.instruments import by_instruments
 from campaign.estimation.inverse.motion import (
@@ -32,6 +31,7 @@ from campaign.estimation.inverse.regression import (
 )
 from campaign.estimation.inverse.rows import in_blocks, moving, rows
 from campaign.estimation.inverse.simulation import simulated_rate
+from campaign.estimation.inverse.structure_choice import choose, held_out, structure
 from campaign.estimation.inverse.terms import DIRECTIONAL, SYMMETRIC, TERMS, periodic
 from campaign.estimation.inverse.validation import (
     TOO_FEW_BLOCKS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.estimation.over_a_turn import over_a_turn
+from campaign.estimation.angle_dependence import over_a_turn
 from tests.estimation.coverage import rejected
 
 GRAVITY = 8.0

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from campaign.estimation.autocorrelated import errors_of, misfit
+from campaign.estimation.autocorrelated_errors import errors_of, misfit
 from campaign.estimation.breakaway_torque import breakaway_torque
 from campaign.estimation.bristle_fit import fit_bristles, two_interfaces
 from campaign.estimation.presliding import OFF_THE_CURVE, damping_by_ratio, fit_presliding

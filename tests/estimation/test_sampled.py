@@ -10,7 +10,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import with_error
-from campaign.estimation.sampled import (
+from campaign.estimation.sampled_curve import (
     ALIKE,
     PEAK_AT_END,
     SAMPLES,

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from campaign.estimate import Estimate
-from campaign.estimation.sampled import LOST
+from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import (
     NO_SCATTER,
     OF_ONE_TRIAL,

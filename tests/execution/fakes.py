@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive.layout.journal import TrialsFollowed
-from campaign.archive.reading.measured import Measure
+from campaign.archive.reading.archived_metrics import Measure
 from campaign.estimate import Estimate
 from campaign.recording import (
     ChannelInfo,

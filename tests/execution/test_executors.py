@@ -24,12 +24,12 @@ from campaign.errors import ArchiveError
 from campaign.execution import executors
 from campaign.execution.attempt import Conditions
 from campaign.execution.executors import ProcessExecutor, process_executor
-from campaign.execution.measuring import Measuring
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
+from campaign.execution.trial_metrics import Measuring
 from campaign.experiments import experiments
 from campaign.protocol import Plan
 from campaign.recording import Outcome

@@ -11,7 +11,7 @@ from dataclasses import asdict
 import pytest
 
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.cli.compiling import COMPILING, compiling_meanwhile, wait_until_compiled
+from campaign.cli.compile_engine import COMPILING, compiling_meanwhile, wait_until_compiled
 from campaign.execution import first_start
 from campaign.execution.first_start import FirstStart, Helpers, make_all
 from campaign.physics import machine_code

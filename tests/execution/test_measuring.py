@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 
 import campaign
-from campaign.access.analysis import analyse_run
+from campaign.api.analysis import analyse_run
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import Decision
 from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.storage import CHUNK
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.channels import LOAD_RATE
 from campaign.cli.show import show_archive
 from campaign.entry_points import PlugIn
 from campaign.estimate import Estimate
-from campaign.execution.measuring import LIMIT, Measuring, author
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
+from campaign.execution.trial_metrics import LIMIT, Measuring, author
 from campaign.experiments import experiments
 from campaign.experiments.friction_lag import cycle_windows
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from campaign.backends import calls
-from campaign.execution.outside import INTERVAL, OutsideWatch
+from campaign.execution.external_stop import INTERVAL, OutsideWatch
 from campaign.execution.stop import StopSwitch
 from campaign.recording import PanicStop
 from tests.execution.fakes import FakeBackend, SwitchedBench

@@ -203,7 +203,9 @@ def switched(count: int, behaviour: dict, **policy: object) -> Lab:
 def test_a_panic_stop_between_trials_ends_the_run_before_anything_moves_again(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    monkeypatch.setattr("campaign.execution.outside.INTERVAL", 0.0)  # these trials take no time
+    monkeypatch.setattr(
+        "campaign.execution.external_stop.INTERVAL", 0.0
+    )  # these trials take no time
 
     def switched_off(stopped: Callable[[], bool]) -> Ending:
         lab.backend.stop = BY_EVE

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from campaign.archive.layout.followed import trials_in
+from campaign.archive.layout.followup_trials import trials_in
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import Attendance, SimulatedOperator

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from campaign.archive.layout.header import RunStatus
+from campaign.archive.reading.archived_metrics import Measure, Measured
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.measured import Measure, Measured
 from campaign.backends import calls
 from campaign.backends.calls import HEARTBEAT, Heartbeat
 from campaign.backends.interface import Source

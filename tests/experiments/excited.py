@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, cast
 
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate
 from campaign.physics.bench import Bench
 from campaign.recording import Outcome
@@ -24,7 +24,7 @@ def rate(on: Bench, share: float) -> str:
 
 def played(on: Bench, options: Mapping[str, Any], first: int) -> tuple[Done, ...]:
     """Trials with numbers and seeds from `first` on. Raises ValueError where one fails."""
-    with speaking_of(on.sides):
+    with axis_terms(on.sides):
         made = [
             each.model_copy(update={"number": first + k, "seed": first + k})
             for k, each in enumerate(trials("excitation", on, dict(options)), start=1)
@@ -44,7 +44,7 @@ def by_series(name: str, seed: int) -> list[Estimate]:
 def series(on: Bench, seed: int) -> list[Estimate]:
     """The same of any. Raises ValueError where a trial fails."""
     options = {**SERIES, "max_rate": rate(on, 0.5), "seed": seed}
-    with speaking_of(on.sides):
+    with axis_terms(on.sides):
         result = analyse("excitation", played(on, options, 5000 * seed))
     return [each.known for each in result.findings]
 
@@ -52,7 +52,7 @@ def series(on: Bench, seed: int) -> list[Estimate]:
 def by_lines(name: str, seed: int) -> list[Estimate]:
     """What the report tells of distortion."""
     on = THREE[name]()
-    with speaking_of(on.sides):
+    with axis_terms(on.sides):
         result = analyse("excitation", played(on, {**LINES, "seed": seed}, 5000 * seed))
     return [each.known for each in result.findings]
 

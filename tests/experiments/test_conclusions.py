@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.access.sentences import remarks, sentence
+from campaign.api.conclusion_sentences import remarks, sentence
 from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin
 from campaign.estimation.stabilization_error import NO_SCATTER, quotient
 from campaign.experiments import experiments

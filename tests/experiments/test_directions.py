@@ -19,7 +19,7 @@ from campaign.experiments.whole_model import experiment as whole_model
 from campaign.experiments.whole_model.models import models
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
-from campaign.physics.friction.sought import Sizes
+from campaign.physics.friction.unknowns import Sizes
 from tests.experiments.asked import data_of
 
 RIG = {"name": "rig", "axis": {"name": "tilt"}}

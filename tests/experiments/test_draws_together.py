@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from campaign.access.sentences import sentence
+from campaign.api.conclusion_sentences import sentence
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.preparing.draws import merged
-from campaign.experiments.preparing.draws_together import concluded
+from campaign.experiments.post_processing.draws import merged
+from campaign.experiments.post_processing.merged_sentences import concluded
 from campaign.experiments.shared.conclusion_parts import SET
 from campaign.result import Amount, Conclusion, Factor, Result
 from tests.experiments.laboratory import MADE_UP

@@ -9,8 +9,8 @@ import pytest
 
 from campaign.experiments import experiments
 from campaign.experiments.friction_map.runs import plan_run
-from campaign.experiments.shared.choices import Choices, nice
 from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.rounded_choices import Choices, nice
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins, worst_friction

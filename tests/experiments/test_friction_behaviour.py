@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 
 from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Systematic
-from campaign.estimation.sampled import ALIKE, LOST
-from campaign.execution.measuring import checked
+from campaign.estimation.sampled_curve import ALIKE, LOST
+from campaign.execution.trial_metrics import checked
 from campaign.experiments import experiments
 from campaign.experiments.model_output.experiment import NO_REVERSAL
 from campaign.experiments.shared.friction_models import with_model

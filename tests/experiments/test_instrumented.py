@@ -18,7 +18,7 @@ from campaign.estimation.inverse.motion import (
 )
 from campaign.estimation.inverse.simulation import find_loop, followed_motion
 from campaign.estimation.inverse.terms import DIRECTIONAL, SYMMETRIC, TERMS
-from campaign.experiments.any_motion.instrumented import (
+from campaign.experiments.any_motion.instrument_estimates import (
     Instruments,
     held_against,
     instruments,

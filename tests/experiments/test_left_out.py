@@ -24,7 +24,7 @@ from campaign.experiments.interface import (
     metrics,
     result_of,
 )
-from campaign.experiments.preparing.unusable import NOT_MEASURED
+from campaign.experiments.post_processing.recording_checks import NOT_MEASURED
 from campaign.result import Column, Finding, Result, Table
 from tests.experiments.laboratory import Done, analyse, execute, finding, trials
 from tests.experiments.test_breakaway import TWO, load_only

@@ -13,13 +13,13 @@ import pytest
 from scipy.stats import binomtest
 
 from campaign.estimate import Estimate
-from campaign.experiments.friction_map.choice import choose
 from campaign.experiments.friction_map.pilot import (
     FEWEST,
     SPEEDS,
     PilotedMapOptions,
     pilot_speeds,
 )
+from campaign.experiments.friction_map.pilot_choice import choose
 from campaign.experiments.friction_map.runs import (
     MEMORIES,
     map_speeds,
@@ -35,7 +35,7 @@ from campaign.physics.limits import margins
 from campaign.physics.true_values import stribeck_parameters
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol.expand import samples_of
-from campaign.protocol.follow import ROUNDING
+from campaign.protocol.stage_trials import ROUNDING
 from campaign.recording import Recording
 from campaign.result import Result
 from campaign.trial import Role, Trial, TrialRequest

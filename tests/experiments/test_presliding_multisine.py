@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
@@ -140,7 +140,7 @@ TRUTHS = {
 def short_runs(seed: int) -> Result:
     """Noise of the axis' current is as large as the torque, and its loop holds the command."""
     sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
-    with speaking_of(AXIS.sides):
+    with axis_terms(AXIS.sides):
         return analyse(KIND, execute(trials(KIND, AXIS, {**sizes, "periods": 4, "seed": seed})))
 
 

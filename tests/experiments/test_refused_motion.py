@@ -13,7 +13,7 @@ from campaign.estimate import Origin
 from campaign.estimation import gate
 from campaign.estimation.inverse.motion import Filtering
 from campaign.experiments.any_motion.motions import moved
-from campaign.experiments.friction_map import sliding
+from campaign.experiments.friction_map import steady_recordings
 from campaign.experiments.friction_map.stretches import points_of, slower
 from campaign.parameter import Identified
 from campaign.trial import Channel, Recording
@@ -171,7 +171,7 @@ def test_trials_and_slow_strokes_that_are_not_in_a_map_are_reasons() -> None:
         trial.trial.number = number
     found = asked("friction_map", trials, shortest="0.5 s").identified
     without, slow = found.left_out
-    assert without in sliding.NO_STRETCH
+    assert without in steady_recordings.NO_STRETCH
     assert dict(without.values) == {"count": 1, "total": 2, "numbers": "2"}
-    assert slow in sliding.TOO_SLOW
+    assert slow in steady_recordings.TOO_SLOW
     assert dict(slow.values) == {"count": 4}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
-from campaign.experiments.friction_map.repeated import scatter_figure
+from campaign.experiments.friction_map.repeated_maps import scatter_figure
 from campaign.experiments.repeatability import DOUBTFUL, MapSet, relative_deviation
 from campaign.experiments.repeatability import _deviation as deviation_of
 from campaign.experiments.repeatability import _mean as over_maps

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Window
-from campaign.estimation.sampled import LOST
+from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import OF_ONE_TRIAL
 from campaign.experiments.stabilization.experiment import EXPERIMENT, OF_A_RECORD
 from campaign.physics.bench import Bench

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.experiments.friction_map import model, sliding
+from campaign.experiments.friction_map import model, steady_recordings
 from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.stretches import Stretch, StretchOptions
 from tests.experiments.asked import data_of
@@ -53,7 +53,7 @@ def stretch(speed: float, *, slips: bool) -> Point:
 
 
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
-    monkeypatch.setattr(sliding, "points_of", lambda *_: (points, None))
+    monkeypatch.setattr(steady_recordings, "points_of", lambda *_: (points, None))
     options = StretchOptions.model_validate({"slowest": "1 mrad/s"})
     return model.identified(data_of([OneTrial()], model=options))
 
@@ -64,7 +64,7 @@ def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(point.unsteady in STICK_SLIP for point in stuck)
     identification = identified(monkeypatch, [*stuck, *steady])
     (left,) = identification.identified.left_out
-    assert left in sliding.UNSTEADY
+    assert left in steady_recordings.UNSTEADY
     assert dict(left.values) == {"count": 2, "total": 6, "why": STICK_SLIP.code}
     found = identification
     (told,) = (f for f in found.findings if f.quantity == "coulomb_torque_positive")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.experiments.preparing.swept_tables import table_names
+from campaign.experiments.post_processing.swept_tables import table_names
 from campaign.trial import canonical_json
 from tests.system.user import campaign, write
 

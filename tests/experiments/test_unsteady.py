@@ -7,10 +7,10 @@ import tomllib
 
 import pytest
 
-from campaign.axis_kind import sides_in, speaking_of
+from campaign.axis_kind import axis_terms, sides_in
 from campaign.estimation.steadiness import NOT_REACHED, STICK_SLIP, drifting
 from campaign.experiments.friction_map.curves import fit_map
-from campaign.experiments.friction_map.fitting import velocity_map
+from campaign.experiments.friction_map.default_options import velocity_map
 from campaign.experiments.friction_map.points import Point, points_of, steady
 from campaign.experiments.friction_map.runs import VelocityMapOptions
 from campaign.experiments.shared.rig import Rig
@@ -102,7 +102,7 @@ def soft(proportional: str) -> Bench:
     tree = tomllib.loads(LINEAR.read_text(encoding="utf-8"))
     tree["friction"] = {"load": {**tree["friction"]["load"], "stribeck_exponent": 1.0}}
     tree["controller"]["rate"] |= {"proportional": proportional, "integral": "10 1/s"}
-    with speaking_of(sides_in(tree)):
+    with axis_terms(sides_in(tree)):
         return Bench.model_validate(tree)
 
 

@@ -24,9 +24,9 @@ from campaign.experiments.whole_model.whole_model_fit import (
     with_bases,
 )
 from campaign.physics.friction import friction_models
-from campaign.physics.friction.sought import Derived, Sizes, product
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
-from campaign.physics.friction_along import Along
+from campaign.physics.friction.unknowns import DerivedOption, Sizes, product
+from campaign.physics.friction_response import Along
 from campaign.reason import Reason
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.rigs import random_rigs
@@ -191,7 +191,7 @@ def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
     }  # fmt: skip
 
 
-STATIC_TORQUE = Derived("static", "static_torque", "N m", "", "", product("ratio", "coulomb"))
+STATIC_TORQUE = DerivedOption("static", "static_torque", "N m", "", "", product("ratio", "coulomb"))
 
 
 def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
@@ -250,7 +250,7 @@ def test_a_model_that_states_no_unknowns_is_refused_by_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     sizes = Sizes((2.0, 2.0), (0.01, 0.01), 0.5, 1.0)
-    silent = {**friction_models(), "silent": replace(friction_models()["coulomb"], sought=None)}
+    silent = {**friction_models(), "silent": replace(friction_models()["coulomb"], unknowns=None)}
     with monkeypatch.context() as patched:
         patched.setattr("campaign.experiments.whole_model.models.friction_models", lambda: silent)
         with pytest.raises(ValueError, match="silent does not say what is fitted of it; there are"):

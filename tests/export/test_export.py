@@ -30,7 +30,7 @@ def channel(name: str, unit: str, samples: np.ndarray) -> Channel:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> campaign.access.RunView:
+def run(tmp_path: Path) -> campaign.api.RunView:
     """One trial that failed before its first sample, and one with values that get lost easily."""
     first, second = plan_of(tmp_path).trials
     point = {"bench.gear.preload.torque": 33.0, "compensation": "static", "list": [1, 2]}
@@ -48,7 +48,7 @@ def run(tmp_path: Path) -> campaign.access.RunView:
     return campaign.open(archived(tmp_path / "results", [(first, None), (second, recording)]))
 
 
-def exported(run: campaign.access.RunView, to: str, folder: Path) -> Path:
+def exported(run: campaign.api.RunView, to: str, folder: Path) -> Path:
     done = export_run(run, exports()[to], folder)
     assert (done.files, done.damaged) == (1, ())
     names = sorted(path.name for path in folder.iterdir())
@@ -56,7 +56,7 @@ def exported(run: campaign.access.RunView, to: str, folder: Path) -> Path:
     return folder / names[0]
 
 
-def samples(run: campaign.access.RunView) -> dict[str, np.ndarray]:
+def samples(run: campaign.api.RunView) -> dict[str, np.ndarray]:
     recording = run.trial(2).recording()
     return {"time": recording.time} | {n: c.samples for n, c in recording.channels.items()}
 

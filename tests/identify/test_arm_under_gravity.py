@@ -17,7 +17,7 @@ import pytest
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.over_a_turn import over_a_turn
+from campaign.estimation.angle_dependence import over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
 from campaign.experiments.friction_map.points import Point
 from campaign.identify.agreement import disagreements

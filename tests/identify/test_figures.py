@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.inverse.motion import Filtering, motion_of_position
 from campaign.experiments.any_motion.figures import figures, friction_figure
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics, predicted
@@ -17,7 +17,7 @@ from campaign.experiments.any_motion.motions import Moved, with_slowest
 from campaign.experiments.frequency_response.model.figures import figures as response_figures
 from campaign.experiments.frequency_response.model.frequency_fit import Masses
 from campaign.experiments.whole_model.models import models
-from campaign.experiments.whole_model.shown import figures as whole_figures
+from campaign.experiments.whole_model.tables_and_figures import figures as whole_figures
 from campaign.experiments.whole_model.whole_model_fit import find as find_whole
 from campaign.result import Curve, Figure
 from tests.estimation.rigs import Rig, random_rigs

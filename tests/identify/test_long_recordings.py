@@ -29,7 +29,7 @@ from campaign.experiments.whole_model.whole_model_fit import find
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
-from campaign.physics.friction.sought import Sizes
+from campaign.physics.friction.unknowns import Sizes
 from tests.estimation.rigs import random_rigs
 
 

@@ -11,7 +11,7 @@ from tests.importing import readers
 def forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files are read in forks, but where a test asks how a reader is started."""
     if "started" not in request.fixturenames:
-        monkeypatch.setattr("campaign.importing.streaming.subprocess", readers)
+        monkeypatch.setattr("campaign.importing.subprocess_reader.subprocess", readers)
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Processes that read a file, as forks of one that has imported the libraries that read files.
 
-Each is a process of its own as in `campaign.importing.streaming`, which starts Python for it: half
-a second of a core to import what is the same every time.
+Each is a process of its own as in `campaign.importing.subprocess_reader`, which starts Python for
+it: half a second of a core to import what is the same every time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ for each in ("scipy.io", "h5py", "nptdms", "asammdf", "openpyxl", "pandas", "cam
     except ImportError:
         pass
 from campaign.importing.formats import excel, hdf5, mat, mdf, tdms
-from campaign.importing.streaming import answer
+from campaign.importing.subprocess_reader import answer
 
 def read():
     answer(importlib.import_module(sys.argv.pop(1)).tables)

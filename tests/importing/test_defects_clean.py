@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.archive.reading.opening import open_run
+from campaign.archive.reading.open_run import open_run
 from campaign.importing.defects import Defect, find
 from campaign.resources import protocols_folder
 from tests.archives import simulated_run

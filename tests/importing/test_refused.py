@@ -15,7 +15,7 @@ from campaign.cli.import_command import import_recordings
 from campaign.cli.prepare import Request, prepare
 from campaign.errors import ProtocolError, UsageError
 from campaign.importing import defects
-from campaign.importing.described import file_used
+from campaign.importing.description import file_used
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError
 from tests.importing.test_mapping import COLUMNS, ENTRY, TEST, planned, refused, write

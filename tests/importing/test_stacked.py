@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.cutting import by_restart
 from campaign.importing.defects.clock import restarts
 from campaign.importing.formats.delimited import tables
 from campaign.importing.guess import guess, mapping_text
+from campaign.importing.trial_rows import by_restart
 from tests.importing.test_mapping import COLUMNS, ENTRY, TEST, planned, refused, served
 from tests.importing.whole import whole
 

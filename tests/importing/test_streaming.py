@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from campaign.importing.interface import Clock, Column, RecordingError
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 from tests.importing.whole import whole
 
 READER = "tests.importing.falling"
@@ -49,7 +49,7 @@ def test_a_reader_that_falls_refuses_the_file(file, does):
 
 
 def test_a_reader_that_hangs_is_ended(file, monkeypatch):
-    monkeypatch.setattr("campaign.importing.streaming.PATIENCE", 0.5)
+    monkeypatch.setattr("campaign.importing.subprocess_reader.PATIENCE", 0.5)
     file.write_text("hangs")
     with pytest.raises(RecordingError, match=r"did not go on for 0.5 s"):
         tables_streamed(READER, file)

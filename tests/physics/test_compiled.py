@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 import campaign.physics
-from campaign.cli.compiling import compiling_meanwhile
+from campaign.cli.compile_engine import compiling_meanwhile
 from campaign.execution import first_start
-from campaign.physics import compiled as compiled_module
-from campaign.physics.compiled import cache_folder, compiled, digest_of_sources, distrust
+from campaign.physics import compilation as compiled_module
+from campaign.physics.compilation import cache_folder, compiled, digest_of_sources, distrust
 from tests.packages import FILM, Packages
 
 PHYSICS = Path(campaign.physics.__file__).parent
@@ -62,7 +62,7 @@ HELPERS = {
     },
     "a module that a helper kept on disk calls": {
         "grease_film/film.py": FILM.replace("FACTOR = 1.0", "from grease_film.deep import FACTOR")
-        .replace("import numba", "from campaign.physics.compiled import compiled")
+        .replace("import numba", "from campaign.physics.compilation import compiled")
         .replace("numba.njit", "compiled"),
         "grease_film/deep.py": "FACTOR = 1.0\n",
     },
@@ -121,7 +121,7 @@ def test_a_source_that_was_edited_while_the_process_ran_is_not_kept(tmp_path: Pa
     edited = f"""
 import os
 from pathlib import Path
-from campaign.physics.compiled import _IMPORTED_AT
+from campaign.physics.compilation import _IMPORTED_AT
 import grease_film.film
 film = Path(grease_film.film.__file__)
 film.write_text({FILM.replace("1.0", "2.00")!r})

@@ -23,7 +23,7 @@ from campaign.physics.complete import (
 )
 from campaign.physics.limits import margins, unpredicted
 from campaign.physics.linear_friction import NoLoopError
-from campaign.physics.loops_used import loops_of, loops_used
+from campaign.physics.plan_loops import loops_of, loops_used
 from campaign.physics.resolution import resolution_margins
 from campaign.physics.steady_friction import steady_friction
 from campaign.physics.variation import of_its_day

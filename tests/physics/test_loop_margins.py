@@ -19,8 +19,8 @@ from campaign.physics.complete import complete
 from campaign.physics.friction import friction_models
 from campaign.physics.linear_friction import NoLoopError, Regime, bench_friction
 from campaign.physics.loop_margins import LoopMargins, Response, margins_of
-from campaign.physics.loops_used import loops_used
 from campaign.physics.open_loop import Mode, OpenLoop, open_loop
+from campaign.physics.plan_loops import loops_used
 from campaign.physics.variation import of_its_day
 from campaign.signals import Polyline, Sine, Zero
 from tests.physics.benches import DEG, INERTIA, KPV, KT, RATIO, Tree, bench, run, stribeck, task
@@ -310,7 +310,7 @@ def test_a_loop_is_computed_once_for_equal_values_and_anew_for_others(
         computed.append(loop)
         return margins_of(loop)
 
-    monkeypatch.setattr("campaign.physics.loops_used.margins_of", counting)
+    monkeypatch.setattr("campaign.physics.plan_loops.margins_of", counting)
 
     def edit(tree: Tree) -> None:
         sampled(tree)

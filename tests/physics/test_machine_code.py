@@ -11,7 +11,7 @@ from numba import typeof
 import campaign.physics.simulate
 from campaign.physics import friction_elements, machine_code
 from campaign.physics.bench import Bench
-from campaign.physics.compiled import compiled
+from campaign.physics.compilation import compiled
 from campaign.physics.friction import friction_models
 from campaign.physics.lanes import Lane
 from campaign.physics.machine_code import WIDTHS, Part, is_made, make, note_made, parts

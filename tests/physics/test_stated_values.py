@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from campaign.physics.bench import Bench
-from campaign.physics.known import NORMAL_95
+from campaign.physics.bench_knowledge import NORMAL_95
 from campaign.physics.stated_values import stated_value
 from campaign.protocol.problems import find_faults
 

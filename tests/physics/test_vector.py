@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from campaign.physics import elementary
-from campaign.physics.alike import alike, side_by_side
 from campaign.physics.blocks import zeros
 from campaign.physics.elementary import any_of, where
+from campaign.physics.equal_interfaces import alike, side_by_side
 from campaign.physics.rows import ANSWERS, HAS, KEEPS, MEETS, MEETS_RATE_END, MEETS_RATE_MEAN
 from campaign.physics.step_function import Motion, compiled_step
 from campaign.physics.vector import CACHE_LINE, LANES, add_up, by_lanes, each_lane

@@ -10,8 +10,8 @@ import pytest
 
 from campaign.errors import ProtocolError
 from campaign.experiments import experiments
+from campaign.physics.bench_knowledge import KnownOptions
 from campaign.physics.complete import lacking
-from campaign.physics.known import KnownOptions
 from campaign.protocol import ProtocolFile, TestEntry, check_limits, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.published.calibrated import NOTHING, calibration_part, file_name
+from campaign.published.calibration_covariance import NOTHING, calibration_part, file_name
 from campaign.published.evidence import Evidence
 from campaign.published.provenance import Provenance, SweepPoint
 from campaign.published.scoreboard import Line, score

@@ -11,7 +11,7 @@ import pytest
 
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import fingerprint
-from campaign.physics.known import KnownOptions
+from campaign.physics.bench_knowledge import KnownOptions
 from campaign.published.provenance import OF_A_TRUTH, provenance_of
 from campaign.trial import Role, Task, Tree, Trial
 

@@ -9,7 +9,7 @@ import pytest
 
 from campaign.errors import UsageError
 from campaign.report.article import write_article
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.formats import chosen_formats
 from campaign.report.formats.interface import Format
 from campaign.report.formats.report_data import ArticleData

@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from campaign.access.analysis import AnalysedTest, analyse_run
+from campaign.api.analysis import AnalysedTest, analyse_run
 from campaign.archive import RunHeader, RunStatus, RunWriter, open_run
 from campaign.archive.reading.sound_samples import damaged_records
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
 from campaign.recording import ChannelInfo, Ending, Outcome

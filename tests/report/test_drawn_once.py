@@ -8,9 +8,9 @@ import pytest
 from matplotlib.axis import Axis as DrawnAxis
 from matplotlib.figure import Figure as Canvas
 
+from campaign.report.drawing.cached_axes import settled
 from campaign.report.drawing.decimate import kept
 from campaign.report.drawing.figures import canvas, draw
-from campaign.report.drawing.settled import settled
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 X, Y = Axis("x", "s"), Axis("y", "rad")

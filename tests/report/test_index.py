@@ -18,8 +18,8 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.summary import summarise
 from campaign.errors import UsageError
 from campaign.report.index.page import entry_of, render, write_index
+from campaign.report.index.report_summary import told_by
 from campaign.report.index.sketch import sketch
-from campaign.report.index.told import told_by
 from campaign.resources import templates_folder
 
 KEPT = Path(__file__).parents[1] / "archive" / "kept" / "format-3.nxs"
@@ -179,7 +179,7 @@ def test_what_is_too_large_is_left_alone_and_what_is_too_long_is_cut(results: Pa
     path = results / "sound-report" / "report.json"
     told(results, {"opening": {"compared": "x" * 1000}})
     assert told_by(path.parent).headline == "x" * 399 + "…"
-    monkeypatch.setattr("campaign.report.index.told.LARGEST", 1000)
+    monkeypatch.setattr("campaign.report.index.report_summary.LARGEST", 1000)
     assert told_by(path.parent).headline == ""
 
 

@@ -19,7 +19,7 @@ from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.gc_threshold import GC_THRESHOLD
 from campaign.report import processes
-from campaign.report.made_before import MADE
+from campaign.report.previous_report import MADE
 from tests.archives import simulated_run
 from tests.system.user import completed
 
@@ -122,7 +122,7 @@ def test_a_format_of_before_that_cannot_be_made_costs_itself(
     def lacking(names: list[str]) -> None:
         raise UsageError("it needs what is not here")
 
-    monkeypatch.setattr("campaign.report.made_before.chosen_formats", lacking)
+    monkeypatch.setattr("campaign.report.previous_report.chosen_formats", lacking)
     folder = report(run, earlier)
     assert "report.md" not in names(folder)  # it would be of the older report
     told = "markdown, which the earlier report had, is left out: it needs what is not here"

@@ -16,7 +16,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.reason import NONE, Reason
 from campaign.report.build import build_report
 from campaign.report.content.document import document_of
-from campaign.report.content.opening import MANY, Opening
+from campaign.report.content.first_screen import MANY, Opening
 from campaign.report.formats import chosen_formats
 from campaign.result import Amount, Axis, Conclusion, Curve, Figure, Panel, Result
 

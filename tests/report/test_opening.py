@@ -22,7 +22,7 @@ from campaign.recording import Ending, Outcome, SafeState
 from campaign.report.build import build_report, render
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
-from campaign.report.content.opening import Opening
+from campaign.report.content.first_screen import Opening
 from campaign.result import (
     Amount,
     Axis,

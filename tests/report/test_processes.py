@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.access.analysis import TestAnalysis, analyse_run
+from campaign.api.analysis import TestAnalysis, analyse_run
 from campaign.archive import open_run
 from campaign.archive.reading import run_reader
 from campaign.experiments import experiments
@@ -153,7 +153,7 @@ def test_the_journal_is_parsed_once_for_a_report(
 def test_what_processes_need_is_imported_before_they_begin() -> None:
     """Experiments of the program and all that draws, in the process that the others are made of."""
     code = (
-        "import sys, campaign.report.preloaded\n"
+        "import sys, campaign.report.preload\n"
         "from campaign.experiments import experiments\n"
         "before = set(sys.modules)\n"
         "shipped = [n for n in experiments() if experiments().plug_in(n) is None]\n"

@@ -15,7 +15,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.experiments.stabilization.identified_compensations import beside_table
 from campaign.published.values import read_published, thesis
 from campaign.report.build import render
-from campaign.report.content.published_beside import as_compared, with_published
+from campaign.report.content.published_columns import as_compared, with_published
 from campaign.report.content.tables import show, table_csv
 from campaign.resources import templates_folder
 from campaign.result import Result, Table

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from campaign.access.analysis import analyse_run, published_of
+from campaign.api.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.estimate import OF_ONE_TRIAL, Estimate

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from campaign.access.sentences import is_decided, remarks, sentence, words
+from campaign.api.conclusion_sentences import is_decided, remarks, sentence, words
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import NONE, Reason
 from campaign.result import Amount, Conclusion, Factor

@@ -12,9 +12,9 @@ import pytest
 
 from campaign.experiments.interface import TestData
 from campaign.report.drawing.figures import draw, inline
-from campaign.report.drawing.legible import legible_width
+from campaign.report.drawing.label_size import legible_width
 from campaign.report.drawing.short_paths import CURVES, SIGNS, short_path
-from campaign.report.drawing.slim import slim
+from campaign.report.drawing.slim_svg import slim
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 ABOUT = 0.0501

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.cli.compiling import COMPILING
+from campaign.cli.compile_engine import COMPILING
 from tests.system.user import ROOT, SEA, campaign, write
 
 

@@ -16,7 +16,7 @@ from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.decisions import extremes
-from campaign.experiments.preparing.unusable import doubt
+from campaign.experiments.post_processing.recording_checks import doubt
 from campaign.policy import Keeping
 from campaign.reason import Cause
 from campaign.recording import Ending, Outcome

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import RunStatus, find_run, open_run
-from campaign.archive.reading.listing import run_paths
+from campaign.archive.reading.run_list import run_paths
 from tests.system.user import SEA, begun, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")

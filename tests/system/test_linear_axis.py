@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import campaign as program
-from campaign.access.analysis import analyse_run
+from campaign.api.analysis import analyse_run
 from campaign.archive import open_run
 from campaign.backends.sim import BACKEND, SimOptions
-from campaign.comparing.shared import shared_sources
+from campaign.comparison.shared_systematics import shared_sources
 from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol import load_protocol, make_plan

@@ -15,7 +15,7 @@ from campaign.cli.rerun import _error, rerun_trial
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.execution import provenance
-from campaign.execution.comparison import changes, differences
+from campaign.execution.recording_difference import changes, differences
 from campaign.execution.written_order import in_written_order
 from campaign.physics import grid
 from campaign.physics.engine_version import ENGINE

@@ -19,8 +19,8 @@ import pytest
 from campaign import signing
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.signature_file import signature_path
-from campaign.archive.verifying.statement import run_statement
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.statement import run_statement
+from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.run_lock import RunLock
 from campaign.backends import sim
 from campaign.cli.prepare import Request

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import RunStatus, find_run, open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from tests.archive.test_resuming import content, documented_differences
 from tests.system.user import environment, forks, write
 

@@ -15,7 +15,7 @@ import pytest
 
 import campaign as program
 from campaign.archive import RunReader, find_run, open_run
-from campaign.archive.verifying.verification import verify_run
+from campaign.archive.verification.verify_run import verify_run
 from campaign.backends.sim import SimBackend
 from campaign.cli import session
 from campaign.cli.prepare import Request
@@ -23,7 +23,7 @@ from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
-from campaign.execution.measuring import Measuring
+from campaign.execution.trial_metrics import Measuring
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response import experiment as frequency_response
 from campaign.experiments.interface import TrialData

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from campaign.access import analysis
+from campaign.api import analysis
 from campaign.archive import open_run
 from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request

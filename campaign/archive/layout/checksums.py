@@ -1,5 +1,4 @@
-"""The tree of checksums: what binds samples to their channel, a channel to its trial, and a trial
-to its run.
+"""The tree of checksums: samples, channels, trials, run.
 
 Its leaves are logical: the samples of a series as numbers, in blocks, however HDF5 lays them out.
 A trial's record names every series with its unit and its leaf; the run's seal names the digest of

@@ -1,4 +1,4 @@
-"""Files that are either whole or visibly not: atomic names, and what was written is on the disk."""
+"""Atomic file names, and writing that reaches the disk (fsync)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every planned trial, whole: what a run would have executed can be rebuilt to the last digit.
+"""Every planned trial, whole: enough to rebuild an execution exactly.
 
 Benches and options come again and again in a plan, so they are kept once each (`plan-trees.jsonl`),
 under the SHA-256 of their canonical JSON, and the trials (`plan-trials.jsonl`) name them.
@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 from campaign.archive.layout.files import write_lines_atomically
-from campaign.archive.layout.followed import trials_in
+from campaign.archive.layout.followup_trials import trials_in
 from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
 from campaign.archive.layout.record import parse_trees, restored_trial, shared_trees, trees_text
 from campaign.archive.layout.run_folder import first_line

@@ -1,4 +1,4 @@
-"""What is known about a run before its first trial, and the words for how it ended."""
+"""The header of a run: what is known before its first trial, and its final status."""
 
 from __future__ import annotations
 

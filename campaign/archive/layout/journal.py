@@ -1,4 +1,4 @@
-"""The journal of a run in progress: the truth about what finished.
+"""The journal of a run in progress: one line for each finished step.
 
 One JSON object per line, appended and synced before anybody is told. A kill can tear the last line
 only; a torn line was never reported, so a reader leaves it out.

@@ -1,4 +1,4 @@
-"""What can still be learnt from a journal of which lines are damaged, and what its lines mean."""
+"""The state of a run from its journal, including one with damaged lines."""
 
 from __future__ import annotations
 

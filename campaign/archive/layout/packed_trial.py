@@ -1,4 +1,4 @@
-"""The file of one trial while its run is in progress: packed samples, then what tells of them.
+"""The file of one trial of a run in progress: packed samples and a record.
 
 A trial file is `MAGIC`, chunks of samples as HDF5's filters would leave them, a `PackedTrial` as
 JSON, and where that begins (8 bytes, little endian). Sealing puts the chunks into HDF5 unchanged.

@@ -1,4 +1,4 @@
-"""What an archive keeps of a trial besides its samples, as one text.
+"""The record of a trial: everything but its samples, as one text.
 
 The record names every series that was recorded, with its unit and the digest of its samples, so the
 digest of the record vouches for all of the trial, wherever its samples lie and whether they were

@@ -1,4 +1,4 @@
-"""What analysis found in a run, as it is kept beside the run: `RUN-results.nxs`.
+"""The results file of a run, `RUN-results.nxs`: names of its groups and fields.
 
 Nothing of it goes into the sealed run, which says what happened; this says what a program of one
 version made of it, and another version may make something else.

@@ -1,4 +1,4 @@
-"""Results as one text, and back: JSON in which each object says what it is.
+"""Results as JSON text with a type for each object, and back.
 
 Arrays are left out of the text: it names the datasets that hold them. A field that says its default
 is left out as well, and so is the law of a fitted curve, which is code. Numbers that JSON has not

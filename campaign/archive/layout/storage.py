@@ -1,4 +1,4 @@
-"""How values lie in a file: the form of a sample, chunks and their compression, texts, digests."""
+"""How values are stored: sample types, chunks, compression, texts, digests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A trial as an archive holds it; its samples are read only when asked for."""
+"""A trial of an archive; its samples are read on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a run cannot be read: noted one by one, so that the rest of it still can be."""
+"""Damage of a run, item by item; the rest stays readable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Damage of a run in words: for a screen, for a warning, and for a file beside others."""
+"""Damage of a run as text: for a terminal, a warning or a file."""
 
 from __future__ import annotations
 

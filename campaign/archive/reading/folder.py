@@ -7,7 +7,7 @@ from pathlib import Path
 
 from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import why
-from campaign.archive.layout.followed import planned_in, stages_in
+from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS, FullPlan
 from campaign.archive.layout.header import PARTIAL, PlannedTrial, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted, TrialFinished
@@ -18,9 +18,9 @@ from campaign.archive.layout.run_folder import (
     read_header,
     read_text,
 )
+from campaign.archive.reading.archived_metrics import measured_in, with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.measured import measured_in, with_metrics
 from campaign.archive.reading.run_reader import RunReader
 from campaign.errors import ArchiveError
 from campaign.recording import SafeState
@@ -71,8 +71,8 @@ def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") ->
 
     `sealed_as` is the group that it becomes when the run is sealed.
     """
-    from campaign.archive.reading.packed import packed_record, read_packed
-    from campaign.archive.reading.recorded import PackedSamples, archived_trial
+    from campaign.archive.reading.archived_samples import PackedSamples, archived_trial
+    from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
 
     entry = entry_name(finished.trial)
     packed = read_packed(path, entry)

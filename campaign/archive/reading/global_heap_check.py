@@ -1,4 +1,4 @@
-"""The one part of HDF5's own bookkeeping that has no checksum and must be looked at beforehand.
+"""Check of HDF5's global heaps, which have no checksum, before HDF5 reads them.
 
 Texts of attributes lie in global heap collections (`GCOL`). HDF5 walks through the objects of one
 by their sizes; where damage made the size of the free space zero, it walks on the spot for ever.

@@ -1,4 +1,4 @@
-"""What was found out about the runs of a folder, so that listing a thousand opens none of them.
+"""Cache of run summaries of a folder, so that listing opens no archive.
 
 A hidden file in the results folder that may be deleted at any time: whatever it does not have, or
 has of a file of another size or time, is read from the run itself. Nothing but listings uses it.

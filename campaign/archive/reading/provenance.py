@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from campaign.archive.layout.header import RunHeader
 from campaign.archive.layout.run_folder import first_line
-from campaign.archive.reading import guarded
+from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError
 
@@ -35,7 +35,7 @@ def read_provenance(
         if info.is_required():
             tree[name] = text(name)
         elif name != "sources" and name in names:
-            with damaged.noting(), guarded.guarded(damaged.path, f"{PROVENANCE}/{name}"):
+            with damaged.noting(), safe_hdf5.guarded(damaged.path, f"{PROVENANCE}/{name}"):
                 told = text(name)
                 tree[name] = told if info.annotation is str else _json(damaged, name, told)
     return _validated(tree, damaged)

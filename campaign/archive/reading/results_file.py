@@ -1,4 +1,4 @@
-"""Reading `RUN-results.nxs`: whole, as it was written, and of the run beside it; or not at all.
+"""Reading `RUN-results.nxs`: complete and of the run beside it, or not at all.
 
 The file may have been cut, changed or exchanged, so nothing of it is used before the hash of the
 whole file was found right. What made it and what it is of is then for the reader to judge.
@@ -15,7 +15,7 @@ from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.results import ENTRY, FORMAT, HASH, RECORD, RunResults
 from campaign.archive.layout.results_text import from_text
 from campaign.archive.layout.run_folder import first_line
-from campaign.archive.reading import guarded
+from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.series import series_at
 from campaign.errors import ArchiveError
 from campaign.result import Array
@@ -24,9 +24,9 @@ from campaign.result import Array
 def is_results_file(path: Path) -> bool:
     """Whether a file holds results of this program, of whatever run, sound or not."""
     try:
-        with guarded.open_file(path) as file:
-            run = guarded.inner_group(guarded.inner_group(file, ENTRY), "run")
-            return guarded.attribute(file, "creator") == "campaign" and "format" in run
+        with safe_hdf5.open_file(path) as file:
+            run = safe_hdf5.inner_group(safe_hdf5.inner_group(file, ENTRY), "run")
+            return safe_hdf5.attribute(file, "creator") == "campaign" and "format" in run
     except ArchiveError:
         return False
 
@@ -37,8 +37,8 @@ def holds_results(path: Path) -> bool | None:
     Looks at no more than the names at the top of it.
     """
     try:
-        with guarded.open_file(path) as file:
-            names = guarded.names(file)
+        with safe_hdf5.open_file(path) as file:
+            names = safe_hdf5.names(file)
     except ArchiveError:
         return None
     if "run" in names:
@@ -67,19 +67,19 @@ def read_any_results(path: Path) -> RunResults:
     Raises ArchiveError in one line: the file is none, is not whole, was changed, or has a newer
     layout.
     """
-    with guarded.open_file(path) as file, guarded.guarded(path, f"/{ENTRY}"):
-        if ENTRY not in guarded.names(file):
+    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, f"/{ENTRY}"):
+        if ENTRY not in safe_hdf5.names(file):
             raise ArchiveError(f"{path}: holds no results")
-        entry = guarded.inner_group(file, ENTRY)
+        entry = safe_hdf5.inner_group(file, ENTRY)
         _check_format(path, entry)
-        digest, place = guarded.digest_at(entry, HASH)
+        digest, place = safe_hdf5.digest_at(entry, HASH)
         if sha256_of(path, place) != digest:
             raise ArchiveError(f"{path}: does not match its own hash; it was damaged or changed")
         return _record(path, entry)
 
 
 def _check_format(path: Path, entry: h5py.Group) -> None:
-    version = guarded.integer_at(guarded.inner_group(entry, "run"), "format")
+    version = safe_hdf5.integer_at(safe_hdf5.inner_group(entry, "run"), "format")
     if not 1 <= version <= FORMAT:
         raise ArchiveError(
             f"{path}: has results of layout {version}; this program reads up to {FORMAT}"
@@ -87,7 +87,7 @@ def _check_format(path: Path, entry: h5py.Group) -> None:
 
 
 def _record(path: Path, entry: h5py.Group) -> RunResults:
-    text = guarded.text_at(guarded.inner_group(entry, RECORD), "data")
+    text = safe_hdf5.text_at(safe_hdf5.inner_group(entry, RECORD), "data")
     known: dict[str, Array] = {}
 
     def array(place: str) -> Array:
@@ -96,7 +96,7 @@ def _record(path: Path, entry: h5py.Group) -> RunResults:
             *groups, name = where.split("/")
             parent = entry
             for group in groups:
-                parent = guarded.inner_group(parent, group)
+                parent = safe_hdf5.inner_group(parent, group)
             known[where] = series_at(parent, name)[1].read()
         values = known[where]
         return values[slice(*map(int, cut))].copy() if cut else values.copy()

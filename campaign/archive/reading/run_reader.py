@@ -1,4 +1,4 @@
-"""An archived run, as whoever opened it sees it."""
+"""An opened run: its header, plan, trials and damage."""
 
 from __future__ import annotations
 
@@ -126,9 +126,9 @@ class RunReader:
         if not self.sealed:
             yield
             return
-        from campaign.archive.reading import guarded
+        from campaign.archive.reading import safe_hdf5
 
-        with guarded.held_open(self.path):
+        with safe_hdf5.held_open(self.path):
             yield
 
     def planned(self, number: int) -> Trial:
@@ -140,12 +140,12 @@ class RunReader:
 
     def unchanged(self) -> bool:
         """Whether every byte of the sealed file is as it was written (reads it all)."""
-        from campaign.archive.reading import guarded
+        from campaign.archive.reading import safe_hdf5
 
         if not self.sealed:
             return False
-        with guarded.open_file(self.path) as file:
-            digest, place = guarded.digest_at(file, "run/outcome/file_sha256")
+        with safe_hdf5.open_file(self.path) as file:
+            digest, place = safe_hdf5.digest_at(file, "run/outcome/file_sha256")
         return digest == sha256_of(self.path, place)
 
     def problems(self) -> list[str]:

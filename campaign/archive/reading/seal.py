@@ -1,4 +1,4 @@
-"""The seal of a run: the digest of every text in it, and reading those texts by it.
+"""The seal of a run: the digest of every text, and reading texts by it.
 
 The index is one of the texts and holds the record of every trial, so the seal's own digest vouches
 for the whole run. It is what a signature signs.
@@ -16,7 +16,7 @@ from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.header import FORMAT
 from campaign.archive.layout.run_folder import first_line
-from campaign.archive.reading import guarded
+from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.damage import DamageList
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
@@ -61,10 +61,10 @@ class SealedTexts:
 
     def __init__(self, path: Path, file: h5py.File, damaged: DamageList) -> None:
         self._path = path
-        self._run = guarded.inner_group(file, "run")
+        self._run = safe_hdf5.inner_group(file, "run")
         self.root, self.seal = "", None
-        with damaged.noting(), guarded.guarded(path, f"/run/{SEAL}"):
-            text = guarded.text_at(*self._parent(SEAL))
+        with damaged.noting(), safe_hdf5.guarded(path, f"/run/{SEAL}"):
+            text = safe_hdf5.text_at(*self._parent(SEAL))
             try:
                 self.seal = Seal.model_validate_json(text)
             except ValidationError as error:
@@ -74,7 +74,7 @@ class SealedTexts:
     def names(self, group: str) -> list[str]:
         """What the group at `group` in `/run` holds, or held when it was sealed."""
         sealed = self.seal.texts if self.seal else {}
-        there = guarded.names(guarded.inner_group(self._run, group))
+        there = safe_hdf5.names(safe_hdf5.inner_group(self._run, group))
         inside = f"{group}/"
         was = (place.removeprefix(inside) for place in sealed if place.startswith(inside))
         return sorted({*there, *was})
@@ -82,25 +82,25 @@ class SealedTexts:
     def notes(self, prefix: str) -> list[str]:
         """The groups of `/run` whose names begin with `prefix`; also those that were sealed."""
         sealed = self.seal.texts if self.seal else {}
-        names = {*guarded.names(self._run), *(place.partition("/")[0] for place in sealed)}
+        names = {*safe_hdf5.names(self._run), *(place.partition("/")[0] for place in sealed)}
         return sorted(name for name in names if name.startswith(prefix))
 
     def text(self, place: str) -> str:
         """A text of `/run`, e.g. `journal/data`. Raises ArchiveError when it is damaged."""
-        with guarded.guarded(self._path, f"/run/{place}"):
+        with safe_hdf5.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
-            return guarded.text_at(parent, name, self._digest(place))
+            return safe_hdf5.text_at(parent, name, self._digest(place))
 
     def unchecked(self, place: str) -> str:
         """A text of `/run` as it stands there; it may be damaged. Raises ArchiveError."""
-        with guarded.guarded(self._path, f"/run/{place}"):
-            return guarded.unchecked_text_at(*self._parent(place))
+        with safe_hdf5.guarded(self._path, f"/run/{place}"):
+            return safe_hdf5.unchecked_text_at(*self._parent(place))
 
     def integer(self, place: str) -> int:
         """A whole number of `/run`. Raises ArchiveError when it is damaged."""
-        with guarded.guarded(self._path, f"/run/{place}"):
+        with safe_hdf5.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
-            return guarded.integer_at(parent, name, self._digest(place))
+            return safe_hdf5.integer_at(parent, name, self._digest(place))
 
     def check(self, place: str) -> None:
         """A text or a number of `/run`. Raises ArchiveError when it is damaged."""
@@ -111,7 +111,7 @@ class SealedTexts:
 
     def _parent(self, place: str) -> tuple[h5py.Group, str]:
         group, _, name = place.rpartition("/")
-        return (guarded.inner_group(self._run, group) if group else self._run), name
+        return (safe_hdf5.inner_group(self._run, group) if group else self._run), name
 
     def _digest(self, place: str) -> str | None:
         if self.seal is None or place in OUTSIDE:

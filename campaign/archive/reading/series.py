@@ -1,4 +1,4 @@
-"""Reading series of samples that nobody vouches for: chunk by chunk, with checked sizes.
+"""Reading untrusted series of samples: chunk by chunk, with checked sizes.
 
 The chunks are unpacked here and not by HDF5, which takes half as long again.
 """
@@ -16,7 +16,7 @@ from h5py import h5d, h5t
 from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import SeriesDigest, series_digest
 from campaign.archive.layout.packed_trial import PackedSeries, Place
-from campaign.archive.reading.guarded import own_id
+from campaign.archive.reading.safe_hdf5 import own_id
 from campaign.errors import ArchiveError
 from campaign.recording import Array
 

@@ -1,4 +1,4 @@
-"""Using the trials whose samples are as they were recorded, and naming the others.
+"""Trials with intact samples, and the names of the others.
 
 Samples are held against their checksums when they are read, which may be as late as an analysis
 asks a recording for a channel. An error there costs the one trial.
@@ -70,7 +70,7 @@ def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
     The index has every record again, and opening a run looks there alone. In the folder of a run in
     progress there is no index: whatever opens that has looked at them.
     """
-    from campaign.archive.reading import guarded
+    from campaign.archive.reading import safe_hdf5
 
     # Of a damaged journal some are missing, and that is told already.
     digests = {each.trial: each.record for each in run.story.finished.values()}
@@ -78,11 +78,11 @@ def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
     if not run.sealed or not wanted:
         return ()
     damaged = DamageList(run.path)
-    with damaged.noting(), guarded.open_file(run.path) as file:
+    with damaged.noting(), safe_hdf5.open_file(run.path) as file:
         for each in wanted:
-            with damaged.noting(), guarded.guarded(run.path, f"/{each.entry}/record"):
-                record = guarded.inner_group(guarded.inner_group(file, each.entry), "record")
-                guarded.text_at(record, "json", digests[each.trial.number])
+            with damaged.noting(), safe_hdf5.guarded(run.path, f"/{each.entry}/record"):
+                record = safe_hdf5.inner_group(safe_hdf5.inner_group(file, each.entry), "record")
+                safe_hdf5.text_at(record, "json", digests[each.trial.number])
     return tuple(damaged.found)
 
 

@@ -1,11 +1,11 @@
-"""A run at a glance, without its trials."""
+"""Summary of a run without its trials."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive.layout.followed import planned_in, stages_in
+from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.header import PARTIAL, SEALED, RunHeader, RunStatus
 from campaign.archive.layout.journal import JOURNAL, RunStarted
 from campaign.archive.layout.journal_summary import read_lines
@@ -109,9 +109,9 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
 
 
 def _summarise_file(path: Path, size: int) -> RunSummary:
-    from campaign.archive.reading import opening
+    from campaign.archive.reading import open_run
 
-    run = opening.read_glance(path)
+    run = open_run.read_glance(path)
     return RunSummary(
         name=path.stem,
         path=path,

@@ -1,4 +1,4 @@
-"""What viewers open first: of a run the most telling trial, of a trial the most telling channel.
+"""The default plot of a run and of a trial in HDF5 viewers.
 
 One channel, and beside it only those that fit on its axis: eleven units on one axis tell nothing.
 """

@@ -1,4 +1,4 @@
-"""Writing HDF5 the way every NeXus reader understands, in flat memory.
+"""Writing HDF5 for NeXus readers in bounded memory.
 
 Sample datasets are one-dimensional, chunked, and pass HDF5's two standard filters, shuffle and
 deflate, or deflate alone where that is smaller. The chunks are compressed beforehand, by ISA-L

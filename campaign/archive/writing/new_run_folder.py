@@ -1,4 +1,4 @@
-"""The folder of a new run: there with everything that is known before the first trial, or not."""
+"""Atomic creation of the folder of a new run."""
 
 from __future__ import annotations
 

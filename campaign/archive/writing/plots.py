@@ -1,4 +1,4 @@
-"""A panel of a figure as NeXus can plot it: curves over one x in one group.
+"""A figure panel as NeXus data: curves over one x in one group.
 
 An NXdata group has one x for all of its curves. Curves of a panel that have the same x are plotted
 together, and so are those that lie beside each other, such as the two directions of a friction map;

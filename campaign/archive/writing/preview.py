@@ -1,4 +1,4 @@
-"""A preview of a long recording: few enough points for a browser, and no peak missed."""
+"""Preview of a long recording: few points that keep every peak."""
 
 from __future__ import annotations
 

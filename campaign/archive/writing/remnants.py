@@ -1,4 +1,4 @@
-"""What a killed process leaves behind in a results folder, and removing what this program wrote.
+"""Remnants of killed processes in a results folder, and their removal.
 
 Nothing that it did not write is ever removed: files are known by their names, and a folder goes
 only when it is empty.

@@ -1,4 +1,4 @@
-"""Writing `RUN-results.nxs`: what analysis found in a run, as NeXus, beside the run.
+"""Writing `RUN-results.nxs`: results as NeXus, beside the run.
 
 Every process of the file is the analysis of one test; each panel of its figures and each of its
 tables can be plotted, and the most telling one is what viewers open. What this program reads back

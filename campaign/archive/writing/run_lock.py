@@ -1,4 +1,4 @@
-"""One process at a time writes a run: from its beginning until it is sealed or let go.
+"""Lock of a run: one writing process, until it is sealed or released.
 
 The system gives a lock up when its process ends, however it ends, so a kill leaves at most an empty
 hidden file behind, which locks nothing.

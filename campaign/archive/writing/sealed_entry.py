@@ -12,7 +12,7 @@ from h5py import h5d, h5o
 
 from campaign.archive.layout.packed_trial import PackedSeries, PackedTrial
 from campaign.archive.layout.record import TrialRecord
-from campaign.archive.reading.recorded import TIME
+from campaign.archive.reading.archived_samples import TIME
 from campaign.archive.reading.series import Series, dataset_series
 from campaign.archive.writing import hdf5
 from campaign.archive.writing.default_plot import Aim, beside

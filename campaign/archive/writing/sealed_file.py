@@ -1,4 +1,4 @@
-"""The sealed file while it is made: trials are copied into it, then all else, and it is checked."""
+"""The sealed file while it is made: copied trials, header, check."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from h5py import h5d
 from campaign import __version__
 from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
-from campaign.archive.layout.followed import planned_in, stages_in
+from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
 from campaign.archive.layout.packed_trial import Place
 from campaign.archive.layout.record import TrialRecord, parse_trees, series_of, trees_text
 from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
-from campaign.archive.reading import guarded
+from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.archived_samples import TIME
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.packed import packed_record, read_packed
-from campaign.archive.reading.recorded import TIME
+from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
 from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.reading.series import layout_of
 from campaign.archive.writing import hdf5, nexus
@@ -76,7 +76,7 @@ class SealedFile:
         if packed.not_kept:
             self.not_kept[entry] = packed.not_kept
         else:
-            with guarded.guarded(path, f"/{entry}"), path.open("rb") as source:
+            with safe_hdf5.guarded(path, f"/{entry}"), path.open("rb") as source:
                 written = self._entries.write(entry, record, packed, source)
                 self._describe(entry, record, trees)
                 for group, series, _, digest in series_of(record):
@@ -146,7 +146,7 @@ def check_sealed(part: Path, file: SealedFile) -> None:
     copied. Raises ArchiveError.
     """
     damaged = DamageList(part)
-    with guarded.open_file(part) as opened, guarded.guarded(part):
+    with safe_hdf5.open_file(part) as opened, safe_hdf5.guarded(part):
         texts = SealedTexts(part, opened, damaged)
         if texts.seal is None:
             raise ArchiveError(str(damaged.found[0]))
@@ -154,22 +154,22 @@ def check_sealed(part: Path, file: SealedFile) -> None:
             texts.check(place)
         for entry, finished in file.copied.items():
             if entry not in file.not_kept:
-                with guarded.guarded(part, f"/{entry}"):
-                    _check_entry(guarded.inner_group(opened, entry), finished, file.placed[entry])
+                with safe_hdf5.guarded(part, f"/{entry}"):
+                    _check_entry(safe_hdf5.inner_group(opened, entry), finished, file.placed[entry])
 
 
 def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Placed) -> None:
     """The record is the one of the journal, and samples lie where they were read back."""
-    kept = guarded.inner_group(entry, "record")
-    guarded.text_at(kept, "json", finished.record)
-    guarded.text_at(kept, "trees")
-    inner = cache(partial(guarded.inner_group, entry))
+    kept = safe_hdf5.inner_group(entry, "record")
+    safe_hdf5.text_at(kept, "json", finished.record)
+    safe_hdf5.text_at(kept, "trees")
+    inner = cache(partial(safe_hdf5.inner_group, entry))
     for (group, name), (unit, layout) in placed.items():
         series = h5d.open(inner(group).id, name.encode())
         if layout_of(series) != layout:
             place = f"{entry.file.filename}: {entry.name}/{group}/{name}"
             raise ArchiveError(f"{place}: does not lie where it was written")
-        guarded.check_attribute(series, "units", unit)
+        safe_hdf5.check_attribute(series, "units", unit)
 
 
 def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, str | int]:

@@ -1,4 +1,4 @@
-"""One trial's file while it is written: a `Recorder` of its samples."""
+"""The file of one trial while it is written: a `Recorder` of samples."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from campaign.archive.layout.record import (
     shared_trees,
     trees_text,
 )
-from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.recorded import (
+from campaign.archive.reading.archived_samples import (
     TIME,
     MemorySamples,
     PackedSamples,
     trial_of_record,
 )
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.writing.default_plot import Aim
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import PREVIEW_POINTS, Preview

@@ -1,4 +1,4 @@
-"""Writing one trial of a run, and its line in the run's journal."""
+"""Writing one trial of a run, and its journal line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from campaign.archive.layout.files import publish_all, why
 from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished, utc_now
-from campaign.archive.reading.measured import trial_measured
+from campaign.archive.reading.archived_metrics import trial_measured
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
 from campaign.policy import KEEP_ALL, Keeping, NotKept
@@ -21,8 +21,8 @@ from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
 
 if TYPE_CHECKING:
+    from campaign.archive.reading.archived_metrics import Measure
     from campaign.archive.reading.archived_trial import ArchivedTrial
-    from campaign.archive.reading.measured import Measure
     from campaign.archive.writing.trial_file import Publish, TrialFile
 
 Array = NDArray[np.float64]

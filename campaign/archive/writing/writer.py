@@ -1,4 +1,4 @@
-"""Writing a run: a folder while it is in progress, one file when it is sealed."""
+"""Writing a run: a folder in progress, one file once sealed."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from campaign.archive.layout.journal import (
     TrialsFollowed,
     utc_now,
 )
+from campaign.archive.reading.archived_metrics import measured_in, with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.archive.reading.measured import measured_in, with_metrics
 from campaign.archive.writing.new_run_folder import make_folder
-from campaign.archive.writing.resuming import reopen
+from campaign.archive.writing.resume_run import reopen
 from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
@@ -46,7 +46,7 @@ class RunWriter:
     """
 
     def __init__(self, folder: Path, journal: Journal, lock: RunLock) -> None:
-        from campaign.archive.writing.sealing import Sealer
+        from campaign.archive.writing.seal_run import Sealer
 
         self.timing: Timing = UNTIMED
         self._shown = folder  # as it was typed

@@ -1,4 +1,4 @@
-"""Whether what came back is what was asked. Pure: series in, the first thing that is wrong out.
+"""Pure checks of returned series against what was requested.
 
 A command that was recorded has to be the one that was asked, sample by sample. Motion is only held
 against it by its sign and its size: how well a rig follows is what an experiment finds out.

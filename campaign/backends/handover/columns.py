@@ -1,4 +1,4 @@
-"""Which columns of returned files are which channels: a mapping is read, or a first one made."""
+"""The mapping of returned columns to channels: read, or drafted."""
 
 from __future__ import annotations
 

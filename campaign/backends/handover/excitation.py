@@ -1,4 +1,4 @@
-"""What a trial asks of a rig, as series: the command over time, and the motion of the hull."""
+"""What a trial asks of a rig, as series: command and hull motion over time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from campaign.axis_kind import sides_in
 from campaign.channels import COMMAND, VOCABULARY, AxisKind, info
 from campaign.channels import axis_of as axis_of_channel
-from campaign.importing.made import RigFacts
+from campaign.importing.derived_channels import RigFacts
 from campaign.physics.base_motion import base_rate
 from campaign.physics.bench import Bench
 from campaign.recording import Array

@@ -1,4 +1,4 @@
-"""What the person at the rig reads: a page for the whole hand-over, and one for each attempt."""
+"""Pages for the operator: one for the hand-over, one for each attempt."""
 
 from __future__ import annotations
 
@@ -10,9 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from campaign.backends.handover.acceptance import GO_ON
 from campaign.backends.handover.excitation import Series, axis_of, shown
-from campaign.backends.handover.judging import GO_ON
-from campaign.backends.handover.places import COLUMNS, MANIFEST, Attempt, Verdict, read_json
+from campaign.backends.handover.handover_folder import (
+    COLUMNS,
+    MANIFEST,
+    Attempt,
+    Verdict,
+    read_json,
+)
 from campaign.channels import COMMAND, VOCABULARY, AxisKind, explained, info
 from campaign.plain_text import on_a_page
 from campaign.trial import Role, Trial

@@ -1,4 +1,4 @@
-"""A Fourier series of an angle from which an inverse dynamic model is told best.
+"""Fourier series of an angle, optimized for inverse dynamics.
 
 Its coefficients are searched for the lowest condition number of the model's columns, within limits
 on angle, rate and acceleration (Swevers, Ganseman, Tükel, De Schutter and Van Brussel, "Optimal

@@ -1,4 +1,4 @@
-"""Odd multisines as commands: a low crest factor, and a beginning that jerks nothing."""
+"""Odd multisines with a low crest factor and a smooth start."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gaussian noise of a band: all of its power between two frequencies, none outside."""
+"""Band-limited Gaussian noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a periodic signal passes zero: a command that begins there jerks nothing."""
+"""Zero passage of a periodic signal: a smooth start of a command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sine whose frequency runs from one to another: a chirp, as points on its course."""
+"""A chirp: a sine with a swept frequency, as points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Best linear approximation of a nonlinear system from repeated multisines: the robust method.
+"""Best linear approximation from repeated multisines: the robust method.
 
 Over realisations of the phases everything scatters that is not linear, over periods only noise
 does; so the two are told apart (Pintelon and Schoukens, "System Identification: A Frequency Domain
@@ -14,7 +14,7 @@ import numpy as np
 
 from campaign.estimation.frequency.distortion import Distortion, detected
 from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.welch import Excited
 from campaign.estimation.frequency_response import Array, ComplexArray

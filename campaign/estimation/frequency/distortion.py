@@ -1,4 +1,4 @@
-"""Even and odd distortion of the output, at lines where the excitation has none.
+"""Even and odd distortion of the output at lines without excitation.
 
 What an amplifier or a loop puts at those lines itself is taken off through the response there
 (Pintelon and Schoukens (2012), 4.3.2). Odd distortion is at the excited lines as well, where it

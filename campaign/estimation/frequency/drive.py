@@ -1,4 +1,4 @@
-"""What responses tell of a drive of two inertias on a spring."""
+"""Parameters of a two-inertia drive from its responses."""
 
 from __future__ import annotations
 

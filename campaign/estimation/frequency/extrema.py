@@ -1,4 +1,4 @@
-"""Modes read between the lines of a response that no function may be fitted to.
+"""Modes read between the lines of a response without a fitted function.
 
 Of few realisations no variance weighs a fit. What the response still shows is between which of its
 lines the gain has an extremum: the interval ends at the nearest lines whose gain surely differs

@@ -1,4 +1,4 @@
-"""The lines of periodic signals, freed of transient and drift, with the covariance of their noise.
+"""Lines of periodic signals without transient and drift, with noise covariance.
 
 A record of P periods has P - 1 lines between two harmonics of its period: whatever nonlinear system
 it comes from, these hold transient and noise alone. A transient is smooth over frequency, so that a

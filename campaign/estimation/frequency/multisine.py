@@ -1,4 +1,4 @@
-"""Odd random-phase multisines: excitations that show noise and distortion beside the response.
+"""Odd random-phase multisines: response, noise and distortion at once.
 
 Only odd lines of the base frequency are excited, and of every few of them one, drawn at random, is
 left out. What the output has there is odd distortion, at even lines even distortion; phases are

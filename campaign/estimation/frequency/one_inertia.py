@@ -1,4 +1,4 @@
-"""Drives whose responses tell less than two inertias: seen from the load alone, or rigid."""
+"""Drives whose responses show less than two inertias."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from campaign.estimation.frequency.drive import (
     TwoMass,
     correlations_of,
 )
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.rational import rational_fit
 from campaign.estimation.frequency.two_mass_model import Side

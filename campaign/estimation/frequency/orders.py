@@ -1,4 +1,4 @@
-"""Which order a response tells: by Schwarz' criterion, among those without unstable poles.
+"""Model order of a response by Schwarz' criterion, without unstable poles.
 
 What several orders explain about equally well they do not tell alike: that is a part of an
 interval, too, and no scatter shows it (`Chosen.near`).
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import RationalFit, delays_to_try, rational_fit
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.intervals import shifted_by

@@ -1,4 +1,4 @@
-"""The output that a fitted response makes of a recorded input, over time.
+"""Output error of a fitted response for a recorded input.
 
 The spectrum of the input times the response is the output that a periodic input would have left;
 what begins and ends otherwise differs from it by free motions of the function's poles (Pintelon and

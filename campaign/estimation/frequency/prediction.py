@@ -1,4 +1,4 @@
-"""A fitted response held against one that was measured elsewhere, in units of its deviation."""
+"""A fitted response compared with one measured elsewhere, in standard deviations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import SURE, Weights
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.reason import NONE, Cause, Reason

@@ -1,4 +1,4 @@
-"""A rational function with a delay through a measured response, with real coefficients.
+"""Fit of a rational function with delay to a measured response.
 
     G(s) = exp(-s delay) * (b0 + b1 s' + ...) / (a0 + a1 s' + ...),    s' = s / (2 pi scale)
 
@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from campaign.estimation.frequency.measured import ALIKE, LEAST_FREEDOM, MeasuredResponse
+from campaign.estimation.frequency.measured_response import ALIKE, LEAST_FREEDOM, MeasuredResponse
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.least_squares import covariance, minimum
 from campaign.reason import NONE, Cause, Reason

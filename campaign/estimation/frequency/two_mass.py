@@ -19,7 +19,7 @@ import numpy as np
 
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.frequency.drive import PARTS, TwoMass, correlations_of
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.one_inertia import HIDDEN, load_side_fit, rigid_fit
 from campaign.estimation.frequency.rational import (

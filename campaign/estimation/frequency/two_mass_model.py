@@ -1,4 +1,4 @@
-"""The responses of two inertias on a spring, and where a fit of them is started."""
+"""Responses of two inertias on a spring, and start values of their fit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import delays_to_try
 from campaign.estimation.frequency_response import Array, ComplexArray
 

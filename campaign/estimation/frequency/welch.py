@@ -1,4 +1,4 @@
-"""The response in any recording, by averaged spectra: H1, H2, Hv, or by the reference of a loop.
+"""Responses from averaged spectra: H1, H2, Hv, or with a loop's reference.
 
 What is excited must be said, because no recording shows it: a response read as output over input
 of a loop that is closed, without a signal from outside, is anything between that of the plant and
@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency_response import Array, ComplexArray
 
 Estimator = Literal["H1", "H2", "Hv"]

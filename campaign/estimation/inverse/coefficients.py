@@ -1,4 +1,4 @@
-"""Coefficients of an inverse dynamic model as estimates: scatter, and what other rows would say."""
+"""Coefficients of an inverse dynamic model as estimates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""By how much what drives a motion is recorded too early: the delay of a drive, or half a sample.
+"""Delay between recorded drive signal and motion.
 
 A command that is held for a sample acts half a sample late; a bus or a filter adds to it. Times the
 inertia it looks like a term of the jerk, and all that share its shape are wrong by it.

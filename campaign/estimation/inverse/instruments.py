@@ -1,4 +1,4 @@
-"""Instruments: what was wanted of a motion stands in for what was measured of it.
+"""Instrumental variables from the commanded motion.
 
 A measured rate has noise in it, and within a loop the force answers that noise: least squares is
 biased by both. What the loop was asked for knows of neither. Source: Janot, Vandanjon, Gautier,

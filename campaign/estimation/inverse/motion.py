@@ -1,4 +1,4 @@
-"""A motion made ready for regression: filtered without phase, differentiated, decimated.
+"""A motion prepared for regression: zero-phase filter, derivatives, decimation.
 
 What is measured is a position (or a rate); a regression needs rate and acceleration, and both sides
 of it filtered alike. Source: Janot, Vandanjon, Gautier, "A generic instrumental variable approach

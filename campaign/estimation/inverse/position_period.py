@@ -1,4 +1,4 @@
-"""The period over position with which force or friction repeats: of a screw, a motor, a gear."""
+"""Spatial period of force or friction: of a screw, a motor, a gear."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Linear regression with residuals that know of their neighbours, over several pieces.
+"""Linear regression with autocorrelated residuals over several recordings.
 
 Ordinary deviations of an inverse dynamic model are 4 to 5 times too small: what it leaves over is
 no white noise. The covariance here is that of Newey and West (Econometrica 55, 1987) with

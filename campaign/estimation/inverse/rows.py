@@ -1,4 +1,4 @@
-"""The rows of a regression: a motion's columns and force, filtered alike and decimated."""
+"""Rows of a regression: columns and force, filtered alike and decimated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion that a model makes of the force that drove it, or of what it was asked for.
+"""Simulated motion of an inverse model under its recorded force or command.
 
 A small residual of forces may still move wrongly. The axis is released from where it was measured
 to be, again and again, and goes its own way under the recorded force; dry friction holds it where

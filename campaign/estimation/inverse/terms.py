@@ -1,4 +1,4 @@
-"""What a motion asks its drive for, term by term: the columns of an inverse dynamic model.
+"""Terms of an inverse dynamic model: the columns of its regression.
 
     force = inertia * acceleration + viscous * rate + coulomb * sign(rate) + offset + ...
 

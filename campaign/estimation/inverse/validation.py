@@ -1,4 +1,4 @@
-"""How well a model predicts a motion that it was not fitted to, and whether another does better."""
+"""Prediction error of a model on unseen motion, and comparison of two models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A measured channel of a record: what is taken out of its residuals, and how its noise weighs."""
+"""A measured channel of a record: detrending of residuals and noise weights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torque of a drive without the noise of its sensor, and what it may be off by then.
+"""Torque of a drive without sensor noise, and its uncertainty.
 
 A simulation that is fed with a noisy torque answers to the noise as well: what is fitted is too
 stiff, too damped and too heavy, by the noise's share of the power (Soderstrom, "Errors-in-variables

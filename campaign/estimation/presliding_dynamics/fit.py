@@ -19,7 +19,7 @@ from campaign.estimation.presliding_dynamics.channel import (
     filtered,
     white_noise,
 )
-from campaign.estimation.presliding_dynamics.fitted import (
+from campaign.estimation.presliding_dynamics.fit_result import (
     Fitted,
     Grid,
     centred,

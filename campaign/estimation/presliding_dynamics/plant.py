@@ -1,4 +1,4 @@
-"""What is simulated below breakaway: an inertia held by bristles, maybe with an elastic part.
+"""The simulated plant below breakaway: an inertia on bristles, with an elastic part.
 
     J dv/dt = T - sum of (sigma0 z + sigma1 dz/dt) - sigma2 v,    dq/dt = v
     dz/dt = v - sigma0 |v| z / s(v),    s(v) = Ts (c + (1 - c) exp(-(|v| / vs)^delta)), c = Tc / Ts

@@ -1,4 +1,4 @@
-"""How much of a motion that it was not fitted to a fitted plant predicts."""
+"""Share of an unseen motion that a fitted plant predicts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.channel import Channel
-from campaign.estimation.presliding_dynamics.fitted import Fitted, Grid
+from campaign.estimation.presliding_dynamics.fit_result import Fitted, Grid
 from campaign.estimation.presliding_dynamics.record import Record, measured
 
 

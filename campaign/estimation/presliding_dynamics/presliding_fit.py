@@ -1,4 +1,4 @@
-"""What records below breakaway say of an axis: the numbers for a reader, or why there are none."""
+"""Numbers of an axis from records below breakaway, or the reason for none."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from campaign.estimation.intervals import (
     with_error,
 )
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
-from campaign.estimation.presliding_dynamics.fitted import Fitted
+from campaign.estimation.presliding_dynamics.fit_result import Fitted
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
 from campaign.estimation.presliding_dynamics.plant import Array, Plant
 from campaign.estimation.presliding_dynamics.record import Assumed, Record

@@ -1,4 +1,4 @@
-"""One measured trial below breakaway, as plain arrays, and what is taken as known of the axis."""
+"""One measured trial below breakaway as arrays, with known values of the axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether one inertia on one bristle describes the records, or something else than noise is left.
+"""Whether one inertia on one bristle explains the records down to noise.
 
 Two questions are asked of the residuals, neither of which takes coloured noise for an error of the
 model. Are they a part of the simulated answer, band by band (an elastic part, a second inertia, a
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.fitted import Fitted, products, with_torque
+from campaign.estimation.presliding_dynamics.fit_result import Fitted, products, with_torque
 from campaign.estimation.presliding_dynamics.long_run import at_bandwidths
 from campaign.estimation.presliding_dynamics.plant import Array, Bristles
 from campaign.reason import NONE, Cause, Reason

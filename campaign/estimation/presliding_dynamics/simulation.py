@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.plant import Array, Plant
-from campaign.physics.compiled import called, compiled
+from campaign.physics.compilation import called, compiled
 
 Between = Literal["smooth", "held"]
 """What the torque does between its samples: a smooth curve, or each value held until the next."""

@@ -1,4 +1,4 @@
-"""Where the joint fit begins: a linear inertia on a spring, from the spectra of the records."""
+"""Start values of the joint fit: inertia on a spring, from spectra."""
 
 from __future__ import annotations
 

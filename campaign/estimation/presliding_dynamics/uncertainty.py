@@ -1,4 +1,4 @@
-"""How well a joint fit determines its parameters.
+"""Uncertainty of the parameters of a joint fit.
 
 Two covariances are compared: one from the autocorrelated scores of all samples, and one from how
 the records differ from each other, which is larger where friction changed between them. The
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.fit import search
-from campaign.estimation.presliding_dynamics.fitted import Fitted
+from campaign.estimation.presliding_dynamics.fit_result import Fitted
 from campaign.estimation.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
 from campaign.estimation.presliding_dynamics.plant import Array
 

@@ -1,4 +1,4 @@
-"""Whether a number of a rig drifts with something, or has jumped: both from the same points.
+"""Drift and jumps of a number from the same points.
 
 A trend is a line over time, over temperature, or over whatever runs differ in. A jump is one level
 before, another behind. Each is judged with what runs scatter besides and with what neighbouring

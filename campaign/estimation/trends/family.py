@@ -1,4 +1,4 @@
-"""Many quantities of one report: which changes would have been declared."""
+"""Declared changes among many quantities of one report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well each of several points is known by itself, when few repeats are behind each of them.
+"""Errors of single points with few repeats.
 
 A deviation from three repeats is itself known to a third only. Points of one kind are about equally
 well known: each one's variance is drawn towards what all of them have in common, by as much as they

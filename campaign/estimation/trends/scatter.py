@@ -1,4 +1,4 @@
-"""Regression on few points that scatter by more than their own errors, and may know of each other.
+"""Regression on few points with excess scatter and autocorrelation.
 
 The model is y = X b + own + between. `own` has the known covariance of the points' intervals.
 `between` is what runs scatter besides: a first-order autoregression in the order of the points,

@@ -1,4 +1,4 @@
-"""Figures of inverse dynamics: friction over rate, what is left over, predictions, delay."""
+"""Figures of inverse dynamics: friction over rate, residuals, predictions, delay."""
 
 from __future__ import annotations
 

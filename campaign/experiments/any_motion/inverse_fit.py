@@ -1,4 +1,4 @@
-"""What the motions of a rig say of it: delay first, then terms, then how sure each number is."""
+"""Inverse dynamics of motions: delay, then terms, then uncertainty."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.inverse.choosing import Structure, choose, structure
 from campaign.estimation.inverse.coefficients import estimates, shifts
 from campaign.estimation.inverse.delay import find_delay
 from campaign.estimation.inverse.motion import Array, Filtering, Motion
@@ -17,6 +16,7 @@ from campaign.estimation.inverse.position_period import find_period
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.rows import all_rows, rows
 from campaign.estimation.inverse.simulation import relative_rate_error
+from campaign.estimation.inverse.structure_choice import Structure, choose, structure
 from campaign.estimation.inverse.terms import (
     DIRECTIONAL,
     SYMMETRIC,
@@ -25,7 +25,7 @@ from campaign.estimation.inverse.terms import (
     periodic,
 )
 from campaign.estimation.inverse.validation import Prediction, improvement, relative_error
-from campaign.experiments.any_motion.instrumented import (
+from campaign.experiments.any_motion.instrument_estimates import (
     NORMAL_95,
     Instruments,
     held_against,

@@ -1,4 +1,4 @@
-"""Trials as motions: which channels are taken, what is lost, and which motion was wanted."""
+"""Trials as motions: channels, gaps, commanded motion."""
 
 from __future__ import annotations
 

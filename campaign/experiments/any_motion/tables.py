@@ -8,7 +8,7 @@ import numpy as np
 
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.terms import Term
-from campaign.experiments.any_motion.instrumented import Instruments, differs
+from campaign.experiments.any_motion.instrument_estimates import Instruments, differs
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table

@@ -1,4 +1,4 @@
-"""What ramps from rest come to: breakaway torque and stiffness, of an axis or its components."""
+"""Conclusions of a breakaway test: breakaway torque and stiffness."""
 
 from __future__ import annotations
 

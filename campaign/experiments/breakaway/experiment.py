@@ -17,7 +17,7 @@ from pydantic import Field, JsonValue
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Origin, Window
 from campaign.estimation.breakaway_torque import breakaway_torque
-from campaign.estimation.found_excitation import found_ramp
+from campaign.estimation.excitation_detection import found_ramp
 from campaign.estimation.presliding import Presliding, damping_by_ratio, fit_presliding
 from campaign.estimation.relative_rate import (
     LONGEST,
@@ -34,11 +34,11 @@ from campaign.experiments.breakaway.parameters import conclusions_of, parameters
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
-from campaign.experiments.shared import fitting_ramps
+from campaign.experiments.shared import default_ramps
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.conclusion_parts import Settings
-from campaign.experiments.shared.found_trials import named_or_found
+from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
@@ -421,7 +421,7 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting_ramps.breakaway,
+    fit=default_ramps.breakaway,
     warnings=_warnings,
     measure=_measure,
     needs_samples=False,

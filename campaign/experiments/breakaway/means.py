@@ -1,4 +1,4 @@
-"""What the ramps of a breakaway test say together: means, and what ramp rate and dwell shift."""
+"""Means of the ramps of a breakaway test, and the effects of ramp rate and dwell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of a rig from its ramps: breakaway, and interfaces that slip one after the other.
+"""Parameters from ramps: breakaway, and interfaces that slip one after the other.
 
 Small motions show the sum over all interfaces before any of them slips. A ramp up to sliding goes
 on to where the weaker ones have slipped, and so shows what the strongest has by itself, and how

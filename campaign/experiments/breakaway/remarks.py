@@ -1,4 +1,4 @@
-"""What a user of a breakaway test should know of its numbers, and can do about them."""
+"""Remarks on the numbers of a breakaway test, with what to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a component test comes to: the friction of each component, and their sum."""
+"""Conclusions of a component test: friction of each component, and their sum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of a component friction test: one ramp of each component, and all readings."""
+"""Figure of a component friction test: one ramp of each component, and all readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the means of components say together: their sum, and the share of the load in it."""
+"""Sum of the components' means, and the share of the load."""
 
 from __future__ import annotations
 

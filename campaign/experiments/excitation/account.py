@@ -1,4 +1,4 @@
-"""What an excitation asked for, and what it reached."""
+"""Requested and reached excitation of each trial."""
 
 from __future__ import annotations
 

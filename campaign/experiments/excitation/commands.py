@@ -1,4 +1,4 @@
-"""The commands that the options of an excitation come to.
+"""Commands from the options of an excitation.
 
 Of what the line to a controller has a word for, a command is that word: sums of sines. All else is
 a polyline, of as few points as its course needs; a controller says how many it takes.

@@ -1,4 +1,4 @@
-"""What excitations come to: how linear the answer was, and what a series told."""
+"""Conclusions of an excitation test: linearity, and results of a series."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Excitation: a motion or a torque made to identify from.
+"""Excitation: a motion or torque designed for identification.
 
 Odd random-phase multisines show the response with its noise and distortion, a Fourier series
 searched for the lowest condition number shows inertia and friction; chirps, noise and a file of
@@ -34,11 +34,11 @@ from campaign.experiments.responses.figures import coherence_figure, response_fi
 from campaign.experiments.responses.signals import usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
-from campaign.experiments.shared.choices import Choices, share
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
 from campaign.experiments.shared.conclusion_parts import Parts, Settings, conclusion, shared
-from campaign.experiments.shared.fitting import NO_ROOM, PEAK, usual
+from campaign.experiments.shared.default_options import NO_ROOM, PEAK, usual
 from campaign.experiments.shared.rig import MOST, Rig
+from campaign.experiments.shared.rounded_choices import Choices, share
 from campaign.physics.bench import Bench
 from campaign.result import Finding, Result, Value
 from campaign.trial import Task, TrialRequest

@@ -1,4 +1,4 @@
-"""Figures of excitations: what was asked, and what was reached."""
+"""Figures of excitations: requested and reached."""
 
 from __future__ import annotations
 

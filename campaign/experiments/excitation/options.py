@@ -1,4 +1,4 @@
-"""Options of an excitation: what is commanded, how large, and of a file which columns."""
+"""Options of an excitation: signal, size, and columns of a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of excitations: what was asked, and what was reached."""
+"""Tables of excitations: requested and reached."""
 
 from __future__ import annotations
 

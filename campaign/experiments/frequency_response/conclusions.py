@@ -1,4 +1,4 @@
-"""What frequency responses come to: bandwidth, margins, elastic mode."""
+"""Conclusions of a frequency response: bandwidth, margins, elastic mode."""
 
 from __future__ import annotations
 

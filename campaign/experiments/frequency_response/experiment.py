@@ -58,7 +58,7 @@ from campaign.experiments.interface import (
     bench_of,
     metrics,
 )
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,
     failures_note,
@@ -67,7 +67,7 @@ from campaign.experiments.shared.common import (
     swept,
 )
 from campaign.experiments.shared.conclusion_parts import Settings
-from campaign.experiments.shared.found_trials import sine_response
+from campaign.experiments.shared.detected_trials import sine_response
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
 from campaign.options import Options
@@ -375,7 +375,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     measure=_measure,
     needs_samples=False,
-    fit=fitting.frequency_response,
+    fit=default_options.frequency_response,
     recorded=_found,
     windows=(STEADY,),
     requires={

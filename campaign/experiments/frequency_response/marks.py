@@ -1,4 +1,4 @@
-"""Bandwidth and margins in a Bode diagram, at their frequencies, and side by side by method."""
+"""Bandwidth and margins as marks in a Bode diagram, by method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sines of the rate or torque command within a bench's limits, and the angle that they swing."""
+"""Sine commands of rate or torque within a bench's limits."""
 
 from __future__ import annotations
 

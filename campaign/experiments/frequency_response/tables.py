@@ -1,4 +1,4 @@
-"""What measured responses say, as tables and findings: servo characteristics and elastic modes."""
+"""Tables and findings of measured responses: servo characteristics, elastic modes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What friction-velocity maps come to: parameters of each direction, and how far they repeat."""
+"""Conclusions of friction-velocity maps: parameters of each direction, repeatability."""
 
 from __future__ import annotations
 

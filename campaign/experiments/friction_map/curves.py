@@ -1,4 +1,4 @@
-"""Friction, or a coefficient of it, over rate: what the points of each direction show.
+"""Friction, or its coefficient, over rate: points and curves of each direction.
 
 Of runs of a map and of stretches of any recording alike: a ripple over position is taken out first,
 then there is a Stribeck curve where there are enough speeds, else a straight line, and of one speed
@@ -24,7 +24,7 @@ from campaign.estimation.friction_line import (
 )
 from campaign.estimation.intervals import multiplied, shifted_by
 from campaign.estimation.ripple import Ripple, ripple_of_points, window_noise
-from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.estimation.stribeck import PARAMETERS, fit_stribeck, stribeck
 from campaign.estimation.velocity_map import (
     DirectionFit,

@@ -1,4 +1,4 @@
-"""Points of a map in a recording that nobody planned: where the load slides steadily."""
+"""Points of a map in an unplanned recording with steady sliding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One friction-velocity map: its fits, and the tables, figures and findings of them."""
+"""Result of one friction-velocity map: fits, tables, figures, findings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from campaign.experiments.friction_map.figures import fit_figure, map_figure, ra
 from campaign.experiments.friction_map.pilot import settled_enough
 from campaign.experiments.friction_map.points import points_of, steady
 from campaign.experiments.friction_map.runs import OWN
-from campaign.experiments.friction_map.sliding import by_direction, parameters_of
+from campaign.experiments.friction_map.steady_recordings import by_direction, parameters_of
 from campaign.experiments.friction_map.tables import (
     curve_findings,
     map_findings,

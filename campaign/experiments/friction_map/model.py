@@ -1,4 +1,4 @@
-"""Friction over rate as parameters: of the runs of a map, or of wherever a recording is steady.
+"""Parameters of friction over rate, from the runs of a map or any steady recording.
 
 Runs of a map are analysed as in their report; stretches of other recordings as in theirs.
 """
@@ -15,7 +15,7 @@ from campaign.experiments.friction_map.curves import MEANINGS, Curves
 from campaign.experiments.friction_map.figures import rate_figure
 from campaign.experiments.friction_map.map_result import one_map
 from campaign.experiments.friction_map.runs import DIRECTIONS, REQUIRED
-from campaign.experiments.friction_map.sliding import KEYS, parameters_of, sliding_of
+from campaign.experiments.friction_map.steady_recordings import KEYS, parameters_of, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Model, TestData, TrialData

@@ -1,4 +1,4 @@
-"""The pilot of a friction-velocity map: a few speeds, which decide where the others tell most.
+"""The pilot of a friction map: a few speeds that decide the others.
 
 The pilot's speeds are spread evenly over those of the plain map. Its runs settle for as long as
 they measure, for nobody knows friction yet, and are points of the map where that was long enough.

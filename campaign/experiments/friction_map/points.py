@@ -1,4 +1,4 @@
-"""Friction at one steady rate: what a point is, and the points of runs of a map."""
+"""Points of a friction map: friction at one steady rate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from campaign.axis_kind import unit_here
+from campaign.axis_kind import axis_unit
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, NORMAL_LOAD, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import multiplied
@@ -260,7 +260,7 @@ def _with_rule(point: Point, reason: Reason) -> Point:
 
 def _speeds(points: Sequence[Point]) -> str:
     told = (f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
-    return f"{', '.join(told)} {unit_here('deg/s')}"
+    return f"{', '.join(told)} {axis_unit('deg/s')}"
 
 
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:

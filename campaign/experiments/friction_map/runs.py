@@ -1,4 +1,4 @@
-"""Runs of a friction-velocity map: what is planned for each speed, and which parts are measured.
+"""Runs of a friction map: planned trial and measured windows of each speed.
 
 Each trial runs out at one speed and back at the same, so it ends where it began and needs no
 homing.

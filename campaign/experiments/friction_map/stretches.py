@@ -1,4 +1,4 @@
-"""Steady stretches of trials, with the load that presses the surfaces together where it is known.
+"""Steady stretches of trials, with the normal load where it is known.
 
 Of a tribometer friction means little without its normal load: over it, it is a coefficient.
 """
@@ -19,7 +19,7 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
-from campaign.estimation.over_a_turn import OverATurn, over_a_turn
+from campaign.estimation.angle_dependence import OverATurn, over_a_turn
 from campaign.estimation.steady_sliding import steady_sliding
 from campaign.estimation.steady_stretches import SHORTEST_TIME, steady_stretches
 from campaign.experiments.friction_map.points import Point, with_constants

@@ -1,4 +1,4 @@
-"""What a friction-velocity map says, as tables, findings and sentences."""
+"""Tables, findings and sentences of a friction-velocity map."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.estimation.both_directions import correlation
 from campaign.estimation.intervals import with_error
-from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.experiments.friction_map.curves import DIGITS, Curves

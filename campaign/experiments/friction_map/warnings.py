@@ -1,4 +1,4 @@
-"""What the plan of a friction-velocity map can know before anything moves, and what to do about it.
+"""Warnings of the plan of a friction-velocity map.
 
 Only of what the bench describes: where friction is not described nothing is warned of.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.estimation.extrapolated import FAR, FEWEST_BELOW
+from campaign.estimation.extrapolation import FAR, FEWEST_BELOW
 from campaign.estimation.ripple import FASTEST, LEAST_PERIODS
 from campaign.estimation.stribeck import PARAMETERS
 from campaign.experiments.friction_map.runs import (

@@ -1,4 +1,4 @@
-"""What outputs of friction models come to: largest torque, and torque at the reversal."""
+"""Conclusions on model outputs: largest torque, and torque at the reversal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What friction models say to a prescribed sinusoidal rate, without a plant (Figures 4.10, 4.14).
+"""Output of friction models at a sinusoidal rate, without a plant (Figures 4.10, 4.14).
 
 The load is moved exactly as prescribed, so nothing but the model decides the torque. The friction
 of the bench can be described by several models, its compensators run on the same rate, and each
@@ -16,7 +16,7 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.estimation.sampled import LOST, at_sample, bracketed, named, peak
+from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, named, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.model_output.conclusions import model_output_conclusions
 from campaign.experiments.model_output.figures import (

@@ -1,4 +1,4 @@
-"""What friction models say to a sinusoidal rate, in figures, and whose output each is."""
+"""Figures of model outputs at a sinusoidal rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recorded motion shows: its steady stretches, and friction of each direction from them."""
+"""Steady stretches of a recorded motion, and friction of each direction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from campaign.estimation.intervals import difference, multiplied, shifted_by
 from campaign.experiments.friction_map.curves import ANGLE, COEFFICIENT, FRICTION
 from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.friction_map.sliding import Sliding, sliding_of
+from campaign.experiments.friction_map.steady_recordings import Sliding, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import conditions

@@ -1,4 +1,4 @@
-"""What recorded motions come to: friction of each direction, and how far a reference was met."""
+"""Conclusions on recorded motions: friction of each direction, tracking."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Any motion, as it was recorded: its course, its force, its tracking error, friction over rate.
+"""Any recorded motion: course, force, tracking error, friction over rate.
 
 For recordings that nobody planned as an experiment of this program. Friction is read where the axis
 happens to slide steadily (Equation 4.1 without acceleration), in both directions; nothing is

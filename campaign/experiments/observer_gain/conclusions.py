@@ -1,4 +1,4 @@
-"""What a study of the observer's gain comes to: what the chosen gain gives, and what more does."""
+"""Conclusions of the observer-gain study: benefit and cost of the gain."""
 
 from __future__ import annotations
 

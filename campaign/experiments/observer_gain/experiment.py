@@ -1,4 +1,4 @@
-"""The gain of the disturbance observer: what more of it gives, and what it costs (5.3.2 to 5.3.4).
+"""Observer gain: benefit and cost of a higher gain (5.3.2 to 5.3.4).
 
 Three things are measured at every gain, beside what the linear theory says of the same bench:
 the stabilization error under base motion; how much of a disturbance torque comes through as rate
@@ -38,11 +38,11 @@ from campaign.experiments.observer_gain.metrics import (
     own_observer,
     worst_ratio,
 )
-from campaign.experiments.shared import fitting
-from campaign.experiments.shared.choices import Choices, nice, share
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import with_changes
 from campaign.experiments.shared.pointing_error import windows_of
 from campaign.experiments.shared.rig import MOST
+from campaign.experiments.shared.rounded_choices import Choices, nice, share
 from campaign.options import Options
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
@@ -141,7 +141,7 @@ def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, Chosen]:
     )
     if kept != options.disturbance_frequencies:
         choices.take("disturbance_frequencies", kept, f"whose cycles are within {why}")
-    return {**fitting.base_motion(options, bench), **choices.told}
+    return {**default_options.base_motion(options, bench), **choices.told}
 
 
 def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest]:

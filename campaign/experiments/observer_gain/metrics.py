@@ -1,4 +1,4 @@
-"""What one recording of the observer-gain study says, and what the recordings at one gain say."""
+"""Metrics of one recording, and of all recordings at one gain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a joint fit below breakaway looks like: records of trials, tables, figures, remarks."""
+"""Records, tables, figures and remarks of a joint fit below breakaway."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a drive's torque is between its samples, where a sampled controller holds its command.
+"""Torque of a drive between samples of a sampled controller.
 
 A current loop answers to each new command at once, and then flattens until the next one. Samples
 of the current are taken when a new command comes, so that a smooth curve through them lags behind

@@ -1,4 +1,4 @@
-"""Options of a presliding-multisine test, and of the model of small motions."""
+"""Options of a presliding multisine, and of the model of small motions."""
 
 from __future__ import annotations
 

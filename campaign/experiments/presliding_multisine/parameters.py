@@ -1,4 +1,4 @@
-"""Parameters of a rig from small motions: stiffness and damping of the bristles, and inertia.
+"""Parameters from small motions: stiffness, damping, inertia.
 
 What is found is the sum over all interfaces, before any of them slips: with one interface that is a
 number of the bench, with several only their sum is known, and no bench file has a place for it.

@@ -1,4 +1,4 @@
-"""Trials as small motions below breakaway: which are, which are not and why."""
+"""Selection of trials with small motions below breakaway."""
 
 from __future__ import annotations
 

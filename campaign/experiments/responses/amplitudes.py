@@ -1,4 +1,4 @@
-"""Recordings of a multisine grouped by their amplitude, as it was recorded."""
+"""Multisine recordings grouped by recorded amplitude."""
 
 from __future__ import annotations
 

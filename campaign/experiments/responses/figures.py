@@ -1,4 +1,4 @@
-"""Figures of responses: Bode with intervals and what was fitted, distortion, coherence."""
+"""Figures of responses: Bode with intervals and fits, distortion, coherence."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Distortion, Level
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.responses.sources import Source

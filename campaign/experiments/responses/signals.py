@@ -1,4 +1,4 @@
-"""What of a trial is input, output and reference of a response, and which stretches have no gap."""
+"""Input, output and reference of a response, and stretches without gaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Responses of trials that belong together: sines, repeated multisines, and any other recording."""
+"""Responses of trials of one kind: sines, repeated multisines, other recordings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
-from campaign.estimation.frequency.measured import MeasuredResponse, closed_from_open
+from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency.welch import Estimator, Record, welch_response
@@ -20,7 +20,7 @@ from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.amplitudes import Recorded, by_amplitude, size_of
-from campaign.experiments.responses.repeating import (
+from campaign.experiments.responses.periodicity import (
     found_repeating,
     repeated,
     unused,

@@ -1,4 +1,4 @@
-"""Tables of responses: what they were measured with, distortion in the band and line by line."""
+"""Tables of responses: setup, distortion in the band and line by line."""
 
 from __future__ import annotations
 

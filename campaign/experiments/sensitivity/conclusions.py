@@ -1,4 +1,4 @@
-"""What a sensitivity study comes to: which parameter of a model has to be known how well."""
+"""Conclusions of a sensitivity study: required accuracy of each parameter."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from campaign.experiments.sensitivity.results import (
     sensitivity_findings,
     sensitivity_table,
 )
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import failures_note, with_changes
 from campaign.experiments.shared.pointing_error import (
     error_of,
@@ -261,7 +261,7 @@ EXPERIMENT = Experiment(
     options=SensitivityOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting.base_motion,
+    fit=default_options.base_motion,
     perturbs_bench=True,
     measure=_measure,
     needs_samples=False,

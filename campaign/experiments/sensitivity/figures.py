@@ -1,4 +1,4 @@
-"""Figures of the sensitivity study: thresholds side by side, and the error over each parameter."""
+"""Figures of the sensitivity study: thresholds, and error over each parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a compensation's friction model says when one parameter differs (Figures 5.12 and 5.13).
+"""Output of a compensation's model with one changed parameter (Figures 5.12, 5.13).
 
 The model runs alone on a prescribed sinusoidal rate, with no plant and no loop around it: as it is,
 and with each parameter lower and higher. The parameters of presliding show around a reversal, over

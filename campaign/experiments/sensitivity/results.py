@@ -1,4 +1,4 @@
-"""What the sensitivity study says: thresholds and ranks of parameters, their table and figure."""
+"""Thresholds and ranks of parameters: table and figure."""
 
 from __future__ import annotations
 

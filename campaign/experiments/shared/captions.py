@@ -1,11 +1,11 @@
-"""Captions made from what a figure shows: numbers with their units, lists, and trials."""
+"""Parts of captions: numbers with units, lists, trials."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 
-from campaign.axis_kind import unit_here
+from campaign.axis_kind import axis_unit
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import TrialData
 from campaign.text import pretty_unit
@@ -19,7 +19,7 @@ def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
     """
     if not math.isfinite(value):
         return "an unknown size"
-    unit, display = unit_here(unit), unit_here(display)
+    unit, display = axis_unit(unit), axis_unit(display)
     shown = convert(value, unit, display or unit)
     large = abs(float(f"{shown:.{digits}g}")) >= 10.0**digits  # 999.7 is 1000
     text = f"{shown:.0f}" if large else f"{shown:#.{digits}g}".rstrip(".")
@@ -28,7 +28,7 @@ def amount(value: float, unit: str, display: str = "", digits: int = 3) -> str:
 
 def setting(value: float, unit: str, display: str = "") -> str:
     """A number that was set, for a caption, `1.5 N·m`: no digits that nobody has set."""
-    unit, display = unit_here(unit), unit_here(display)
+    unit, display = axis_unit(unit), axis_unit(display)
     return _with_unit(f"{convert(value, unit, display or unit):.4g}", display or unit)
 
 

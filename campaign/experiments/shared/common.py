@@ -1,4 +1,4 @@
-"""What several analyses need: groups of trials, conditions for findings, picks from a sweep."""
+"""Common parts of analyses: groups of trials, conditions, picks from a sweep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What conclusions are put together from: conditions, numbers, ratios, ranges over a sweep.
+"""Parts of conclusions: conditions, numbers, ratios, ranges over a sweep.
 
 A sentence holds estimates, not text of numbers: units and intervals are the report's business, and
 so is whether a ratio is called more or less. What was set is an estimate, too, that is `given`.

@@ -1,4 +1,4 @@
-"""Friction by direction, and the constant force that a motion cannot tell from its asymmetry.
+"""Friction by direction, and a constant force that resembles its asymmetry.
 
 A sensor's zero, or a weight, of size c adds c to the friction of the positive direction and takes c
 from that of the negative one. Half of the difference is what may be such a force; the mean of both

@@ -1,4 +1,4 @@
-"""What the virtual experiments on friction share: one bench with its friction in several models."""
+"""The bench of virtual friction experiments, with friction in several models."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import JsonValue, ValidationError
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import shifted_by
-from campaign.estimation.sampled import together
+from campaign.estimation.sampled_curve import together
 from campaign.experiments.interface import Metrics, TrialData, metrics
 from campaign.experiments.shared.common import grouped
 from campaign.physics.bench import Bench

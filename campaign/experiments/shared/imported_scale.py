@@ -1,4 +1,4 @@
-"""Channels that were made of columns from elsewhere: how well the constant is known."""
+"""Uncertainty of the scale of imported channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clauses of conclusions about friction models: one for each model and place of a sweep."""
+"""Clauses of conclusions on friction models, by model and swept value."""
 
 from __future__ import annotations
 

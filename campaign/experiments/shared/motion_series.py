@@ -1,4 +1,4 @@
-"""A measured motion of the hull as a signal: from the text of a CSV file to its acceleration.
+"""A measured hull motion as a signal, from CSV text to acceleration.
 
 Whatever was measured is met exactly at every sample. A rate is a straight line from sample to
 sample, so its acceleration is a staircase; an angle is a natural-ended cubic spline, whose second
@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.axis_kind import words_here
+from campaign.axis_kind import in_axis_terms
 from campaign.signals import Array, Polyline
 from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME, Quantity
 
@@ -37,7 +37,7 @@ def kind_of(unit: str) -> Kind:
             continue
         return kind  # type: ignore[return-value]
     known = "; ".join(
-        f"{words_here(kind)}: {', '.join(q.here.accepts)}" for kind, q in KINDS.items()
+        f"{in_axis_terms(kind)}: {', '.join(q.here.accepts)}" for kind, q in KINDS.items()
     )
     raise ValueError(f"{unit!r} is no unit of a motion; allowed are {known}")
 

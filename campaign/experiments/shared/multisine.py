@@ -1,4 +1,4 @@
-"""Odd random-phase multisines, and their sizes below breakaway as they suit a bench.
+"""Odd random-phase multisines, sized for motion below breakaway.
 
 A sum of odd multiples of a lowest frequency, in random phases and all of one size: even distortion
 of what is excited falls between its lines (Pintelon and Schoukens, "System Identification: A
@@ -15,8 +15,8 @@ import numpy as np
 
 from campaign.estimation.excitation_design.passage import first_passage
 from campaign.experiments.interface import Chosen
-from campaign.experiments.shared.choices import Choices, nice
 from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.rounded_choices import Choices, nice
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.loop import at_load

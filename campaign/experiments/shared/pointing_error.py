@@ -1,4 +1,4 @@
-"""The pointing error of a trial under base motion: its windows, and its metric.
+"""Pointing error of a trial under base motion: windows and metric.
 
 Several experiments measure it. Their analyses build on the metric, which is archived with a trial;
 samples are read for figures.

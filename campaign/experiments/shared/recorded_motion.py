@@ -1,4 +1,4 @@
-"""Any recorded motion as the trials of an experiment that plans none."""
+"""Trials of experiments that analyze any recorded motion."""
 
 from __future__ import annotations
 

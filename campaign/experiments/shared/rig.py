@@ -1,4 +1,4 @@
-"""What a bench tells before anything moves that the size of an experiment depends on.
+"""Facts of a bench that size an experiment.
 
 Where friction is not described its sizes are None, and whoever asks takes what the limits allow.
 """
@@ -17,7 +17,7 @@ from campaign.physics.limit_watch import judged_samples
 from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import loops_of
+from campaign.physics.plan_loops import loops_of
 from campaign.units import rate_here
 
 SLOW = 1e-9

@@ -1,4 +1,4 @@
-"""Swept values as people read them: with a name, in the unit that they are read in.
+"""Swept values as text, with name and unit.
 
 A path is an option of the test (`frequency`) or a value of its bench (`bench.gear.preload.torque`);
 its quantity stands where it is declared.
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 from campaign.experiments.interface import bench_of
 from campaign.options import Options, describe
-from campaign.physics.known import number_at
+from campaign.physics.bench_knowledge import number_at
 from campaign.result import Axis, Value
 from campaign.text import pretty_unit
 from campaign.trial import Trial

@@ -1,4 +1,4 @@
-"""What no repetition can show: how far a bench's own constants move what was measured with them.
+"""Systematic parts from a bench's own constants.
 
 A torque is a current times the torque constant, and friction is that torque less J times an
 acceleration. How uncertain those constants are, a bench may say.

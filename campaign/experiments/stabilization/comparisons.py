@@ -1,4 +1,4 @@
-"""What stabilization errors say beside each other: how much a method wins, what a preload costs."""
+"""Ratios of stabilization errors: benefit of a method, cost of a preload."""
 
 from __future__ import annotations
 

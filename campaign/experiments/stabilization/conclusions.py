@@ -1,4 +1,4 @@
-"""What a stabilization test comes to: what each method leaves of the error without compensation."""
+"""Conclusions of a stabilization test: remaining error of each method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The error of each method, with its interval: side by side, or along a swept number."""
+"""Stabilization error of each method with its interval, also over a sweep."""
 
 from __future__ import annotations
 

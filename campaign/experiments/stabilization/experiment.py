@@ -1,4 +1,4 @@
-"""Stabilization under base motion: how still the load stays in space, by compensation method.
+"""Stabilization under base motion: pointing error of each compensation.
 
 The hull swings, the rate command is zero, and the standard deviation of the integrated gyro rate is
 the stabilization error (sections 5.2 and 5.3): over whole cycles where the motion is sinusoidal,
@@ -26,14 +26,14 @@ from campaign.channels import (
 )
 from campaign.estimate import Estimate
 from campaign.estimation.prediction_interval import of_next
-from campaign.estimation.sampled import LOST
+from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
 from campaign.experiments.shared.conclusion_parts import Settings
-from campaign.experiments.shared.found_trials import hull_sine
+from campaign.experiments.shared.detected_trials import hull_sine
 from campaign.experiments.shared.pointing_error import (
     MEASURED,
     error_of,
@@ -323,7 +323,7 @@ EXPERIMENT = Experiment(
     options=StabilizationOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=fitting.base_motion,
+    fit=default_options.base_motion,
     recorded=_found,
     windows=(MEASURED,),
     measure=_measure,

@@ -1,4 +1,4 @@
-"""Figures of the stabilization test: errors by method, and one trial of each method over time."""
+"""Figures of the stabilization test: errors by method, one trial over time."""
 
 from __future__ import annotations
 

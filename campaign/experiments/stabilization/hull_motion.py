@@ -1,4 +1,4 @@
-"""How the hull moves in a stabilization test: a sine, a measured series, or a ship in a seaway."""
+"""Hull motion of a stabilization test: sine, measured series, or ship motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compensations with identified values beside those they are the twins of, at each place."""
+"""Identified compensations beside their originals, at each swept value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The relative rate of a load under base motion, as a whole and where it passes zero."""
+"""Relative rate of a load under base motion, whole and near reversals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What step responses come to: rise, settling, overshoot, remaining error."""
+"""Conclusions on step responses: rise, settling, overshoot, remaining error."""
 
 from __future__ import annotations
 

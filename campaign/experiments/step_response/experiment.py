@@ -1,4 +1,4 @@
-"""Step response of the rate loop, as a rule without friction: how it was tuned (section 4.2.3)."""
+"""Step response of the rate loop, usually without friction (section 4.2.3)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from campaign.channels import COMMAND, GYRO_RATE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import of_repeats
 from campaign.estimation.rise_time import rise_interval
-from campaign.estimation.sampled import drop_interval_if_deterministic
+from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.estimation.step_response import (
     NOT_SETTLED,
     StepCharacteristics,
     step_characteristics,
 )
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.shared import fitting
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,
     failures_note,
@@ -29,7 +29,7 @@ from campaign.experiments.shared.common import (
     swept,
 )
 from campaign.experiments.shared.conclusion_parts import Settings
-from campaign.experiments.shared.found_trials import step_found
+from campaign.experiments.shared.detected_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.experiments.step_response.conclusions import step_conclusions
 from campaign.experiments.step_response.results import Step, step_figure, step_table
@@ -293,7 +293,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     measure=_measure,
-    fit=fitting.step_response,
+    fit=default_options.step_response,
     recorded=_found,
     windows=(REST, ANSWER),
     perturbs_bench=True,

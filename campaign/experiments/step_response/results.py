@@ -1,4 +1,4 @@
-"""What steps come to as a table and a figure: rise, settling, overshoot and what error stays."""
+"""Table and figure of step responses: rise, settling, overshoot, remaining error."""
 
 from __future__ import annotations
 

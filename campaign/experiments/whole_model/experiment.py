@@ -1,4 +1,4 @@
-"""Whole friction models along any motion, fitted through the engine and compared on unseen motion.
+"""Friction models along any motion, fitted through the engine and compared.
 
 The friction models of this program meet the measured rate, with their own state; inertia, delay and
 linear terms are fitted with them. What has no information goes to no bench file.
@@ -23,7 +23,7 @@ from campaign.experiments.shared.recorded_motion import of_any_motion
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.experiments.whole_model.models import USUAL
 from campaign.experiments.whole_model.parts import telling_parts
-from campaign.experiments.whole_model.shown import figures, models_table, values_table
+from campaign.experiments.whole_model.tables_and_figures import figures, models_table, values_table
 from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
 from campaign.options import Options
 from campaign.parameter import Identified, Parameter, Unseen

@@ -1,4 +1,4 @@
-"""Friction models as unknowns: what each states of itself, with both directions or one."""
+"""Friction models as sets of unknowns, with equal or separate directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from campaign.estimation.unknowns import Unknown
 from campaign.physics.friction import friction_models
-from campaign.physics.friction.sought import Derived, Sizes, Sought
+from campaign.physics.friction.unknowns import DerivedOption, FrictionUnknown, Sizes
 from campaign.text import nearest
 
 USUAL = ("stribeck", "lugre")
@@ -28,8 +28,8 @@ class Model:
 
     name: str
     model: str
-    numbers: tuple[Sought, ...]
-    derived: tuple[Derived, ...] = ()
+    numbers: tuple[FrictionUnknown, ...]
+    derived: tuple[DerivedOption, ...] = ()
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -63,9 +63,9 @@ def models(sizes: Sizes, names: Sequence[str] = USUAL) -> Sequence[Model]:
         known = friction_models()
         if name not in known:
             raise ValueError(f"there is no friction model {name!r}{nearest(name, known)}")
-        sought = known[name].sought
-        if sought is None:
-            there = ", ".join(each for each in known if known[each].sought is not None)
+        unknowns = known[name].unknowns
+        if unknowns is None:
+            there = ", ".join(each for each in known if known[each].unknowns is not None)
             raise ValueError(f"{name} does not say what is fitted of it; there are {there}")
         ways = (
             [("by direction", True)]
@@ -73,8 +73,8 @@ def models(sizes: Sizes, names: Sequence[str] = USUAL) -> Sequence[Model]:
             else [("directions alike", False), ("by direction", True)]
         )
         for way, by_direction in ways:
-            stated = sought(sizes, by_direction)
-            numbers = tuple(each for each in stated if isinstance(each, Sought))
-            derived = tuple(each for each in stated if isinstance(each, Derived))
+            stated = unknowns(sizes, by_direction)
+            numbers = tuple(each for each in stated if isinstance(each, FrictionUnknown))
+            derived = tuple(each for each in stated if isinstance(each, DerivedOption))
             found.append(Model(f"{name}, {way}", name, numbers, derived))
     return found

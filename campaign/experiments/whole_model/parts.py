@@ -1,4 +1,4 @@
-"""Parts of long motions that tell most of a friction model: a fit of all would take minutes."""
+"""Parts of long motions with most information on friction."""
 
 from __future__ import annotations
 

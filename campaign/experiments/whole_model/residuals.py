@@ -1,4 +1,4 @@
-"""What a friction model leaves over of the force of motions, for any values of the model."""
+"""Residual force of motions for any values of a friction model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from campaign.estimation.inverse.rows import all_rows, late_force, moving
 from campaign.estimation.inverse.terms import TERMS, Term
 from campaign.estimation.whole_model import Values
 from campaign.experiments.whole_model.models import Model
-from campaign.physics.friction_along import Along
+from campaign.physics.friction_response import Along
 
 STEPS = 10
 """Simulated steps of a row at least: rates of a motion are low-passed, and rows all the more."""

@@ -1,4 +1,4 @@
-"""Friction models fitted to motions, and compared on what none of them was fitted to."""
+"""Friction models fitted to motions, and compared on unseen rows."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.choosing import criterion, structure
 from campaign.estimation.inverse.motion import Filtering, Motion, kept_times
 from campaign.estimation.inverse.rows import late_force, moving
+from campaign.estimation.inverse.structure_choice import criterion, structure
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
 from campaign.estimation.inverse.validation import Prediction, improvement, relative_error
 from campaign.estimation.unknowns import Unknown
@@ -32,7 +32,7 @@ from campaign.experiments.any_motion.motions import Moved, never_moved
 from campaign.experiments.interface import say_at
 from campaign.experiments.whole_model.models import USUAL, Model, models
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
-from campaign.physics.friction.sought import Derived, Sizes
+from campaign.physics.friction.unknowns import DerivedOption, Sizes
 from campaign.reason import Cause, Reason
 from campaign.text import words
 
@@ -385,7 +385,7 @@ def predicted(one: Fit, motions: Sequence[Motion], filtering: Filtering) -> tupl
     return tuple(Prediction(kept_times(each, filtering), *both) for each, *both in sides)
 
 
-def derived(one: Derived, values: Mapping[str, float], fit: ModelFit) -> Estimate:
+def derived(one: DerivedOption, values: Mapping[str, float], fit: ModelFit) -> Estimate:
     """An option that follows from several unknowns, by the delta method.
 
     It is not determined where one of these is not. values: of all unknowns (SI), by name.
@@ -424,7 +424,7 @@ def derived(one: Derived, values: Mapping[str, float], fit: ModelFit) -> Estimat
     return made
 
 
-def _slope(one: Derived, values: Mapping[str, float], name: str) -> float:
+def _slope(one: DerivedOption, values: Mapping[str, float], name: str) -> float:
     """How much it changes with an unknown: a central difference."""
     step = SMALL * abs(values[name]) or SMALL
     low, high = (one.value({**values, name: values[name] + way * step}) for way in (-1.0, 1.0))

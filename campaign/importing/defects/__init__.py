@@ -5,7 +5,7 @@ columns (`importing.made`), times a clock (`even_clock`) and samples read.
 """
 
 from campaign.importing.defects.defect import Defect
-from campaign.importing.defects.finding import find
+from campaign.importing.defects.find_defects import find
 
 __all__ = ["CHANNEL_KINDS", "Defect", "find"]
 

@@ -1,4 +1,4 @@
-"""What is wrong between an angle and its rate: factor, sign, delay.
+"""Defects between an angle and its rate: factor, sign, delay.
 
 They are held against each other over stretches of time, by how far each says that the axis moved:
 from sample to sample a quantised angle has no derivative, over a stretch it has a difference.

@@ -1,4 +1,4 @@
-"""The clock behind the times of rows: its step, rounding, gaps, restarts; and as an even clock.
+"""The clock of a table's rows: step, rounding, gaps, restarts.
 
 A missing sample shifts everything behind it for good, a late stamp only itself: that tells a gap
 from jitter. Stamps of a coarse clock jump by its step, which is neither.

@@ -1,4 +1,4 @@
-"""What is wrong with a recording, as data; and what its finders share."""
+"""Defects of a recording as data, and common parts of their detection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a torque, a force or a current: clipping, a swapped sign, a delay, copies.
+"""Defects of torque, force or current: clipping, sign, delay, copies.
 
 It is what accelerates a mass and overcomes friction: a sum of parts that follow from the rate. At
 the right delay they explain it, and at another only as far as a motion is like itself.

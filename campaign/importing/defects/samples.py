@@ -1,4 +1,4 @@
-"""What is wrong with a channel by itself: lost samples, dropouts, wraparound, slowness.
+"""Defects of one channel: lost samples, dropouts, wraparound, slow sampling.
 
 Standing still is no defect, however long: what only a motion would show is judged by how a channel
 enters and leaves the stretch in question. A channel that is slower than its table is held, or

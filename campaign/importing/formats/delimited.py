@@ -1,4 +1,4 @@
-"""CSV, TSV and any other table of text: separator, decimal sign and heading are found.
+"""CSV, TSV and other text tables, with a detected dialect.
 
 Test machines write a table for each step of a procedure, with lines about the step above it: such
 tables lie below each other, each under the same heading.

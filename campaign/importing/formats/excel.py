@@ -1,4 +1,4 @@
-"""Excel workbooks (`.xlsx`): each sheet is read as lines of a text table; needs openpyxl.
+"""Excel workbooks (`.xlsx`): each sheet as a text table; needs openpyxl.
 
 What is read is what Excel last computed and stored: a formula that it never computed has no value.
 Of merged cells only the first holds their text. Dates and times of day become seconds.
@@ -28,7 +28,7 @@ from campaign.importing.interface import (
     read_by,
 )
 from campaign.importing.rows import blocks_of, columns_of
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 
 SAMPLE = 200
 """Rows by which a table is found."""

@@ -1,4 +1,4 @@
-"""HDF5 files, those of MATLAB's version 7.3 among them: datasets by their path, read in parts.
+"""HDF5 files, including MATLAB version 7.3: datasets by path, read in parts.
 
 Nothing outside the file is opened: links to other files, and datasets whose numbers lie in others,
 are left out.
@@ -15,7 +15,7 @@ import numpy as np
 
 from campaign.importing.arrays import OPAQUE, WIDEST, Named, tables_of
 from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table, read_by
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 MOST = 10_000

@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (`.lvm`): blocks, each with a heading of its own and a clock.
+"""LabVIEW measurement files (`.lvm`): blocks with heading and clock.
 
 A block has a column of times for all channels, one for each, or none; then time follows from `X0`
 and `Delta_X`. What stands in the comment column is no channel. Files that LabVIEW wrote without any

@@ -1,4 +1,4 @@
-"""MAT files of version 4 to 7.2: plain variables, Simulink's structures, dSPACE's X and Y.
+"""MAT files of version 4 to 7.2: variables, Simulink structures, dSPACE X and Y.
 
 Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) are in
 no documented form; where there is nothing else, how to save what is in them is said.
@@ -25,7 +25,7 @@ from campaign.importing.interface import (
     Table,
     read_by,
 )
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 
 MOST_TIMES = 100
 """How many times its own size a file may unpack to; what is measured has noise, and does not."""

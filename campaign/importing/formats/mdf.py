@@ -1,4 +1,4 @@
-"""MDF of measuring programs (`.mf4`, `.mdf`), group by group; needs asammdf.
+"""MDF files (`.mf4`, `.mdf`), group by group; needs asammdf.
 
 A group has one clock. Groups are never laid over each other: what one recorded at other moments
 than another would have to be invented.
@@ -23,7 +23,7 @@ from campaign.importing.interface import (
     Table,
     read_by,
 )
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 
 MAGIC = (b"MDF     3.", b"MDF     4.")
 UNFINISHED = b"UnFinMF "

@@ -1,4 +1,4 @@
-"""CSV of Rigol's oscilloscopes: samples are counted, and start and step stand beside the names.
+"""CSV of Rigol oscilloscopes: counted samples, with start and step in the heading.
 
 X,CH1,CH2,Start,Increment,
 Sequence,Volt,Volt,-1.000e-03,2.000e-06

@@ -23,7 +23,7 @@ from campaign.importing.interface import (
     Table,
     read_by,
 )
-from campaign.importing.streaming import tables_streamed
+from campaign.importing.subprocess_reader import tables_streamed
 
 MAGIC = b"TDSm"
 _reading = partial(read_by, "npTDMS", what="TDMS file", extra="tdms")

@@ -1,4 +1,4 @@
-"""TwinCAT Scope's text export: rows of facts about each channel, then times beside values.
+"""TwinCAT Scope text export: channel facts, then times beside values.
 
 A column headed `Name` holds times (ms); the channels up to the next such column share them. Columns
 of other clocks stand in the same rows and have nothing to do with each other: each clock is a

@@ -1,4 +1,4 @@
-"""What a guess says of a column, of a table, of files."""
+"""Draft facts of columns, tables and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which columns make a recording together: of tables that complete each other, and axis by axis.
+"""Columns that form one recording: complementing tables, axis by axis.
 
 A file may hold its channels in tables of their own, or several axes side by side; files of one
 signal each hold a recording together. What is read alike shares its `[columns.NAME]`.

@@ -1,4 +1,4 @@
-"""What a column's name says: its role in the vocabulary of channels, and a unit at its end."""
+"""Role and unit from a column's name."""
 
 from __future__ import annotations
 

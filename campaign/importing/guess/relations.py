@@ -1,4 +1,4 @@
-"""What columns say of each other: rates of angles, units by factors between them, contradictions.
+"""Relations between columns: derivatives, unit factors, contradictions.
 
 A factor proves no unit. What is found here is likely, or takes away what a file states.
 """

@@ -1,4 +1,4 @@
-"""A guess as the text of a mapping: what is known stands, what is not stands behind `# ?`.
+"""A draft as mapping text: known entries, and `# ?` for open ones.
 
 A unit is only written plainly where the file states it; any other is a comment that its reader
 turns into a line, or corrects.

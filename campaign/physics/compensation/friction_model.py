@@ -1,4 +1,4 @@
-"""Model-based compensation: friction models run on the measured relative rate (section 5.2).
+"""Model-based compensation: friction models at the measured relative rate (section 5.2).
 
 The static and the LuGre compensation of the thesis are this method with `stribeck` or `lugre`
 friction inside; any other friction model makes its own compensation the same way.

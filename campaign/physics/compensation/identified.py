@@ -1,4 +1,4 @@
-"""What a compensation is called that holds what was identified: NAME-identified, beside NAME."""
+"""Names of identified compensations: NAME-identified, beside NAME."""
 
 from __future__ import annotations
 

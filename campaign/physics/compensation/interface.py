@@ -1,4 +1,4 @@
-"""What a compensation method is: linear dynamics and friction models between sensors and torque.
+"""The interface of a compensation: linear dynamics and friction models.
 
 Every method here, and every combination of them, is built of the same two parts. A linear block
 (an observer, a filter) reads what the controller can measure. Friction models run on the measured

@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import (
     Array,
@@ -39,17 +39,17 @@ from campaign.physics.friction.interface import (
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.sought import (
+from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.unknowns import (
     BENDING,
     REVERSE,
+    FrictionUnknown,
     Lasting,
     Sizes,
-    Sought,
-    Stated,
+    Unknowns,
     curve,
     stiffness,
 )
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
 from campaign.physics.step_function import AN_INSTANT, Motion
 from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, Time, Torque
 
@@ -214,13 +214,13 @@ def _small_signal(options: ArmstrongOptions) -> SmallSignal:
     return SmallSignal(stuck=spring, stuck_compensation=spring)
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     late = Lasting("the memory lag", lambda options, turning: options["memory_lag"])
-    lag = Sought(
+    lag = FrictionUnknown(
         "memory_lag", "memory_lag", "s", "How late the torque answers to the rate.",
         0.0, MOST_LAG, 0.2 * MOST_LAG, REVERSE, lasts=late,
     )  # fmt: skip
-    dwell = Sought(
+    dwell = FrictionUnknown(
         "dwell_time", "dwell_time", "s", "Time at rest after which half of stiction is back.",
         1e-3, 1e3, 0.1, "rest for different times before it breaks away", logarithmic=True,
         rests_on=("bristle_stiffness",), lasts=BENDING,
@@ -240,5 +240,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "memory_lag", "dwell_time"),
     small_signal=_small_signal,
     fastest=lambda options: options.memory_lag,
-    sought=_sought,
+    unknowns=_unknowns,
 )

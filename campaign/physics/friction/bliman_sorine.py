@@ -36,19 +36,19 @@ from campaign.physics.friction.interface import (
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of
-from campaign.physics.friction.sought import (
+from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.unknowns import (
     BENDING,
     PRESLIDE,
     STATIC,
-    Derived,
+    DerivedOption,
+    FrictionUnknown,
     Sizes,
-    Sought,
-    Stated,
+    Unknowns,
     line,
     static,
     stiffness,
 )
-from campaign.physics.friction.stribeck import in_direction, mean_viscous
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, RotationalStiffness, Torque
 
@@ -159,21 +159,21 @@ def _stored_energy(options: BlimanSorineOptions, state: Array) -> float:
     return float(0.5 * state[0] ** 2 / options.bristle_stiffness)
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     """The slow stiffness as a share of the most with which friction has a peak."""
     peak = static(BENDING, by_direction=by_direction, ratio=(LEAST_PEAK, STATIC[1]), start=1.3)
-    ratios = [each.name for each in peak if isinstance(each, Sought)]
+    ratios = [each.name for each in peak if isinstance(each, FrictionUnknown)]
 
     def slow_stiffness(values: Mapping[str, float]) -> float:
         most = min(1.0 - 1.0 / values[name] for name in ratios)
         return values["slow_share"] * values["bristle_stiffness"] * most
 
-    share = Sought(
+    share = FrictionUnknown(
         "slow_share", "", "", "Slow stiffness, over the most with which friction has a peak.",
         1e-3, 0.99, 0.3, PRESLIDE, logarithmic=True, rests_on=("bristle_stiffness",),
         lasts=BENDING,
     )  # fmt: skip
-    slow = Derived(
+    slow = DerivedOption(
         "slow_stiffness", "slow_stiffness", "N m/rad", "Stiffness of the slow part.", PRESLIDE,
         slow_stiffness,
     )  # fmt: skip
@@ -193,5 +193,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "slow_stiffness"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,
-    sought=_sought,
+    unknowns=_unknowns,
 )

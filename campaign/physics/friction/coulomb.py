@@ -20,8 +20,8 @@ from campaign.physics.friction.interface import (
     FrictionOptions,
     SmallSignal,
 )
-from campaign.physics.friction.sought import line
 from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.unknowns import line
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, Torque
 
@@ -102,5 +102,5 @@ FRICTION = FrictionModel(
         sliding=_sliding,
         static_torque=lambda options, direction: in_direction(options, "coulomb_torque", direction),
     ),
-    sought=lambda sizes, by_direction: line(sizes, by_direction=by_direction),
+    unknowns=lambda sizes, by_direction: line(sizes, by_direction=by_direction),
 )

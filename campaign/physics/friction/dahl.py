@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.elementary import exp, expm1, power, where
 from campaign.physics.friction.coulomb import CURVE, NegativeDirection
 from campaign.physics.friction.coulomb import steady_state as coulomb_steady_state
@@ -29,8 +29,8 @@ from campaign.physics.friction.interface import (
     SmallSignal,
 )
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.sought import line, stiffness
 from campaign.physics.friction.stribeck import in_direction, mean_viscous
+from campaign.physics.friction.unknowns import line, stiffness
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalDamping, RotationalStiffness, Torque
 
@@ -137,7 +137,7 @@ FRICTION = FrictionModel(
     # The power lost is T v (1 - y^i), never negative: y < 1 where T has the sign of v, else > 1.
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
     step_for=_step_for,
-    sought=lambda sizes, by_direction: (
+    unknowns=lambda sizes, by_direction: (
         *line(sizes, by_direction=by_direction),
         stiffness(sizes),
     ),

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.elementary import sin, where
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.lugre import FRICTION as LUGRE
@@ -115,5 +115,5 @@ FRICTION = FrictionModel(
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
-    sought=LUGRE.sought,
+    unknowns=LUGRE.unknowns,
 )

@@ -1,4 +1,4 @@
-"""Parallel Maxwell-slip elements: springs of one displacement that slip, each at its own torque.
+"""Parallel Maxwell-slip elements: springs that slip at their own torques.
 
 They are listed as shares, or follow from a number N and a shape p: torques are equal, and element i
 slips after a way in proportion to i^p. All elements together have the stiffness and the torque that

@@ -27,12 +27,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import called
+from campaign.physics.compilation import called
 from campaign.physics.elementary import exp, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.path import decayed, parts_of, sign_of
-from campaign.physics.friction.sought import SLIDE, Sizes, Sought, Stated, curve, stiffness
 from campaign.physics.friction.stribeck import (
     CURVE,
     CurveOptions,
@@ -41,6 +40,14 @@ from campaign.physics.friction.stribeck import (
     in_direction,
     mean_viscous,
     steady_state,
+)
+from campaign.physics.friction.unknowns import (
+    SLIDE,
+    FrictionUnknown,
+    Sizes,
+    Unknowns,
+    curve,
+    stiffness,
 )
 from campaign.physics.step_function import Motion
 from campaign.units import RotationalStiffness, TorqueRate
@@ -137,10 +144,10 @@ def _stored_energy(options: GmsOptions, state: Array) -> float:
     return float(0.5 * np.sum(state[: len(stiffnesses)] ** 2 / stiffnesses))
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     """A lag s(v) / C that is between a millionth and a thousand times that of a whole stroke."""
     usual = sizes.torque * sizes.rate / sizes.travel
-    attraction = Sought(
+    attraction = FrictionUnknown(
         "attraction", "attraction", "N m/s", "How fast slipping elements approach the curve.",
         1e-3 * usual, 1e6 * usual, 1e2 * usual, SLIDE, logarithmic=True,
     )  # fmt: skip
@@ -159,5 +166,5 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness", "attraction"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,
-    sought=_sought,
+    unknowns=_unknowns,
 )

@@ -1,4 +1,4 @@
-"""What a friction model is, to the bench that describes it and to the engine that advances it."""
+"""The interface of a friction model, for benches and the engine."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 from pydantic.fields import FieldInfo
 
-from campaign.axis_kind import speaking_of, spoken_of
+from campaign.axis_kind import axis_terms, current_sides
 from campaign.options import Options
-from campaign.physics.friction.sought import Sizes, Stated
+from campaign.physics.friction.unknowns import Sizes, Unknowns
 from campaign.units import TORQUE, Phase, Quantity
 
 Array = NDArray[np.float64]
@@ -47,11 +47,11 @@ class FrictionOptions(Options):
     @classmethod
     def _of_its_side(cls, tree: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """Between a rotary motor and a linear load, each side has units of its own."""
-        sides = spoken_of()
+        sides = current_sides()
         if sides.load is sides.motor or not isinstance(tree, Mapping):
             return handler(tree)
         own, rate = (tree.get(name, "load") for name in ("side", "velocity"))
-        with speaking_of(sides.at_motor if own == "motor" else sides):
+        with axis_terms(sides.at_motor if own == "motor" else sides):
             options = handler(tree)
         if own != rate:
             raise ValueError(
@@ -161,8 +161,8 @@ class FrictionModel:
         fastest: the shortest time (s) that a step must resolve for its torque, from validated
             options, besides what `small_signal` says; None: none.
         no_compensation: why it cannot compensate, for a reader; "" where it can.
-        sought: the parameters that motions identify, from the friction's sizes, each direction with
-            its own (True) or both alike. None: it is not identified.
+        unknowns: the parameters that motions identify, from the friction's sizes, for each
+            direction (True) or both alike. None: it is not identified.
     """
 
     name: str
@@ -180,7 +180,7 @@ class FrictionModel:
     dry: DryFriction | None = None
     fastest: Callable[[Any], float] | None = None
     no_compensation: str = ""
-    sought: Callable[[Sizes, bool], Stated] | None = None
+    unknowns: Callable[[Sizes, bool], Unknowns] | None = None
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""

@@ -20,11 +20,10 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import Array, DryFriction, FrictionModel, SmallSignal
 from campaign.physics.friction.path import sign_of
-from campaign.physics.friction.sought import SLIDE_SLOWER, Lasting, Sizes, Sought, Stated, curve
 from campaign.physics.friction.stribeck import (
     CURVE,
     CurveOptions,
@@ -34,6 +33,14 @@ from campaign.physics.friction.stribeck import (
     mean_viscous,
 )
 from campaign.physics.friction.stribeck import steady_state as stribeck_steady_state
+from campaign.physics.friction.unknowns import (
+    SLIDE_SLOWER,
+    FrictionUnknown,
+    Lasting,
+    Sizes,
+    Unknowns,
+    curve,
+)
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate
 
@@ -84,9 +91,9 @@ def steady_state(options: KarnoppOptions, velocity: Array) -> Array:
     return torque
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> Stated:
+def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     passing = Lasting("passing the band", lambda options, turning: options["zero_band"] / turning)
-    band = Sought(
+    band = FrictionUnknown(
         "zero_band", "zero_band", "rad/s", "Rate below which it is brought to rest and held.",
         1e-4 * sizes.rate, sizes.rate, 0.05 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
         lasts=passing,
@@ -114,5 +121,5 @@ FRICTION = FrictionModel(
         "within its band it is the torque that acts on the load, which a controller does not know; "
         "outside it is 'stribeck'"
     ),
-    sought=_sought,
+    unknowns=_unknowns,
 )

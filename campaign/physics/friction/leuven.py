@@ -26,7 +26,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.elementary import power, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
@@ -166,5 +166,5 @@ FRICTION = FrictionModel(
     steady_state=steady_state,
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
-    sought=LUGRE.sought,
+    unknowns=LUGRE.unknowns,
 )

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.elementary import any_of, exp, expm1, power, where
 from campaign.physics.friction.interface import (
     Array,
@@ -23,7 +23,6 @@ from campaign.physics.friction.interface import (
     Presliding,
     SmallSignal,
 )
-from campaign.physics.friction.sought import bristles
 from campaign.physics.friction.stribeck import (
     CURVE,
     NegativeDirection,
@@ -32,6 +31,7 @@ from campaign.physics.friction.stribeck import (
     mean_viscous,
     steady_state,
 )
+from campaign.physics.friction.unknowns import bristles
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, Torque
 
@@ -167,5 +167,5 @@ FRICTION = FrictionModel(
     small_signal=_small_signal,
     stored_energy=_stored_energy,
     step_for=_step_for,
-    sought=lambda sizes, by_direction: bristles(sizes, by_direction=by_direction),
+    unknowns=lambda sizes, by_direction: bristles(sizes, by_direction=by_direction),
 )

@@ -18,19 +18,26 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compiled import called, inlined
+from campaign.physics.compilation import called, inlined
 from campaign.physics.elementary import exp, where
 from campaign.physics.friction.dahl import relaxed
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.lugre import FRICTION as LUGRE
 from campaign.physics.friction.lugre import LuGreOptions
 from campaign.physics.friction.path import parts_of, sign_of
-from campaign.physics.friction.sought import BENDING, PRESLIDE, Sizes, Sought, Stated, bristles
 from campaign.physics.friction.stribeck import (
     curve_parameters,
     curve_torque,
     mean_viscous,
     steady_state,
+)
+from campaign.physics.friction.unknowns import (
+    BENDING,
+    PRESLIDE,
+    FrictionUnknown,
+    Sizes,
+    Unknowns,
+    bristles,
 )
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate
@@ -96,8 +103,8 @@ def _small_signal(options: FadingOptions) -> SmallSignal:
     return SmallSignal(stuck=bristles, stuck_compensation=bristles)
 
 
-def _sought(sizes: Sizes, by_direction: bool) -> Stated:
-    fading = Sought(
+def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
+    fading = FrictionUnknown(
         "damping_velocity", "damping_velocity", "rad/s", "Rate at which sigma1 has fallen to 37 %.",
         1e-4 * sizes.rate, 10.0 * sizes.rate, 0.1 * sizes.rate, PRESLIDE, logarithmic=True,
         lasts=BENDING,
@@ -117,5 +124,5 @@ FRICTION = FrictionModel(
     changeable=(*(LUGRE.changeable or ()), "damping_velocity"),
     small_signal=_small_signal,
     stored_energy=LUGRE.stored_energy,
-    sought=_sought,
+    unknowns=_unknowns,
 )

@@ -1,10 +1,10 @@
-"""What friction models with a state share: a step in parts of one direction, and a closed form."""
+"""Common parts of models with a state: one-directional parts of a step, closed form."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.elementary import expm1, where
 from campaign.physics.step_function import Motion
 

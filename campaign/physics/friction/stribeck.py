@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.compiled import inlined
+from campaign.physics.compilation import inlined
 from campaign.physics.elementary import exp, power, tanh, where
 from campaign.physics.friction.interface import (
     Array,
@@ -22,7 +22,7 @@ from campaign.physics.friction.interface import (
     Presliding,
     SmallSignal,
 )
-from campaign.physics.friction.sought import curve
+from campaign.physics.friction.unknowns import curve
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate, RotationalDamping, Torque
 
@@ -212,5 +212,5 @@ FRICTION = FrictionModel(
         static_torque=lambda options, direction: in_direction(options, "static_torque", direction),
         jumps=lambda options: options.sign_smoothing == 0.0,
     ),
-    sought=lambda sizes, by_direction: curve(sizes, by_direction=by_direction),
+    unknowns=lambda sizes, by_direction: curve(sizes, by_direction=by_direction),
 )

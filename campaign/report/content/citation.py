@@ -1,11 +1,11 @@
-"""How to cite a run: as a sentence, and as an entry of a bibliography."""
+"""Citation of a run: a sentence and a bibliography entry."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
 
-from campaign.access.analysis import source_of, title_of
+from campaign.api.analysis import source_of, title_of
 from campaign.archive import RunReader
 from campaign.report.latex_text import latex
 

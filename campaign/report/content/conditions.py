@@ -1,4 +1,4 @@
-"""Under which conditions a test ran: kind, bench, options that acted, and its sweep, in words."""
+"""Conditions of a test: kind, bench, effective options, sweep."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.experiments.interface import options_of
-from campaign.report.content.recorded_from import recorded_from
+from campaign.report.content.recording_sources import recorded_from
 from campaign.report.content.written_units import TestUnits
 from campaign.text import path_words
 from campaign.trial import Role, canonical_json

@@ -1,4 +1,4 @@
-"""All that a report says of a run, as data: what every format is made from."""
+"""The content of a report as data, common to all formats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.access.analysis import (
+from campaign.api.analysis import (
     AnalysedTest,
     TestAnalysis,
     analyse_run,
@@ -23,9 +23,9 @@ from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import Published
 from campaign.recording import Outcome
+from campaign.report.content.first_screen import Opening, opening_of
 from campaign.report.content.held_values import held_tables
 from campaign.report.content.incidents import Incidents, incidents
-from campaign.report.content.opening import Opening, opening_of
 from campaign.report.content.references import Files, References, compared_with
 from campaign.report.content.settings import tree_settings
 from campaign.report.content.truth import truth_tables

@@ -1,4 +1,4 @@
-"""Is the bench still the same bench: the checks of a run, each against the first of its kind."""
+"""Drift of the bench over a run: each check against the first of its kind."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from campaign.access.analysis import one_line
+from campaign.api.analysis import one_line
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.sound_samples import Trials, without_damaged

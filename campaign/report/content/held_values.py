@@ -1,4 +1,4 @@
-"""True, stated and identified: what compensations hold, beside the bench that was simulated.
+"""True, stated and identified values of compensations.
 
 `campaign identify` leaves a twin beside a compensation, which holds what was identified. Both have
 a model of all friction together, so that what is true of a number is a sum over the interfaces, or
@@ -12,20 +12,20 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
-from campaign.axis_kind import speaking_of, unit_here
+from campaign.axis_kind import axis_terms, axis_unit
 from campaign.estimate import Estimate
 from campaign.physics.bench import Bench
 from campaign.physics.bench_fingerprint import why_altered
+from campaign.physics.bench_knowledge import NORMAL_95
 from campaign.physics.compensation.identified import identified_name
-from campaign.physics.known import NORMAL_95
 from campaign.physics.loop import at_load
 from campaign.physics.true_values import true_of, true_value
 from campaign.published.values import Cell as PublishedCell
 from campaign.published.values import Published, heading_of
 from campaign.report.content.lines import cell_name
-from campaign.report.content.published_beside import cell_of, value_in
+from campaign.report.content.published_columns import cell_of, value_in
 from campaign.report.content.truth import (
     COUNTED,
     SIMULATED,
@@ -86,7 +86,7 @@ def held_tables(
         if not numbers or numbers in told:
             continue
         told.append(numbers)
-        with speaking_of(test.sides):
+        with axis_terms(test.sides):
             table = _table(numbers, test, benches, published)
         if table is not None:
             tables[test.name] = table
@@ -245,7 +245,7 @@ def _row(number: Held, cell: PublishedCell | None, simulated: Sequence[Bench]) -
     """Without a true value where the simulated benches have none, or several."""
     true = {_number(bench, number.quantity, number.conditions) for bench in simulated}
     value = true.pop() if len(true) == 1 else None
-    unit = unit_here(UNITS[number.quantity])
+    unit = axis_unit(UNITS[number.quantity])
     # Bristles' own damping is true of what their stiffness at rest is.
     like = AT_REST if number.quantity == DAMPING else number.quantity
     return {

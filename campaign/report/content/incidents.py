@@ -1,5 +1,4 @@
-"""What happened besides the plan: decisions, steps by hand, attempts, faults, drift of the checks,
-and loops that were close to instability.
+"""Incidents of a run: decisions, operator steps, attempts, faults, drift.
 
 The journal and the trials tell it; nothing is left for the reader of a plain simulated run.
 """

@@ -1,14 +1,14 @@
-"""Key numbers: what the sentences of each test say, as a table for the first screen."""
+"""Key numbers of each test for the first screen."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from campaign.access.analysis import AnalysedTest
-from campaign.access.sentences import alone
-from campaign.axis_kind import speaking_of
-from campaign.experiments.preparing.draws import draws_of
+from campaign.api.analysis import AnalysedTest
+from campaign.api.conclusion_sentences import alone
+from campaign.axis_kind import axis_terms
+from campaign.experiments.post_processing.draws import draws_of
 from campaign.experiments.shared.common import short_label
 from campaign.published.draws import without_seed
 from campaign.published.evidence import speaks_to
@@ -108,7 +108,7 @@ def _of_test(
     if len(said) > 1:
         shared = {n: v for n, v in every[0].items() if all(n in c and c[n] == v for c in every)}
     own = [line for line in lines if line.test == test.name]
-    with speaking_of(test.sides):
+    with axis_terms(test.sides):
         numbers = tuple(
             KeyNumber(
                 quantity_words(finding.quantity),

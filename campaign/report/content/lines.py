@@ -1,4 +1,4 @@
-"""Lines of the scoreboard as text: what was printed, what was found, and what that comes to."""
+"""Scoreboard lines as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loops that were close to instability, or beyond: computed from the benches of archived trials."""
+"""Loops close to or beyond instability, from archived benches."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from campaign.access.analysis import one_line
+from campaign.api.analysis import one_line
 from campaign.archive import RunReader
-from campaign.axis_kind import BOTH_ROTARY, sides_in, speaking_of, words_here
+from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
 from campaign.experiments.interface import bench_of
 from campaign.physics.bench import Bench
-from campaign.physics.loops_used import LoopUse, loops_used
+from campaign.physics.plan_loops import LoopUse, loops_used
 from campaign.reason import Cause
 from campaign.result import Column, Table, Value
 from campaign.trial import Task, canonical_json
@@ -39,7 +39,7 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
             problems.append(f"the loops of {test}: {one_line(error)}")
             continue
         low = (use for use in uses if use.margins.low or not use.margins.stable)
-        with speaking_of(sides[test]):
+        with axis_terms(sides[test]):
             rows += [{"test": test, **_row(use)} for use in low]
     columns = (
         Column("test", "Test"),
@@ -53,8 +53,8 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
         Column("growth", "Fastest pole (1/s)", reason=COMPUTED()),
     )
     kinds = set(sides.values())
-    with speaking_of(kinds.pop() if len(kinds) == 1 else BOTH_ROTARY):
-        note = words_here(NOTE)
+    with axis_terms(kinds.pop() if len(kinds) == 1 else BOTH_ROTARY):
+        note = in_axis_terms(NOTE)
     table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=note)
     return table, problems
 
@@ -72,7 +72,7 @@ def _trials_of(
 
 def _row(use: LoopUse) -> dict[str, Any]:
     margins, stable = use.margins, use.margins.stable
-    mode = words_here(" (torque command)") if use.mode == "torque" else ""
+    mode = in_axis_terms(" (torque command)") if use.mode == "torque" else ""
     return {
         "trial": use.trial,
         "compensation": use.compensation,

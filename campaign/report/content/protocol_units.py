@@ -1,4 +1,4 @@
-"""Which units the text of a run's protocol has, by test and by option."""
+"""Units in the protocol text, by test and option."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reference values and found ones: each test's findings beside what is stated of them.
+"""Stated and external reference values beside findings of each test.
 
 A bench file says how well its numbers are known, `campaign identify` writes that: then a later run
 shows whether the rig, its friction above all, still is what it was. Only where samples do not come
@@ -16,9 +16,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.family import RATE
 from campaign.experiments.interface import bench_of
@@ -27,8 +27,8 @@ from campaign.physics.bench_fingerprint import why_altered
 from campaign.physics.stated_values import stated_value
 from campaign.physics.true_values import QUANTITIES
 from campaign.reason import Cause
-from campaign.references.judged import Judged, Verdict, with_verdicts
 from campaign.references.values import ReferenceValue
+from campaign.references.verdict import Judged, Verdict, with_verdicts
 from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
@@ -99,7 +99,7 @@ def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -
     units = units_of(tests, run.header) if tests else {}
     found: list[Found] = []
     for test in tests:
-        with speaking_of(test.sides):
+        with axis_terms(test.sides):
             found += filter(None, [_stated(run, test)])
             found += (_of_file(p, values, units[test.name]) for p, values in files.items())
     verdicts = iter(with_verdicts([pair for _, _, pairs in found for pair in pairs]))
@@ -109,7 +109,7 @@ def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -
         own = [next(verdicts) for _ in pairs]
         if not own:
             continue
-        with speaking_of(test.sides):
+        with axis_terms(test.sides):
             compared = _compared(own, source, units[test.name])
         if source.key == "stated":
             stated[test.name] = compared

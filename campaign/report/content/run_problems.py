@@ -1,4 +1,4 @@
-"""What went wrong with a run, in plain sentences; nothing of a run that went as planned."""
+"""Problems of a run in plain sentences."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import ArchivedTrial, RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials

@@ -1,4 +1,4 @@
-"""What was set, in words and in the units of the page: benches, options, tasks, motions."""
+"""Settings of benches, options, tasks and motions, in the page's units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from campaign.axis_kind import each_speaking_of, spoken_of, words_here
+from campaign.axis_kind import current_sides, each_in_axis_terms, in_axis_terms
 from campaign.channels import COMMAND, UNITS, AxisKind, info
 from campaign.channels import Quantity as PhysicalQuantity
 from campaign.recording import ChannelInfo
@@ -58,7 +58,7 @@ def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
     yield "window", f"{start} to {stop} s"
     yield "sample rate", _amount(task.sample_rate, ("Hz", "Hz"))
     if task.start_angle:
-        yield words_here("start angle"), _amount(task.start_angle, angle)
+        yield in_axis_terms("start angle"), _amount(task.start_angle, angle)
     if task.stop_rate is not None:
         yield "stops at a rate of", _amount(task.stop_rate, rate)
     if task.spring_stiffness:
@@ -110,8 +110,10 @@ def _signal(signal: Signal, unit: tuple[str, str]) -> str:
 
 def _told(label: str, value: Any, quantity: Quantity | None) -> Pairs:
     if isinstance(value, BaseModel):
-        sides = spoken_of().at_motor if getattr(value, "side", "") == "motor" else spoken_of()
-        for name, text in each_speaking_of(sides, settings_of(value)):
+        sides = (
+            current_sides().at_motor if getattr(value, "side", "") == "motor" else current_sides()
+        )
+        for name, text in each_in_axis_terms(sides, settings_of(value)):
             yield f"{label}: {name}", text
     elif isinstance(value, Mapping):
         for name, item in value.items():
@@ -155,7 +157,7 @@ def _per_second(rate: tuple[str, str]) -> tuple[str, str]:
 
 
 def _words(name: str) -> str:
-    return words_here(name.replace("_", " "))
+    return in_axis_terms(name.replace("_", " "))
 
 
 def _quantity_at(options: Any, path: str) -> Quantity | None:
@@ -163,7 +165,7 @@ def _quantity_at(options: Any, path: str) -> Quantity | None:
     name, _, rest = path.partition(".")
     if isinstance(options, Mapping):
         return _quantity_at(options.get(name), rest) if rest else None
-    sides = spoken_of().at_motor if getattr(options, "side", "") == "motor" else spoken_of()
+    sides = current_sides().at_motor if getattr(options, "side", "") == "motor" else current_sides()
     field = type(options).model_fields.get(name) if isinstance(options, BaseModel) else None
     if field is None:
         return None

@@ -1,4 +1,4 @@
-"""Symbols of the thesis beside what files call them: its Tables 4.2 and 5.1, and the observer's.
+"""Symbols of the thesis and their keys (Tables 4.2, 5.1).
 
 One table for who reads an equation and looks for the number, and for the other way round.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from campaign.axis_kind import BOTH_ROTARY, Sides, speaking_of, unit_here, words_here
+from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, axis_unit, in_axis_terms
 from campaign.text import pretty_unit
 from campaign.units import OBSERVER_GAIN
 
@@ -101,8 +101,8 @@ def _own(symbol: Symbol, sides: Sides) -> Sides:
 
 
 def _meaning(symbol: Symbol, sides: Sides) -> str:
-    with speaking_of(_own(symbol, sides)):
-        return words_here(symbol.meaning)
+    with axis_terms(_own(symbol, sides)):
+        return in_axis_terms(symbol.meaning)
 
 
 def _unit(symbol: Symbol, sides: Sides) -> str:
@@ -110,8 +110,8 @@ def _unit(symbol: Symbol, sides: Sides) -> str:
         return OBSERVER_GAIN.of(sides).si
     if symbol.field == "gear.ratio" and sides.load is not sides.motor:
         return "rad/m"
-    with speaking_of(_own(symbol, sides)):
-        return unit_here(symbol.unit)
+    with axis_terms(_own(symbol, sides)):
+        return axis_unit(symbol.unit)
 
 
 def markdown() -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Tables in a reader's units: few digits on the page, all of them in the CSV file."""
+"""Tables in a reader's units: rounded on the page, exact in CSV."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
-from campaign.axis_kind import words_here
+from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.published.headline import LIMITS, Headline, headline
 from campaign.published.scoreboard import Line, Scoreboard, place_columns
@@ -226,7 +226,7 @@ def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
     for cell in _numbers(table, column):
         if isinstance(cell, Estimate) and cell.has_interval:
             yield from (
-                words_here(p.source) for p in cell.systematic if p.standard_uncertainty is None
+                in_axis_terms(p.source) for p in cell.systematic if p.standard_uncertainty is None
             )
 
 

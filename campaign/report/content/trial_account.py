@@ -1,4 +1,4 @@
-"""All that an archive says of one trial, in a reader's words and units."""
+"""Everything an archive says of one trial, in a reader's units."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep
 from campaign.archive.layout.journal_summary import Lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import trial_number
 from campaign.archive.reading.sound_samples import sound_part
-from campaign.axis_kind import sides_in, speaking_of, words_here
+from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
 from campaign.channels import COMMAND
 from campaign.errors import ArchiveError, CampaignError
 from campaign.estimate import Estimate, Window
@@ -87,7 +87,7 @@ def account_of(
     run: RunReader, archived: ArchivedTrial, story: Lines, test: AnalysedTest | None
 ) -> TrialAccount:
     """What there is to say of an executed trial; `story` is the run's journal."""
-    with speaking_of(sides_in(archived.trial.bench)):
+    with axis_terms(sides_in(archived.trial.bench)):
         return _account(run, archived, story, test)
 
 
@@ -296,7 +296,7 @@ def _metric(found: Estimate) -> Mapping[str, Value]:
     ends = (found.value, *found.combined)
     value, low, high = (None if e is None else convert(e, found.unit, unit) for e in ends)
     return {
-        "name": words_here(found.name.replace("_", " ")),
+        "name": in_axis_terms(found.name.replace("_", " ")),
         "value": interval(value, low, high),
         "unit": pretty_unit(unit),
         "reason": str(found.reason),

@@ -1,4 +1,4 @@
-"""Which trials get a page of their own: `failed`, `all`, numbers and ranges of them."""
+"""Trials with a page of their own: `failed`, `all`, numbers, ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""True, found, interval: each test's findings beside the bench that its samples came from.
+"""True values, findings and intervals of simulated benches.
 
 Only where that bench is known: of a run on `sim`. The report opens the truth when every analysis
 is done; no analysis is given it.
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
-from campaign.axis_kind import speaking_of, words_here
+from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import student
 from campaign.experiments.interface import bench_of
@@ -55,7 +55,7 @@ def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Tab
     plants = run.header.truth.plants
     found = {}
     for test in tests:
-        with speaking_of(test.sides):
+        with axis_terms(test.sides):
             found[test.name] = _table(test, plants, units[test.name])
     return {name: table for name, table in found.items() if table is not None}
 
@@ -173,7 +173,7 @@ def _bias(quantity: str, off: Array, source: str) -> str:
             f" {_signed(high)} %), more than the scatter of the {len(off)}"
         )
     told = f"{quantity}: {where} explains"
-    return f"{told} (largest systematic part: {words_here(source)})" if source else told
+    return f"{told} (largest systematic part: {in_axis_terms(source)})" if source else told
 
 
 def _signed(value: float) -> str:

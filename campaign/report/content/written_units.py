@@ -1,4 +1,4 @@
-"""Values of options and of swept paths in the units that the protocol wrote them in.
+"""Option and sweep values in the protocol's units.
 
 Everything inside is SI, and most quantities have one display unit. But who writes `"3 urad"` means
 microradians, and reads 0.000171887 degrees as somebody else's number. The protocol's text is in the
@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunHeader
 from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench import Bench
-from campaign.physics.known import number_at
+from campaign.physics.bench_knowledge import number_at
 from campaign.protocol.shapes import Shape, shape_at
 from campaign.report.content.protocol_units import leaves_of, written_units
 from campaign.result import Table

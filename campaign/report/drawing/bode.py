@@ -1,4 +1,4 @@
-"""A Bode picture of a bench's rate loop: every compensation, stuck and sliding, with margins."""
+"""Bode plot of a bench's rate loop for every compensation, with margins."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""Numbers against their references: every change in percent, a row each."""
+"""Changes against references in percent, one row each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from campaign.references.judged import Judged, Verdict
+from campaign.references.verdict import Judged, Verdict
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER
 

@@ -1,4 +1,4 @@
-"""Curves of a panel: lines, dots, bands and bars, and the published values beside them."""
+"""Curves of a panel: lines, dots, bands, bars, published values."""
 
 from __future__ import annotations
 

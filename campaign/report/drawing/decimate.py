@@ -1,4 +1,4 @@
-"""Fewer points for a long line, without losing a peak, an end or a gap."""
+"""Decimation of long lines that keeps peaks, ends and gaps."""
 
 from __future__ import annotations
 

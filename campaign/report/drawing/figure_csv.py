@@ -1,4 +1,4 @@
-"""The numbers behind a figure as CSV: what its curves show, in the units of its axes."""
+"""Numbers of a figure as CSV, in the units of its axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawing `result.Figure` as SVG: the same input gives the same bytes, on any machine.
+"""Drawing `result.Figure` as reproducible SVG.
 
 Text stays text and takes the page's font. Colours are written so that the page can exchange them
 for its dark ones; a file on its own is for white paper.
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.report.drawing.cached_axes import settled
 from campaign.report.drawing.curves import (
     draw_bounds,
     draw_curve,
@@ -37,7 +38,6 @@ from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
-from campaign.report.drawing.settled import settled
 from campaign.report.drawing.ticks import set_ticks
 from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
 from campaign.result import Axis, Figure, Panel

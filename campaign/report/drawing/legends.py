@@ -1,4 +1,4 @@
-"""The legend of a figure: its curves, and the hollow signs of published values."""
+"""Legend of a figure: curves and published values."""
 
 from __future__ import annotations
 

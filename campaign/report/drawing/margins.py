@@ -1,4 +1,4 @@
-"""Room for ticks, labels, titles and the legend of a sheet, measured once.
+"""Measured margins for ticks, labels, titles and legend.
 
 matplotlib's constrained layout measures every axes four times or more for one drawing, which takes
 as long as all the rest of it. Here an axes is measured where it stands nearly right, and again only
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.layout_engine import LayoutEngine
 from matplotlib.transforms import Bbox
 
-from campaign.report.drawing.settled import settled
+from campaign.report.drawing.cached_axes import settled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

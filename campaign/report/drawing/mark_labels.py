@@ -1,4 +1,4 @@
-"""Marks of a panel, and where their labels stand: never over data.
+"""Marks of a panel, and their labels placed off the data.
 
 Labels of lines and stretches stand outside of the axes, where no curve is; the label of a point
 stands beside it where there is room, else outside as well.

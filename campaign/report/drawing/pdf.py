@@ -1,4 +1,4 @@
-"""The same pictures as PDF, for LaTeX: whatever has been drawn as SVG is at hand as PDF, too.
+"""Figures as PDF for LaTeX.
 
 Nobody who draws knows of it: within `also_as_pdf`, each sheet that becomes an SVG document is kept
 as a PDF of one page until somebody takes it.

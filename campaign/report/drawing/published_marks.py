@@ -1,4 +1,4 @@
-"""Published values beside the curves of a figure: which they are, and where they stand.
+"""Published values beside the curves of a figure.
 
 A curve says of which quantity its points are and under which conditions; a published cell that
 agrees with all of that is a hollow mark, at the cell's own place along x. Where a document prints

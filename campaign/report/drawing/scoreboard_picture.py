@@ -1,4 +1,4 @@
-"""The scoreboard as a picture: how far each published cell is from what the run found.
+"""The scoreboard as a figure: deviation of each published cell.
 
 A few cells have a row each. Many share one row per table, where they lie side by side on the axis,
 and the farthest of each is named. Either way the picture fits a screen, each sign tells in its

@@ -1,4 +1,4 @@
-"""Paths and numbers of a drawing as short as SVG reads them."""
+"""Short notation of SVG paths and numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws of a random bench as a picture: one strip per published value, with its place in it."""
+"""Draws of a random bench: one strip per published value."""
 
 from __future__ import annotations
 

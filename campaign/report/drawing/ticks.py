@@ -1,4 +1,4 @@
-"""Ticks that mean something: decades or 1-2-5 on a logarithm, whole numbers, angles of a circle."""
+"""Ticks at decades or 1-2-5 steps, whole numbers, angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded channels over time as small plain SVG: hundreds of them in seconds.
+"""Recorded channels over time as small plain SVG.
 
 What matplotlib takes a second for is drawn here in milliseconds, with nothing but a frame, ticks,
 lines and shaded windows. Colours are the page's own variables.

@@ -1,4 +1,4 @@
-"""`report.json`: every number of the page, and what stands behind it, for other programs."""
+"""`report.json`: every number of the page, for other programs."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 from campaign import __version__, result
-from campaign.access.estimates import row_of
-from campaign.access.results import code_of
-from campaign.access.sentences import sentence
+from campaign.api.conclusion_sentences import sentence
+from campaign.api.estimates import row_of
+from campaign.api.results import code_of
 from campaign.archive.reading.damage_words import in_words
-from campaign.axis_kind import speaking_of
+from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate
 from campaign.published.headline import LIMITS, headline
 from campaign.published.scoreboard import Line
@@ -179,7 +179,7 @@ def _run(document: Document) -> data.Run:
 
 def _test(section: Section) -> data.Test:
     test, found = section.test, section.test.result
-    with speaking_of(test.sides):
+    with axis_terms(test.sides):
         return data.Test(
             name=test.name,
             kind=test.kind,

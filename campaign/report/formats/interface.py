@@ -1,4 +1,4 @@
-"""What a format is: it writes what a page shows as another file into the page's folder."""
+"""The interface of a report format: the page as another file."""
 
 from __future__ import annotations
 

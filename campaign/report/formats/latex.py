@@ -1,4 +1,4 @@
-r"""`NAME.tex`, to be `\input` into one's own paper, and `main.tex`, which typesets it alone."""
+r"""`NAME.tex` for one's own paper, and `main.tex`, which typesets it alone."""
 
 from __future__ import annotations
 

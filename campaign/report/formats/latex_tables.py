@@ -1,4 +1,4 @@
-"""Tables in LaTeX, ruled by booktabs: as wide as their words, or wrapped to the line's width."""
+"""LaTeX tables with booktabs: natural width, or wrapped to the line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page as a sequence of plain pieces, in its order: what formats without templates write."""
+"""The page as an ordered list of plain pieces, for formats without templates."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
+from campaign.report.content.first_screen import Answer, Opening
 from campaign.report.content.lines import ShownLine
-from campaign.report.content.opening import Answer, Opening
 from campaign.report.page.damage_notice import Notice
 from campaign.report.page.folder import Comparison, Section, ShownFigure
 from campaign.report.page.layout import Layout

@@ -1,4 +1,4 @@
-"""`NAME.pdf`: the page as a browser prints it on A4, with all that folds unfolded.
+"""`NAME.pdf`: the page printed by a browser on A4, unfolded.
 
 Chromium writes the time of printing into the file, so the same page gives the same pages and not
 the same bytes.

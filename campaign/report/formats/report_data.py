@@ -1,4 +1,4 @@
-"""What `report.json` holds: every number of a report, unrounded, with all there is to say of it.
+"""The data of `report.json`: every number unrounded.
 
 The JSON Schema in `docs/report.schema.json` is made from these; `docs/results-as-data.md` explains.
 Numbers are SI unless something else is said; one that is not finite is null.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
-from campaign.report.content.opening import Opening
+from campaign.report.content.first_screen import Opening
 
 FORMAT = 2
 """Rises when a field changes its meaning or goes; a new one may come at any time."""

@@ -1,4 +1,4 @@
-"""`index.html` of a results folder: every run with what it came to, searchable."""
+"""`index.html` of a results folder: every run, searchable."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from campaign.archive import RunSummary, list_runs
 from campaign.archive.layout.header import PARTIAL
 from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
-from campaign.report.index.told import told_by
+from campaign.report.index.report_summary import told_by
 from campaign.report.output import MARKER
-from campaign.report.page.packaged import fill_packaged
+from campaign.report.page.packaged_templates import fill_packaged
 from campaign.report.palette import variables
 
 NAME = "index.html"

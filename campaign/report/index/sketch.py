@@ -1,4 +1,4 @@
-"""A figure as a small picture: its curves alone, thick enough to be seen at a glance.
+"""A figure as a thumbnail of its curves.
 
 Drawings of a report shrink to something that nobody can read. What is drawn here is from the
 numbers of `report.json`, which is read as anybody's: what is no number is left out.

@@ -1,4 +1,4 @@
-"""A page of pieces: what comparisons, trends and identifications say, for every format."""
+"""A page of pieces: comparisons, trends, identifications."""
 
 from __future__ import annotations
 

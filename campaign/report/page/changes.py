@@ -1,12 +1,12 @@
-"""The picture of numbers against their references, on the page of whoever compares."""
+"""The figure of changes against references."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from campaign.references.judged import Judged, Verdict
+from campaign.references.verdict import Judged, Verdict
 from campaign.report.drawing.changes_picture import draw_changes, with_change
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.page.folder import Folder, ShownFigure
 
 

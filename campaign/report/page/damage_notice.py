@@ -1,4 +1,4 @@
-"""That a report is not the whole run: on top of the page, in a table, in every figure's file."""
+"""Notice that a report is incomplete, on the page and in every file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each figure of a page is drawn from, before any of them is drawn.
+"""Drawing jobs of the figures of a page.
 
 Looks are the same on the whole page, and published values stand beside curves: both follow from all
 of a document, and neither needs a drawing. So drawings can be made in any order, and anywhere.
@@ -13,7 +13,7 @@ from typing import Protocol
 
 from campaign.published.scoreboard import Scoreboard
 from campaign.report.content.document import Document
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.figures import draw, series_of
 from campaign.report.drawing.published_marks import Marks, PublishedBeside, told
 from campaign.report.drawing.scoreboard_picture import draw_overview

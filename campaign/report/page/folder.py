@@ -1,4 +1,4 @@
-"""What the page shows, numbered, and the files beside it, collected while it is laid out."""
+"""Numbered items of the page, and the files beside it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from campaign.access.analysis import AnalysedTest
+from campaign.api.analysis import AnalysedTest
 from campaign.plain_text import on_a_page
 from campaign.report.content import tables
 from campaign.report.content.lines import ShownLine
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.figures import inline
-from campaign.report.drawing.legible import legible_width, view_box
+from campaign.report.drawing.label_size import legible_width, view_box
 from campaign.report.drawing.pdf import taken
 from campaign.report.page.names import Names
 from campaign.report.palette import Look

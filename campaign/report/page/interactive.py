@@ -1,4 +1,4 @@
-"""Figures that zoom and tell their values under a cursor, beside the static ones of the page.
+"""Interactive figures: zoom and values at the cursor.
 
 The page carries the points that its drawings show, and one script. Without the script, or before
 somebody turns it on, the page is the static one. uPlot draws (`vendor/`, MIT).

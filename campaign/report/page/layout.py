@@ -1,4 +1,4 @@
-"""What the templates are given: plain, numbered, ordered data, nothing left to decide."""
+"""The data that templates receive: numbered, ordered, complete."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from functools import partial
 from shlex import quote
 from typing import Any
 
-from campaign.access.analysis import AnalysedTest, one_line
-from campaign.axis_kind import speaking_of
+from campaign.api.analysis import AnalysedTest, one_line
+from campaign.axis_kind import axis_terms
 from campaign.published.scoreboard import Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
 from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
-from campaign.report.content.published_beside import as_compared, with_published
+from campaign.report.content.published_columns import as_compared, with_published
 from campaign.report.content.references import Compared
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
-from campaign.report.drawing.drawn import Drawn
+from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.strips import draw_strips
 from campaign.report.page.changes import changes_figure
 from campaign.report.page.drawings import (
@@ -296,7 +296,7 @@ def _section(
     published: Sequence[PublishedTable],
     expected: Expected,
 ) -> Section:
-    with speaking_of(maker.test.sides):
+    with axis_terms(maker.test.sides):
         return _section_of_axis(place, maker, scoreboard, published, expected)
 
 

@@ -1,4 +1,4 @@
-"""Names on the page and in the folder: safe in a path and in an id, unique, always the same."""
+"""Names on the page and in the folder: safe, unique, stable."""
 
 from __future__ import annotations
 

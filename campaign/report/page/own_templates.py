@@ -1,4 +1,4 @@
-"""Slips in a laboratory's own templates that Jinja2 would pass over, or tell of too late.
+"""Mistakes in custom templates that Jinja2 does not report.
 
 A file that no template is called like, a block that the extended template does not have and text
 outside of all blocks would silently not be shown; a template that extends itself would never end.

@@ -1,4 +1,4 @@
-"""What a page is made of, piece by piece, for the page itself and for every other format."""
+"""Pieces of a page, common to all formats."""
 
 from __future__ import annotations
 

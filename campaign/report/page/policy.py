@@ -1,4 +1,4 @@
-"""What a browser may do with the page: show it, and nothing else (Content-Security-Policy)."""
+"""Content-Security-Policy of the page."""
 
 from __future__ import annotations
 

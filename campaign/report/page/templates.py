@@ -1,4 +1,4 @@
-"""Filling templates: the packaged ones, and a laboratory's own that win over them.
+"""Rendering templates: packaged ones, and custom ones that override them.
 
 A file of the laboratory's folder stands in for the packaged one of the same name. The packaged ones
 stay within reach under the prefix `campaign/`, so that one's own `report.html` can extend it:
@@ -31,7 +31,7 @@ from jinja2.bccache import Bucket
 from jinja2.environment import TemplateModule
 from jinja2.utils import missing
 
-from campaign.access.analysis import one_line
+from campaign.api.analysis import one_line
 from campaign.errors import UsageError
 from campaign.report.page.own_templates import check_own_templates, meant
 

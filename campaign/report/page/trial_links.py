@@ -1,4 +1,4 @@
-"""Where a trial's own page lies, for whoever prints a trial's number."""
+"""Links to the pages of trials."""
 
 from __future__ import annotations
 

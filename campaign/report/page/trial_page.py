@@ -1,4 +1,4 @@
-"""A trial's own page: its channels, what was set and measured, and how it ended."""
+"""The page of a trial: channels, settings, metrics, outcome."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from campaign.estimation.relative_rate import relative_rate
 from campaign.recording import Channel, Recording
 from campaign.report.content import tables
 from campaign.report.content.trial_account import TrialAccount, account_of, lost_account
-from campaign.report.drawing.legible import LEGIBLE
+from campaign.report.drawing.label_size import LEGIBLE
 from campaign.report.drawing.traces import FONT, WIDTH, Stretch, Trace, draw_traces, key
 from campaign.report.page.layout import Layout
 from campaign.report.page.templates import Templates

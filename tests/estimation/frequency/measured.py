@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 
 Array = np.ndarray
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.estimation.frequency.measured import MeasuredResponse, closed_from_open
+from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
 from campaign.estimation.servo import ServoCharacteristics, characteristics
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.frequency.measured import noisy

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.output_error import output_error, simulated_output
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.rational import rational_fit

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Origin
-from campaign.estimation.frequency.measured import closed_from_open
+from campaign.estimation.frequency.measured_response import closed_from_open
 from campaign.estimation.frequency.modes import chosen_modes, modes
 from campaign.estimation.frequency.orders import chosen_order, order_of
 from campaign.estimation.frequency.rational import LARGE_RESIDUALS, rational_fit

@@ -12,7 +12,7 @@ from campaign.cli.kinds import show_kind
 from campaign.physics.bench import Bench
 from campaign.physics.complete import complete
 from campaign.physics.loop_margins import LoopMargins
-from campaign.physics.loops_used import loops_of
+from campaign.physics.plan_loops import loops_of
 from campaign.physics.step_choice import OWN, longest_step
 from campaign.physics.variation import as_it_is
 from campaign.signals import Sine

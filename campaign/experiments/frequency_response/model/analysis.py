@@ -1,4 +1,4 @@
-"""Frequency response of any motion: modes, margins, distortion, and the two masses of a drive.
+"""Frequency response of any motion: modes, margins, distortion, two masses.
 
 Sines, repeated odd multisines and any other recording each give a response; a rational function
 with a delay tells its modes, and two inertias on a spring what the sensors' places allow.
@@ -39,7 +39,7 @@ from campaign.experiments.frequency_response.model.tables import (
     modes_table,
 )
 from campaign.experiments.frequency_response.model.validation import Validation, models, validated
-from campaign.experiments.frequency_response.model.validation_shown import (
+from campaign.experiments.frequency_response.model.validation_figures import (
     residual_figures,
     validation_conclusions,
     validation_figures,

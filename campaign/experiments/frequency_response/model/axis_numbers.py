@@ -1,4 +1,4 @@
-"""Numbers of the axis from those of a response that friction bends.
+"""Numbers of the axis from a response that friction distorts.
 
 A best linear approximation belongs to its excitation (Pintelon and Schoukens, "System
 Identification: A Frequency Domain Approach" (2012), 3.4): its inertia is that of the response, not

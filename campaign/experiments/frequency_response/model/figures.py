@@ -1,4 +1,4 @@
-"""Figures of identified responses: with what was fitted to them, and their closed loops."""
+"""Figures of identified responses with their fits and closed loops."""
 
 from __future__ import annotations
 

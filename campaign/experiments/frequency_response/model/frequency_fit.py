@@ -1,4 +1,4 @@
-"""What each response comes to: order, modes, margins, and the two masses of the best of them."""
+"""Fit of each response: order, modes, margins, two masses."""
 
 from __future__ import annotations
 

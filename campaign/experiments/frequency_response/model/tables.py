@@ -1,4 +1,4 @@
-"""Tables of frequency responses: what was measured, orders, modes, margins, two masses."""
+"""Tables of frequency responses: setup, orders, modes, margins, two masses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models held against responses and recordings that they were not fitted to, and their own."""
+"""Validation of models on unseen responses and recordings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.estimation.frequency.measured import MeasuredResponse
+from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.output_error import (
     Simulated,
     output_error,

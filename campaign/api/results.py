@@ -1,0 +1,272 @@
+"""All results of one run: to inspect, and to keep beside the run.
+
+A file of results is used in place of analysing where it is whole, of this very run, and made by
+this very program; else the run is analysed, and it is said why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from html import escape
+from typing import TYPE_CHECKING
+
+from campaign import __version__
+from campaign.api.analysis import AnalysedTest, analyse_run, published_of, source_of, title_of
+from campaign.api.conclusion_sentences import sentence
+from campaign.api.damage_warnings import tell, warn
+from campaign.api.estimates import findings_table
+from campaign.api.tables import result_table
+from campaign.archive import RunReader
+from campaign.archive.layout.results import ResultsOfTest, RunResults, results_path
+from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.damage_words import in_words
+from campaign.errors import ArchiveError
+from campaign.experiments import experiments
+from campaign.published.scoreboard import Line, Scoreboard, score
+from campaign.reason import Cause
+from campaign.result import Cell, Column, Figure, Finding, Table
+from campaign.source_hash import digest, sources_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NO_FILE = "there is no file of results"
+
+
+@dataclass(frozen=True)
+class Results:
+    """What analysis found in a run.
+
+    Attributes:
+        found: all of it, as objects.
+        origin: where it is from, in words: the file that was read, or the program that analysed
+            the run just now and why no file was read.
+    """
+
+    found: RunResults = field(repr=False)
+    origin: str
+
+    @property
+    def conclusions(self) -> dict[str, tuple[str, ...]]:
+        """By test, the sentences it comes to, the most important first."""
+        return {test.name: test.sentences for test in self.found.tests}
+
+    @property
+    def findings(self) -> pd.DataFrame:
+        """One row per number of any test (SI): `test`, then the columns of a test's `findings`."""
+        pairs = [(test.name, each) for test in self.found.tests for each in test.result.findings]
+        frame = findings_table(_beside_test([finding for _, finding in pairs]))
+        frame.insert(0, "test", [name for name, _ in pairs])
+        frame.attrs["damaged"] = list(self.found.damaged)
+        return frame
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The tables of all tests by `test/key`, unrounded, SI; units in `attrs`."""
+        tests = self.found.tests
+        frames = {
+            f"{each.name}/{table.key}": result_table(table)
+            for each in tests
+            for table in each.result.tables
+        }
+        for frame in frames.values():
+            frame.attrs["damaged"] = list(self.found.damaged)
+        return frames
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """The figures of all tests by `test/key`: panels, and curves as arrays (SI)."""
+        tests = self.found.tests
+        return {f"{each.name}/{f.key}": f for each in tests for f in each.result.figures}
+
+    @property
+    def published(self) -> pd.DataFrame:
+        """The published values beside what was found, in the printed units; empty without any."""
+        table = self.found.published
+        frame = result_table(scoreboard_table(Scoreboard()) if table is None else table)
+        return frame.astype(dict.fromkeys(NUMBERS, "float64"))
+
+    @property
+    def problems(self) -> dict[str, str]:
+        """By test, why it has no result; empty when all have."""
+        return {test.name: test.problem for test in self.found.tests if test.problem}
+
+    def __repr__(self) -> str:
+        tests = ", ".join(test.name for test in self.found.tests) or "no tests"
+        return f"<results of {self.found.run}: {tests}; {self.origin}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: what each test comes to, or why it has no result."""
+        parts = [f"<p><code>{escape(repr(self))}</code></p>"]
+        for test in self.found.tests:
+            told = (*test.sentences, *([f"No result: {test.problem}."] if test.problem else []))
+            items = "".join(f"<li>{escape(each)}</li>" for each in told)
+            parts.append(f"<h4>{escape(test.title)}</h4><ul>{items}</ul>")
+        return "".join(parts)
+
+
+def results_of(
+    run: RunReader,
+    tests: Sequence[AnalysedTest],
+    scoreboard: Scoreboard,
+    *,
+    telling: tuple[str, str] | None = None,
+    measured_anew: bool = False,
+) -> RunResults:
+    """What the analysis of a run found, with what it is of and whose code found it.
+
+    `telling`: test and key of the figure that tells most.
+    """
+    header = run.header
+    found = (damage for test in tests for damage in test.damaged)
+    damaged = tuple(dict.fromkeys((*run.damaged, *found)))
+    return RunResults(
+        run=run.name,
+        file=run.path.name,
+        root=run.identity,
+        date=run.ended or header.created,
+        version=__version__,
+        sources=code_of(tests),
+        tests=tuple(map(_of_test, tests)),
+        title=title_of(header.title or header.protocol_name, source_of(run)),
+        measured_anew=measured_anew,
+        damaged=tuple(in_words(damage) for damage in damaged),
+        published=scoreboard_table(scoreboard) if scoreboard.lines else None,
+        telling=telling,
+    )
+
+
+def results_view(run: RunReader, *, strict: bool = False, measure_anew: bool = False) -> Results:
+    """The results of a run: from the file beside it where that may be used, else by analysing.
+
+    An ArchiveWarning says why a file that is there is not used, and which trials an analysis has to
+    leave out. Raises ArchiveError for both, but for a file of another version, when `strict`.
+    """
+    path = results_path(run.path)
+    why = NO_FILE
+    if path.exists():
+        kept, why = _kept(run, strict=strict, measure_anew=measure_anew)
+        if kept is not None:
+            return Results(kept, f"read from {path}")
+        warn(f"{why}; the run is analysed")
+    found = _analysed(run, strict=strict, measure_anew=measure_anew)
+    return Results(found, f"analysed by campaign {__version__}: {why}")
+
+
+def _kept(run: RunReader, *, strict: bool, measure_anew: bool) -> tuple[RunResults | None, str]:
+    """What is kept beside a run, or why that is of no use."""
+    from campaign.archive.reading.results_file import read_results
+
+    path = results_path(run.path)
+    try:
+        found = read_results(path, run.identity)
+    except ArchiveError as error:
+        if strict:
+            raise
+        return None, str(error)
+    why = ""
+    if (found.version, found.sources) != (__version__, code_of(found.tests)):
+        why = f"was made by other code: campaign {found.version}, sources {found.sources[:12]}…"
+    elif found.measured_anew != measure_anew:
+        measured = "anew" if found.measured_anew else "when they were executed"
+        why = f"is of recordings that were measured {measured}"
+    elif found.damaged and not run.damaged:
+        why = f"was made when the run was damaged: {found.damaged[0]}"
+    return (None, f"{path}: {why}") if why else (found, "")
+
+
+def _analysed(run: RunReader, *, strict: bool, measure_anew: bool) -> RunResults:
+    tests = analyse_run(run, experiments(), measure_anew=measure_anew)
+    left_out = dict.fromkeys(d for test in tests for d in test.damaged if _is_new(d, run))
+    tell(run.path, tuple(left_out), strict=strict)
+    scoreboard = score(published_of(run), [test.evidence() for test in tests])
+    return results_of(run, tests, scoreboard, measured_anew=measure_anew)
+
+
+def _is_new(damage: Damage, run: RunReader) -> bool:
+    """Whether it costs a trial and was not told of when the run was opened."""
+    return bool(damage.trial) and damage not in run.damaged
+
+
+def code_of(tests: Iterable[AnalysedTest | ResultsOfTest]) -> str:
+    """Hash of the sources of this program and of the installed packages that analyse the tests."""
+    known = experiments()
+    plug_ins = (known.plug_in(test.kind) for test in tests)
+    packages = [name for each in plug_ins if each is not None for name in each.packages]
+    return digest(sources_of(dict.fromkeys(["campaign", *sorted(packages)])))
+
+
+def _of_test(test: AnalysedTest) -> ResultsOfTest:
+    plug_in = experiments().plug_in(test.kind)
+    return ResultsOfTest(
+        test.name,
+        test.kind,
+        test.title,
+        test.result,
+        tuple(map(sentence, test.result.conclusions)),
+        test.problem,
+        "campaign" if plug_in is None else plug_in.distribution,
+        __version__ if plug_in is None else plug_in.version,
+    )
+
+
+NUMBERS = ("published", "reproduced", "low", "high", "deviation")
+_PRINTED = Cause("printed", "a number of a document")
+_ENDS = Cause("interval ends", "the interval of the number before it")
+_BESIDE = Cause("interval beside", "low and high are its interval")
+_FROM_PRINTED = Cause("from printed", "from what is printed")
+
+
+def scoreboard_table(scoreboard: Scoreboard) -> Table:
+    """The scoreboard as a table: a row per published number, in the unit it is printed in."""
+    columns = (
+        Column("table", "Table"),
+        Column("row", "Row"),
+        Column("column", "Column"),
+        Column("unit", "Unit"),
+        Column("published", "Published", reason=_PRINTED()),
+        Column("reproduced", "Reproduced", reason=_BESIDE()),
+        Column("low", "Low", reason=_ENDS()),
+        Column("high", "High", reason=_ENDS()),
+        Column("deviation", "Deviation", "percent", reason=_FROM_PRINTED()),
+        Column("verdict", "Verdict"),
+        Column("status", "Status"),
+        Column("test", "Test"),
+        Column("source", "Source"),
+        Column("reason", "Reason"),
+        Column("draws", "Draws", exact=True),
+    )
+    lines = tuple(map(_line, scoreboard.lines))
+    return Table("published", "Published values and what was found", columns, lines)
+
+
+def _line(line: Line) -> dict[str, Cell]:
+    cell, found = line.cell, line.found
+    return {
+        "table": cell.table,
+        "row": cell.row,
+        "column": cell.column,
+        "unit": cell.unit,
+        "published": cell.value,
+        "reproduced": line.reproduced,
+        "low": None if found is None else found.low,
+        "high": None if found is None else found.high,
+        "deviation": line.deviation,
+        "verdict": str(line.verdict),
+        "status": "" if line.status is None else str(line.status),
+        "test": line.test,
+        "source": line.source,
+        "reason": line.why or cell.reason,
+        "draws": len(line.draws),
+    }
+
+
+def _beside_test(findings: Sequence[Finding]) -> Sequence[Finding]:
+    """With a condition that is called `test` renamed: the column of that name says whose it is."""
+
+    def renamed(finding: Finding) -> Finding:
+        told = {("condition.test" if n == "test" else n): v for n, v in finding.conditions.items()}
+        return replace(finding, conditions=told)
+
+    return [renamed(each) if "test" in each.conditions else each for each in findings]

@@ -1,0 +1,307 @@
+"""Reading untrusted HDF5 files: checked structure, bounded sizes.
+
+A file may be truncated, damaged or made to do harm. Nothing is followed out of the file (external
+and soft links, external storage, virtual datasets), no filter is loaded from anywhere (only shuffle
+and deflate), only fixed-length text, 64-bit integers and float64 are read (so no object type ever
+is), every size is checked against what is really stored before memory is asked for, and every
+dataset must match its checksum.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
+from numpy.typing import NDArray
+
+from campaign.archive.layout.files import why
+from campaign.archive.layout.storage import CHECKSUM, SAMPLE
+from campaign.archive.reading.global_heap_check import heaps_are_sound
+from campaign.errors import ArchiveError
+
+Array = NDArray[np.float64]
+
+_ALLOWED_FILTERS = {h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE}
+_LARGEST_ATTRIBUTE = 1 << 16  # bytes
+_TEXT = h5py.string_dtype()
+
+_SOUND: dict[bytes, bool] = {}
+"""Whether the heaps of the files that are open are sound, by name; as far as that was looked at."""
+
+# What h5py raises on damage is not documented, and is of every kind.
+_DAMAGE = (
+    OSError,
+    RuntimeError,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+    SystemError,
+)
+
+
+@contextlib.contextmanager
+def guarded(path: Path, place: str = "") -> Iterator[None]:
+    """Any failure inside becomes an ArchiveError that names the file and the place in it."""
+    try:
+        yield
+    except ArchiveError:
+        raise
+    except _DAMAGE as error:
+        where = f"{path}: {place}" if place else str(path)
+        raise ArchiveError(f"{where}: cannot be read: {why(error)}") from None
+
+
+_HELD: ContextVar[Mapping[Path, h5py.File]] = ContextVar("held files", default={})  # noqa: B039
+"""Of this thread, the files that stay open until the block that holds them ends."""
+
+
+@contextlib.contextmanager
+def held_open(path: Path) -> Iterator[None]:
+    """Within the block, this thread opens the file once: every trial of it comes from there.
+
+    Opening costs more than reading a channel of a short trial. A file that cannot be opened is not
+    held, and whoever reads it is told.
+    """
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ArchiveError):
+            file = stack.enter_context(open_file(path))
+            token = _HELD.set({**_HELD.get(), path: file})
+            stack.callback(_HELD.reset, token)
+        yield
+
+
+@contextlib.contextmanager
+def open_file(path: Path) -> Iterator[h5py.File]:
+    """An HDF5 file for reading; ArchiveError when it is none."""
+    if (held := _HELD.get().get(path)) is not None:
+        yield held
+        return
+    with guarded(path):
+        if not path.is_file():
+            raise ArchiveError(f"{path}: there is no such file")
+        if not h5py.is_hdf5(path):
+            raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
+        with h5py.File(path, "r", locking=False) as file:
+            _SOUND.pop(h5f.get_name(file.id), None)
+            yield file
+
+
+def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
+    """The group `name`, stored in this very file, of the NeXus class."""
+    group = own(parent, name)
+    if not isinstance(group, h5py.Group):
+        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+    if attribute(group, "NX_class") != nx_class:
+        raise ArchiveError(f"{_place(parent, name)}: is not of class {nx_class}")
+    return group
+
+
+def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
+    """The group `name`, stored in this very file, of whatever class."""
+    group = member(parent, name)
+    if group is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a group")
+    return group
+
+
+def member(parent: h5py.Group, name: str) -> h5py.Group | None:
+    """The group `name`, of whatever class; None when it is a dataset. No link is followed."""
+    found = own(parent, name)
+    if isinstance(found, h5py.Dataset):
+        return None
+    if not isinstance(found, h5py.Group):
+        raise ArchiveError(f"{_place(parent, name)}: is neither a group nor a dataset")
+    return found
+
+
+def check_dataset(parent: h5py.Group, name: str) -> int:
+    """Read a text or number against its checksum; returns the bytes it has in the file."""
+    dataset = _dataset_at(parent, name)
+    if dataset.shape == () and dataset.dtype.kind == "S":
+        text_at(parent, name)
+    elif dataset.shape == () and dataset.dtype in (np.dtype("<i8"), SAMPLE):
+        _check(dataset.id, np.asarray(dataset[()], dtype=dataset.dtype).tobytes())
+    else:
+        raise ArchiveError(f"{_place(parent, name)}: is neither a text nor a number")
+    return int(dataset.id.get_storage_size())
+
+
+def names(group: h5py.Group) -> list[str]:
+    """Names of what `group` holds, sorted."""
+    return sorted(name.decode("utf-8", "surrogateescape") for name in group.id)
+
+
+def text_at(parent: h5py.Group, name: str, digest: str | None = None) -> str:
+    """A text, held against `digest`; where there is none, against its own attribute."""
+    dataset, raw = _raw_text(parent, name)
+    _check(dataset, raw, digest)
+    return raw.decode("utf-8")
+
+
+def unchecked_text_at(parent: h5py.Group, name: str) -> str:
+    """A text as it stands there, damaged or not."""
+    return _raw_text(parent, name)[1].decode("utf-8", "replace")
+
+
+def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
+    dataset, plan = _dataset_id(parent, name)
+    kind = dataset.dtype
+    if dataset.rank or kind.kind != "S" or plan.get_layout() == h5d.CHUNKED:
+        raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
+    if dataset.get_storage_size() != kind.itemsize:
+        raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
+    value = np.empty((), dtype=kind)
+    dataset.read(h5s.ALL, h5s.ALL, value)
+    return dataset, bytes(value[()])
+
+
+def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
+    """The file's own hash, and the offset and length of the place where it stands."""
+    *groups, name = path.split("/")
+    for group in groups:
+        parent = own(parent, group)
+    dataset = _dataset_at(parent, name)
+    offset = dataset.id.get_offset()
+    if dataset.shape != () or dataset.dtype != np.dtype("S64") or offset is None:
+        raise ArchiveError(f"{_place(parent, name)}: is not a hash")
+    return bytes(dataset[()]).decode("ascii", "replace"), (offset, 64)
+
+
+def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
+    """A whole number, held against the digest of its decimal digits, or its own attribute."""
+    dataset = _dataset_at(parent, name)
+    if dataset.shape != () or dataset.dtype != np.dtype("<i8"):
+        raise ArchiveError(f"{_place(parent, name)}: is not a 64-bit whole number")
+    value = np.asarray(dataset[()], dtype="<i8")
+    if digest is None:
+        _check(dataset.id, value.tobytes())
+    else:
+        _check(dataset.id, str(int(value)).encode(), digest)
+    return int(value)
+
+
+def attribute(item: h5py.HLObject, name: str) -> str:
+    """A text attribute; ArchiveError when there is none."""
+    return _text_attribute(item.id, name)
+
+
+def check_attribute(item: h5d.DatasetID, name: str, recorded: str) -> None:
+    """ArchiveError unless a text attribute says what was recorded."""
+    if (found := _text_attribute(item, name)) != recorded:
+        raise ArchiveError(f"{_named(item)}@{name}: is {found!r}, and {recorded!r} was recorded")
+
+
+def _text_attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> str:
+    identifier = _attribute(item, name)
+    kind = identifier.get_type()
+    if not isinstance(kind, h5t.TypeStringID):
+        raise ArchiveError(f"{_named(item)}@{name}: is not a text")
+    value = np.empty((), dtype=_TEXT if kind.is_variable_str() else kind.dtype)
+    identifier.read(value)
+    return bytes(value[()]).decode("utf-8")
+
+
+def text_list(item: h5py.HLObject, name: str) -> list[str]:
+    """An attribute that is a list of texts; empty when there is none."""
+    if name not in item.attrs:
+        return []
+    identifier = _attribute(item.id, name)
+    if len(identifier.shape) != 1 or h5py.check_string_dtype(identifier.dtype) is None:
+        raise ArchiveError(f"{item.file.filename}: {item.name}@{name}: is not a list of texts")
+    return [str(text) for text in item.attrs[name]]
+
+
+def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
+    raw = name.encode()
+    file = h5f.get_name(item)
+    if file not in _SOUND:  # looked at here, as nothing else that is read lies in the heaps
+        _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
+    if not _SOUND[file]:
+        raise ArchiveError(f"{os.fsdecode(file)}: cannot be read: its attributes are damaged")
+    try:
+        identifier = h5a.open(item, raw)
+    except KeyError:
+        raise ArchiveError(f"{_named(item)}@{name}: is missing") from None
+    if identifier.get_storage_size() > _LARGEST_ATTRIBUTE:
+        raise ArchiveError(f"{_named(item)}@{name}: is too large")
+    return identifier
+
+
+def own(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
+    """What `parent` itself holds under a name; no link is followed."""
+    found = own_id(parent, name)
+    if isinstance(found, h5g.GroupID):
+        return h5py.Group(found)
+    return h5py.Dataset(found) if isinstance(found, h5d.DatasetID) else None
+
+
+def own_id(parent: h5py.Group, name: str) -> Any:
+    """As `own`, of HDF5's low-level interface: a campaign has tens of thousands of objects."""
+    raw = name.encode()
+    if "/" in name or name == ".":  # on a path, only the last link would be looked at
+        raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
+    group = parent.id
+    try:
+        link = group.links.get_info(raw) if raw else None
+    except _DAMAGE:
+        if raw in group:
+            raise
+        link = None
+    if link is None:
+        raise ArchiveError(f"{_place(parent, name)}: is missing")
+    if link.type != h5py.h5l.TYPE_HARD:
+        raise ArchiveError(f"{_place(parent, name)}: is a link, and links are not followed")
+    return h5o.open(group, raw)
+
+
+def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
+    return h5py.Dataset(_dataset_id(parent, name)[0])
+
+
+def _dataset_id(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, h5py.h5p.PropDCID]:
+    """A dataset whose samples lie in this very file, and how they are laid out there."""
+    found = own_id(parent, name)
+    if not isinstance(found, h5d.DatasetID):
+        raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
+    plan = found.get_create_plist()
+    layout = plan.get_layout()
+    if layout == h5d.VIRTUAL or (layout == h5d.CONTIGUOUS and plan.get_external_count()):
+        raise ArchiveError(f"{_place(parent, name)}: lies in another file, which is not opened")
+    filters = {plan.get_filter(number)[0] for number in range(plan.get_nfilters())}
+    if not filters <= _ALLOWED_FILTERS:
+        raise ArchiveError(
+            f"{_place(parent, name)}: is stored with a filter other than shuffle and deflate"
+        )
+    return found, plan
+
+
+def _check(dataset: h5d.DatasetID, raw: Any, digest: str | None = None) -> None:
+    _compare(dataset, hashlib.sha256(raw).hexdigest(), digest)
+
+
+def _compare(dataset: h5d.DatasetID, found: str, digest: str | None = None) -> None:
+    """ArchiveError unless a digest is what it ought to be: `digest`, or the dataset's attribute."""
+    if (_text_attribute(dataset, CHECKSUM) if digest is None else digest) != found:
+        raise ArchiveError(
+            f"{_named(dataset)}: does not match its checksum; it was damaged or changed"
+        )
+
+
+def _named(item: h5g.GroupID | h5d.DatasetID) -> str:
+    """File and path, for messages."""
+    return f"{os.fsdecode(h5f.get_name(item))}: {os.fsdecode(h5i.get_name(item))}"
+
+
+def _place(parent: h5py.Group, name: str) -> str:
+    return f"{parent.file.filename}: {parent.name.rstrip('/')}/{name}"

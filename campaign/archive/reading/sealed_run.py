@@ -1,0 +1,297 @@
+"""Reading a sealed run from its index, without opening trials."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import h5py
+
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.entries import ENTRY, entry_names, file_name
+from campaign.archive.layout.followup_trials import planned_in, stages_in
+from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
+from campaign.archive.layout.journal import RunStarted, TrialFinished
+from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.packed_trial import PackedTrial
+from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
+from campaign.archive.layout.run_folder import parse_plan
+from campaign.archive.layout.storage import storable
+from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.archived_metrics import measured_in, with_metrics
+from campaign.archive.reading.archived_samples import RecordedSamples, archived_trial
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.packed_trial_reader import packed_record, parse_record
+from campaign.archive.reading.provenance import read_provenance
+from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
+from campaign.archive.reading.seal import SEAL, SealedTexts
+from campaign.errors import ArchiveError
+from campaign.recording import Outcome, SafeState
+from campaign.trial import Tree
+
+NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
+"""The texts of `/run` that are notes, but for the sources."""
+
+
+def read_sealed(path: Path) -> RunReader:
+    """A sealed file, whatever its name; samples are held against it when read."""
+    damaged = DamageList(path)
+    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        header = _header(texts, damaged)
+        if texts.seal is not None and texts.seal.run != header.name:
+            damaged.add(f"/run/{SEAL}", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
+        story = read_lines(damaged.read(lambda: texts.text("journal/data"), "").encode())
+        note_journal(story, damaged)
+        trials, earlier = _Trials.read(path, file, texts, damaged).archived(story, damaged)
+        plan: tuple[PlannedTrial, ...] = damaged.read(
+            lambda: parse_plan(path, texts.text("plan/data")), ()
+        )
+        _note_contradictions(texts, header, story, len(plan), damaged)
+        stages = stages_in(story.entries)
+        return RunReader(
+            path=path,
+            header=header,
+            status=RunStatus(texts.text("outcome/status")),
+            reason=texts.text("outcome/reason"),
+            safe_state=SafeState(texts.text("outcome/safe_state")),
+            ended=damaged.read(lambda: texts.text("end_time"), ""),
+            plan=plan + planned_in(stages),
+            trials=trials,
+            journal=story.text,
+            full_plan=FullPlan(path, partial(_plan_texts, path), stages),
+            damaged=tuple(damaged.found),
+            earlier_attempts=earlier,
+            root=texts.root,
+            stages=stages,
+        )
+
+
+def read_glance(path: Path) -> Glance:
+    """What a listing tells of it."""
+    damaged = DamageList(path)
+    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        header = _header(texts, damaged)
+        status = RunStatus(texts.text("outcome/status"))
+        interrupted = interrupted_trials(status, lambda: texts.text("journal/data"))
+        return Glance(
+            header=header,
+            planned=header.trials + _followed(texts, header),
+            status=status,
+            ended=texts.text("end_time"),
+            finished=texts.integer("outcome/trials_finished"),
+            failed=texts.integer("outcome/trials_failed") - interrupted,
+            interrupted=interrupted,
+        )
+
+
+def _followed(texts: SealedTexts, header: RunHeader) -> int:
+    """How many trials followed; the journal is looked into only where some may have."""
+    if not any(test.get("stages") for test in header.tests):
+        return 0
+    story = read_lines(texts.text("journal/data").encode())
+    return len(planned_in(stages_in(story.entries)))
+
+
+def _header(texts: SealedTexts, damaged: DamageList) -> RunHeader:
+    names = texts.names("provenance")
+    sources = dict(_sources(texts, damaged))
+    return read_provenance(names, lambda name: texts.text(f"provenance/{name}"), sources, damaged)
+
+
+def _plan_texts(path: Path) -> tuple[str, str]:
+    damaged = DamageList(path)
+    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
+        texts = SealedTexts(path, file, damaged)
+        return texts.text("plan_trials/data"), texts.text("trees/data")
+
+
+def _note_contradictions(
+    texts: SealedTexts, header: RunHeader, story: Lines, planned: int, damaged: DamageList
+) -> None:
+    """Texts that say the same thing twice and do not agree: somebody changed one of them."""
+    if damaged.found:
+        return  # what cannot be read agrees with nothing
+    finished, ended = story.finished.values(), story.ended
+    failed = sum(each.outcome is not Outcome.COMPLETED for each in finished)
+    title = header.title or header.protocol_name or header.name
+    says: dict[str, str | int] = {
+        "title": title,
+        "entry_identifier": header.name,
+        "start_time": header.created,
+        "outcome/trials_finished": len(finished),
+        "outcome/trials_failed": failed,
+    }
+    if ended is not None:
+        says |= {
+            "end_time": ended.at,
+            "outcome/status": ended.status,
+            "outcome/reason": ended.reason,
+            "outcome/safe_state": ended.safe_state,
+        }
+    else:
+        damaged.add("/run/journal", "does not tell of the end of the run")
+    for place, wanted in says.items():
+        with damaged.noting():
+            read = texts.integer if isinstance(wanted, int) else texts.text
+            if read(place) != (wanted if isinstance(wanted, int) else storable(str(wanted))):
+                damaged.add(f"/run/{place}", "is not what the rest of the run says")
+    if planned != header.trials:
+        damaged.add("/run/plan", f"has {planned} trials, and the header says {header.trials}")
+
+
+def note_journal(story: Lines, damaged: DamageList) -> None:
+    """What of a sealed journal cannot be understood."""
+    for number in story.damaged:
+        damaged.add(f"/run/journal:{number}", "is not a line of a journal")
+    if story.torn or not story.all(RunStarted):
+        damaged.add("/run/journal", "is not a whole journal")
+
+
+def _sources(texts: SealedTexts, damaged: DamageList) -> Iterator[tuple[str, str]]:
+    for name in texts.notes("source_"):
+        with damaged.noting():
+            yield texts.text(f"{name}/file_name"), texts.text(f"{name}/data")
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Where the records of a sealed run are looked for.
+
+    The journal has the digest of every record, so one that matches is good wherever it stands: in
+    the index, or again in the trial's own group should the index be damaged.
+
+    Attributes:
+        groups: names of what the file holds.
+        lines: of the index, by their digests.
+        whole: whether the index is as it was sealed: then it tells of a trial as the journal does.
+        trees: benches and options that could be read.
+        not_kept: why samples are not there, by entry.
+    """
+
+    path: Path
+    file: h5py.File
+    groups: frozenset[str]
+    lines: Mapping[str, str]
+    whole: bool
+    trees: Trees
+    not_kept: Mapping[str, str]
+
+    @classmethod
+    def read(cls, path: Path, file: h5py.File, texts: SealedTexts, damaged: DamageList) -> _Trials:
+        index, whole = _text_or_rest(texts, "index/data", damaged)
+        trees, _ = _text_or_rest(texts, "trees/data", damaged)
+        lines = {text_digest(line): line for line in index.splitlines()}
+        not_kept: dict[str, str] = {}
+        with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
+            not_kept = read_not_kept(texts)
+        groups = frozenset(safe_hdf5.names(file))
+        return cls(path, file, groups, lines, whole, _good_trees(trees), not_kept)
+
+    def archived(
+        self, story: Lines, damaged: DamageList
+    ) -> tuple[tuple[ArchivedTrial, ...], dict[int, tuple[ArchivedTrial, ...]]]:
+        """The trials that count, and the attempts before them by number; the rest is noted."""
+        trials: list[ArchivedTrial] = []
+        earlier: dict[int, list[ArchivedTrial]] = {}
+        measured = measured_in(story.entries)
+        attempts = self._told(story)
+        unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
+        if unknown:
+            damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
+        for entry, told in entry_names(attempts).items():
+            with damaged.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
+                archived = with_metrics(self._archived(entry, told), measured.get(told.record))
+                if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
+                    earlier.setdefault(told.trial, []).append(archived)
+                else:
+                    trials.append(archived)
+        return tuple(trials), {number: tuple(found) for number, found in earlier.items()}
+
+    def _told(self, story: Lines) -> list[TrialFinished]:
+        """Every finished attempt that the journal tells of; the index makes up for lost lines."""
+        told = {(each.trial, each.attempt): each for each in story.attempts}
+        if self.whole and not story.whole:
+            known = {each.record for each in told.values()}
+            for digest in self.lines.keys() - known:
+                finished = _as_finished(parse_record(self.path, "/run/index", self.lines[digest]))
+                told.setdefault((finished.trial, finished.attempt), finished)
+        return list(told.values())
+
+    def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
+        trees: Trees = self.trees
+        if (line := self.lines.get(told.record)) is not None:
+            record = parse_record(self.path, f"/{entry}", line)
+        if line is None or not record.tree_names <= trees.keys():
+            record, trees = read_entry(self.path, self.file, entry, told.record)
+        if (record.number, record.attempt) != (told.trial, told.attempt):
+            raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
+        # Where its samples are there, whatever is said of them, they are held against the record.
+        not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
+        if entry not in self.groups and not not_kept:
+            raise ArchiveError(
+                f"{self.path}: /{entry}: is missing, and the journal says that it finished"
+            )
+        return archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
+
+
+def _as_finished(record: TrialRecord) -> TrialFinished:
+    """A line of the journal that was lost, as far as the index has it."""
+    return TrialFinished(
+        at=record.ended,
+        trial=record.number,
+        attempt=record.attempt,
+        file=file_name(record.number, record.attempt),
+        sha256="0" * 64,
+        record=record.sha256,
+        bytes=0,
+        outcome=record.outcome,
+        reason=record.reason,
+        safe_state=record.safe_state,
+    )
+
+
+def read_entry(path: Path, file: h5py.File, name: str, digest: str) -> tuple[TrialRecord, Trees]:
+    """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
+    with safe_hdf5.guarded(path, f"/{name}"):
+        entry = safe_hdf5.inner_group(file, name)
+        kept = safe_hdf5.inner_group(entry, "record")
+        record, trees = (safe_hdf5.unchecked_text_at(kept, text) for text in ("json", "trees"))
+        return packed_record(path, name, PackedTrial(record=record, trees=trees), digest)
+
+
+def read_not_kept(texts: SealedTexts) -> dict[str, str]:
+    """Why samples are not there, by entry; nothing where all are."""
+    if "not_kept" not in texts.notes("not_kept"):
+        return {}
+    tree = json.loads(texts.text("not_kept/data"))
+    return {str(entry): str(reason) for entry, reason in tree.items()}
+
+
+def _good_trees(text: str) -> Trees:
+    """The trees whose lines are good; a damaged one is missed by the trials that need it."""
+    trees: dict[str, Tree] = {}
+    for line in text.splitlines():
+        try:
+            trees |= parse_trees(line)
+        except ValueError:
+            continue
+    return trees
+
+
+def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[str, bool]:
+    """A text and whether it is as it was sealed; where it is not, that is noted."""
+    try:
+        return texts.text(place), True
+    except ArchiveError as error:
+        damaged.note(error)
+    try:
+        return texts.unchecked(place), False
+    except ArchiveError:
+        return "", False

@@ -1,0 +1,170 @@
+"""Consistency of a run: journal, plan, fingerprints and trials."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from campaign.archive.layout.entries import entry_names
+from campaign.archive.layout.followup_trials import planned_in, stages_in
+from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.header import PlannedTrial, RunHeader
+from campaign.archive.layout.journal import RunStarted, TrialFinished, TrialMeasured
+from campaign.archive.layout.journal_summary import Lines
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.archive.reading.damage import DamageList
+from campaign.errors import ArchiveError
+from campaign.trial import Trial, canonical_json
+
+_BESIDE = {"published", "policy"}
+"""Of the normalised protocol, what determines no trial and is not part of its fingerprint."""
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What is compared of a trial that is there; its bench and samples are let go of.
+
+    Attributes:
+        entry: its name in a sealed run, e.g. `trial_00017_attempt_1`.
+        place: where it lies, for messages.
+    """
+
+    entry: str
+    place: str
+    number: int
+    test: str
+    kind: str
+    role: str
+    fingerprint: str
+    outcome: str
+    reason: str
+    safe_state: str
+
+    @classmethod
+    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> Executed:
+        trial, ending = archived.trial, archived.ending
+        return cls(
+            entry=entry,
+            place=place,
+            number=trial.number,
+            test=trial.test,
+            kind=trial.kind,
+            role=trial.role,
+            fingerprint=fingerprint,
+            outcome=ending.outcome,
+            reason=ending.reason,
+            safe_state=ending.safe_state,
+        )
+
+
+def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
+    """Whole lines, and the beginning that the header tells of."""
+    for number in story.damaged:
+        found.add(f"{place}:{number}", "is not a line of a journal")
+    started = story.all(RunStarted)
+    if not started or not isinstance(story.entries[0], RunStarted):
+        found.add(place, "does not begin with the start of a run")
+    elif started[0].run != header.name:
+        found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
+    elif started[0].trials != header.trials:
+        found.add(place, f"tells of {started[0].trials} trials; {header.trials} are planned")
+
+
+def check_measured(story: Lines, place: str, found: DamageList) -> None:
+    """What was measured was measured of trials that had finished, and of each once."""
+    finished: set[str] = set()
+    measured: set[str] = set()
+    for entry in story.entries:
+        if isinstance(entry, TrialFinished):
+            finished.add(entry.record)
+        elif isinstance(entry, TrialMeasured):
+            if entry.record not in finished:
+                found.add(place, f"has metrics of trial {entry.trial}, which had not finished")
+            if entry.record in measured:
+                found.add(place, f"has metrics of trial {entry.trial} twice")
+            measured.add(entry.record)
+
+
+def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
+    """The trials that followed are numbered on after the plan's, and no stage was asked twice."""
+    stages = stages_in(story.entries)
+    numbers = [trial.number for trial in planned_in(stages)]
+    if numbers != list(range(header.trials + 1, header.trials + 1 + len(numbers))):
+        found.add(place, "tells of trials that followed, and does not number them after the plan's")
+    asked = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
+    for text, count in asked.items():
+        if count > 1:
+            found.add(place, f"tells {count} times which trials follow at {text}")
+
+
+def check_trials(
+    story: Lines, there: Mapping[str, Executed], unreadable: Iterable[str], found: DamageList
+) -> None:
+    """Each finished trial of the journal is there, ended as it says; `unreadable` are told of."""
+    told = entry_names(story.attempts)
+    for entry in told.keys() - there.keys() - set(unreadable):
+        found.add(f"/{entry}", "is missing, and the journal says that it finished")
+    for entry, trial in there.items():
+        finished = told.get(entry)
+        if finished is None:
+            found.add(trial.place, "is there, and no line of the journal says that it finished")
+            continue
+        for what in ("outcome", "reason", "safe_state"):
+            mine, theirs = str(getattr(trial, what)), str(getattr(finished, what))
+            if mine != theirs:
+                found.add(trial.place, f"has {what} {mine!r}, and the journal says {theirs!r}")
+
+
+def check_plan(
+    plan: tuple[PlannedTrial, ...],
+    header: RunHeader,
+    there: Iterable[Executed],
+    place: str,
+    found: DamageList,
+    followed: int = 0,
+) -> None:
+    """Each executed trial is the one that was planned; `followed` of them are not in the header."""
+    if len(plan) - followed != header.trials:
+        what = f"has {len(plan) - followed} trials, and the header says {header.trials}"
+        found.add(place, what)
+    planned = {trial.number: trial for trial in plan}
+    for trial in there:
+        wanted = planned.get(trial.number)
+        if wanted is None:
+            found.add(trial.place, "is not in the plan")
+            continue
+        for what in ("test", "kind", "role", "fingerprint"):
+            mine, theirs = getattr(trial, what), str(getattr(wanted, what))
+            if mine != theirs:
+                found.add(trial.place, f"has {what} {mine!r}, and the plan says {theirs!r}")
+
+
+def check_full_plan(
+    full: FullPlan,
+    plan: tuple[PlannedTrial, ...],
+    place: str,
+    found: DamageList,
+) -> None:
+    """The whole description of each planned trial is that of which the plan has the fingerprint."""
+    if len(full) != len(plan):
+        found.add(place, f"has {len(full)} trials, and the plan has {len(plan)}")
+        return
+    for planned in plan:
+        with found.noting():
+            trial: Trial = full.trial(planned.number)
+            if trial.fingerprint != planned.fingerprint:
+                raise ArchiveError(
+                    f"{found.path}: {place}: trial {planned.number} does not match its fingerprint"
+                )
+
+
+def check_protocol(header: RunHeader, place: str, found: DamageList) -> None:
+    """The normalised protocol is that of which the header has the fingerprint."""
+    if not header.fingerprint and not header.normalised:
+        return
+    what = {name: tree for name, tree in header.normalised.items() if name not in _BESIDE}
+    digest = hashlib.sha256(canonical_json(what).encode()).hexdigest()
+    if digest != header.fingerprint:
+        found.add(place, "the normalised protocol does not match its fingerprint")

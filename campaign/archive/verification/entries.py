@@ -1,0 +1,276 @@
+"""Verifying the trials of a run, in several processes for large runs.
+
+A part of them knows nothing of the others. What is found comes back in the order of the trials.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from itertools import groupby, zip_longest
+from operator import itemgetter
+from pathlib import Path
+
+import h5py
+from h5py import h5o
+
+from campaign import processes
+from campaign.archive.layout import storage
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.entries import entry_name
+from campaign.archive.layout.files import sha256_of
+from campaign.archive.layout.journal import TrialFinished
+from campaign.archive.layout.record import Trees, TrialRecord, series_of
+from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.archived_samples import TIME, PackedSamples
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.global_heap_check import known_heaps, told_of_heaps
+from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
+from campaign.archive.reading.sealed_run import read_entry
+from campaign.archive.reading.series import series_at
+from campaign.archive.verification.consistency import Executed
+from campaign.archive.verification.result import UNFINISHED, Progress
+from campaign.archive.writing import nexus
+from campaign.archive.writing.default_plot import Aim
+from campaign.errors import ArchiveError
+from campaign.recording import ChannelInfo
+
+_MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
+_PLOT = frozenset(("axes", "time_indices"))
+"""Attributes by which viewers plot a group, besides its signal."""
+
+
+PRELOADED = (__name__,)
+WORTHWHILE = 400
+"""Trials from which on several processes take less time than they cost to begin."""
+TOGETHER = 50
+"""Trials that one process checks before it takes the next."""
+
+Entries = Sequence[tuple[str, TrialFinished]]
+"""Names of groups in a sealed run, and what the journal says of each."""
+
+
+class EntryCheck:
+    """What some trials of a run show; it grows as they are looked at.
+
+    Attributes:
+        executed, unreadable: by the name of the trial's group.
+        datasets: how many were read against their checksums.
+        size: bytes that were read.
+        instruments: where each lies in the file, the bench that it describes, and what it shows.
+            Trials of one bench share it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.problems = DamageList(path)
+        self.remarks = DamageList(path)
+        self.executed: dict[str, Executed] = {}
+        self.unreadable: set[str] = set()
+        self.datasets = 0
+        self.size = 0
+        self.instruments: list[tuple[int, nexus.Described, EntryCheck]] = []
+
+    def absorb(self, other: EntryCheck) -> None:
+        """Add what others show; an instrument that was added before counts once."""
+        self.problems.found += other.problems.found
+        self.remarks.found += other.remarks.found
+        self.executed |= other.executed
+        self.unreadable |= other.unreadable
+        self.datasets += other.datasets
+        for address, described, found in other.instruments:
+            if not self._has(address, described):
+                self.instruments.append((address, described, found))
+                self.absorb(found)
+
+    def _has(self, address: int, described: nexus.Described) -> bool:
+        return any(each[0] == address and each[1] == described for each in self.instruments)
+
+    def trial_file(self, entry: str, finished: TrialFinished) -> None:
+        """A trial's own file: its record, its samples, and its bytes."""
+        path, name = self.path / finished.file, entry_name(finished.trial)
+        known = len(self.problems.found)
+        self.unreadable.add(entry)
+        with self.problems.noting(), safe_hdf5.guarded(path, f"/{name}"):
+            packed = read_packed(path, name)
+            record, trees = packed_record(path, name, packed, finished.record)
+            self._record(f"{path.name}/{name}", entry, record, trees)
+            samples = PackedSamples(path, name, record, packed.not_kept)
+            for problem in samples.problems():
+                self.problems.note(ArchiveError(problem))
+            self.datasets += 1 + (0 if packed.not_kept else len(list(series_of(record))))
+        same = path.is_file() and sha256_of(path) == finished.sha256
+        if not same and len(self.problems.found) == known:
+            self.problems.add(finished.file, UNFINISHED)
+
+    def trial(self, file: h5py.File, entry: str, finished: TrialFinished) -> None:
+        """What a trial says of itself, and that its samples are those that were recorded."""
+        self.unreadable.add(entry)
+        with self.problems.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
+            group = safe_hdf5.group_at(file, entry, "NXentry")
+            record, trees = read_entry(self.path, file, entry, finished.record)
+            self.datasets += 1
+            self._record(f"/{entry}", entry, record, trees)
+            self._says(group, record)
+            self._members(group, f"/{entry}", record, trees)
+            self._series(group, f"/{entry}", record)
+
+    def _record(self, place: str, entry: str, record: TrialRecord, trees: Trees) -> None:
+        if record.fingerprint_of(trees) != record.fingerprint:
+            self.problems.add(f"{place}/record", "does not match its fingerprint")
+        self.executed[entry] = Executed(
+            entry=entry,
+            place=place,
+            number=record.number,
+            test=str(record.trial["test"]),
+            kind=str(record.trial["kind"]),
+            role=str(record.trial.get("role", "measurement")),
+            fingerprint=record.fingerprint,
+            outcome=record.outcome,
+            reason=record.reason,
+            safe_state=record.safe_state,
+        )
+        self.unreadable.discard(entry)
+
+    def _says(self, group: h5py.Group, record: TrialRecord) -> None:
+        """What viewers show beside the record is what the record says."""
+        says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
+        for name, wanted in says.items():
+            with self.problems.noting():
+                safe_hdf5.text_at(group, name, text_digest(storage.storable(wanted)))
+                self.datasets += 1
+
+    def _members(self, group: h5py.Group, place: str, record: TrialRecord, trees: Trees) -> None:
+        """What else an entry holds; what is missing or unknown is told."""
+        kept = safe_hdf5.names(safe_hdf5.inner_group(group, "record"))
+        wanted = set(_MEMBERS)
+        if record.samples is not None:
+            wanted.add("data")
+            if nexus.follows_definition(record.series):
+                wanted |= set(nexus.MEMBERS)
+        if record.preview is not None:
+            wanted.add("preview")
+        there = set(safe_hdf5.names(group))
+        for name in sorted(wanted - there):
+            self.problems.add(f"{place}/{name}", "is missing")
+        others = set(kept) - {"json", "trees"}
+        unknown = sorted(there - wanted) + sorted(f"record/{name}" for name in others)
+        for name in unknown:
+            self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
+        self._by_themselves(group, place, "record", ("trees",))
+        if set(nexus.MEMBERS) <= there & wanted:
+            described = nexus.Described.of(trees[str(record.trial["bench"])])
+            self._instrument(group, place, described)
+
+    def _instrument(self, group: h5py.Group, place: str, described: nexus.Described) -> None:
+        """The definition and the instrument, which trials of one bench share: each once."""
+        address = h5o.get_info(safe_hdf5.inner_group(group, "instrument").id).addr
+        if self._has(address, described):
+            return
+        found = EntryCheck(self.path)
+        self.instruments.append((address, described, found))
+        with found.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/instrument"):
+            for name, what in nexus.differences(group, described):
+                found.problems.add(f"{place}/{name}", what)
+        found._by_themselves(group, place, "", ("definition",))
+        for inner in places(group, "instrument", "instrument/"):
+            parent, _, name = inner.rpartition("/")
+            found._by_themselves(group, place, parent, (name,))
+
+    def _by_themselves(
+        self, group: h5py.Group, place: str, inner: str, names: Iterable[str]
+    ) -> None:
+        """Datasets that have checksums of their own, in the groups `inner` of an entry."""
+        with self.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/{inner}"):
+            for step in filter(None, inner.split("/")):
+                group = safe_hdf5.inner_group(group, step)
+            for name in names:
+                if name in group:
+                    safe_hdf5.check_dataset(group, name)
+                    self.datasets += 1
+
+    def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
+        """The samples, each series against its digest, and that there are no others."""
+        aim = Aim.of_tree(record.trial)
+        infos = {info.name: info for info in (TIME, *record.series)}
+        for inner, series in groupby(series_of(record), key=itemgetter(0)):
+            with self.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/{inner}"):
+                data = safe_hdf5.group_at(group, inner, "NXdata")
+                told = {name: (length, digest) for _, name, length, digest in series}
+                for name, (length, digest) in told.items():
+                    with self.problems.noting():
+                        self._one_series(data, f"{place}/{inner}", infos[name], length, digest)
+                for name in sorted(set(safe_hdf5.names(data)) - told.keys() - {"title"}):
+                    self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
+                with self.problems.noting():
+                    safe_hdf5.text_at(data, "title", text_digest(storage.storable(record.label)))
+                for name in sorted(_PLOT - set(data.attrs)):
+                    self.problems.add(f"{place}/{inner}@{name}", "is missing")
+                shown = [name for name in told if name != "time"]
+                if safe_hdf5.attribute(data, "signal") not in aim.accepted(shown):
+                    self.problems.add(f"{place}/{inner}@signal", "is not the channel to plot first")
+                if safe_hdf5.text_list(data, "axes") != ["time"]:
+                    self.problems.add(f"{place}/{inner}@axes", "is not the time")
+
+    def _one_series(
+        self, data: h5py.Group, place: str, info: ChannelInfo, length: int, digest: str
+    ) -> None:
+        with safe_hdf5.guarded(self.path, f"{place}/{info.name}"):
+            dataset, series = series_at(data, info.name, length)
+            self.size += series.check(digest)
+            self.datasets += 1
+            safe_hdf5.check_attribute(dataset, "units", info.unit)
+            safe_hdf5.check_attribute(dataset, "long_name", info.long_name)
+
+
+def check_entries(check: EntryCheck, entries: Entries, progress: Progress) -> None:
+    """Check trials of a sealed run, or the trial files of a folder, and add what they show."""
+    parts = [entries[start : start + TOGETHER] for start in range(0, len(entries), TOGETHER)]
+    for found in _checked(check.path, parts, len(entries) >= WORTHWHILE):
+        check.absorb(found)
+        progress(found.size)
+
+
+def _checked(path: Path, parts: Sequence[Entries], many: bool) -> Iterator[EntryCheck]:
+    """A process that dies costs time: what is missing is then checked here."""
+    count = (os.cpu_count() or 1) if many else 1
+    if count == 1:
+        yield from (_check(path, part) for part in parts)
+        return
+    with processes.process_pool(count, PRELOADED, told_of_heaps, known_heaps()) as pool:
+        begun: list[Future[EntryCheck]] = []
+        with suppress(BrokenProcessPool):  # keeps those before
+            begun.extend(pool.submit(_check, path, part) for part in parts)
+        for part, future in zip_longest(parts, begun):
+            found = None
+            if future is not None:
+                with suppress(BrokenProcessPool):
+                    found = future.result()
+            yield found or _check(path, part)
+
+
+def _check(path: Path, part: Entries) -> EntryCheck:
+    check = EntryCheck(path)
+    if path.is_dir():
+        for entry, finished in part:
+            check.trial_file(entry, finished)
+        return check
+    with safe_hdf5.open_file(path) as file:
+        for entry, finished in part:
+            check.trial(file, entry, finished)
+    return check
+
+
+def places(parent: h5py.Group, name: str, prefix: str = "") -> Iterator[str]:
+    """Every dataset in a group and the groups in it, by its path in the group."""
+    group = safe_hdf5.member(parent, name)
+    if group is None:
+        return
+    for inner in safe_hdf5.names(group):
+        if safe_hdf5.member(group, inner) is None:
+            yield f"{prefix}{inner}"
+        else:
+            yield from places(group, inner, f"{prefix}{inner}/")

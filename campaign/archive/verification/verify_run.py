@@ -1,0 +1,218 @@
+"""Verifying a run: every text against the seal, every trial against its record.
+
+A damaged sample is named by trial and channel. Damage in what HDF5 keeps for itself may change
+nothing that can be read; the hash of the file finds it, and it is reported as structure.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.entries import ENTRY, entry_names
+from campaign.archive.layout.files import PART, sha256_of
+from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
+from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
+from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.folder import open_folder
+from campaign.archive.reading.open_run import read_sealed
+from campaign.archive.reading.run_reader import RunReader
+from campaign.archive.reading.seal import NUMBERS, OUTSIDE, SealedTexts
+from campaign.archive.reading.sealed_run import NOTES, read_not_kept
+from campaign.archive.verification import consistency
+from campaign.archive.verification.consistency import Executed
+from campaign.archive.verification.entries import EntryCheck, check_entries, places
+from campaign.archive.verification.result import (
+    STRUCTURE,
+    UNREADABLE_HASH,
+    Progress,
+    Verification,
+)
+from campaign.errors import ArchiveError
+
+_HASH = "outcome/file_sha256"
+_REQUIRED = frozenset(
+    [
+        *("title", "entry_identifier", "start_time", "end_time", "program_name", *NUMBERS),
+        *("provenance/name", "provenance/created"),
+        *("outcome/status", "outcome/reason", "outcome/safe_state"),
+        *(f"{note}/{name}" for note in NOTES for name in ("type", "file_name", "data")),
+    ]
+) - {f"not_kept/{name}" for name in ("type", "file_name", "data")}
+_OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING}
+
+
+def verify_run(path: Path, progress: Progress = lambda count: None) -> Verification:
+    """Verify a sealed run or the folder of a run in progress, in flat memory; never raises
+    for what is in it.
+    """
+    check = _Check(path, progress)
+    with check.problems.noting(), safe_hdf5.guarded(path):
+        if path.is_dir():
+            check.folder()
+        else:
+            check.sealed()
+    return Verification(
+        path,
+        tuple(dict.fromkeys(check.problems.found)),
+        tuple(check.remarks.found),
+        len(check.executed) + len(check.unreadable),
+        check.datasets,
+        check.root,
+    )
+
+
+class _Check(EntryCheck):
+    """One verification, with what its trials show."""
+
+    def __init__(self, path: Path, progress: Progress) -> None:
+        super().__init__(path)
+        self.progress = progress
+        self.root = ""
+
+    def sealed(self) -> None:
+        """A sealed file: its content first, so that the hash speaks of what that does not show."""
+        with self.problems.noting():
+            self._content()
+        self._hash()
+
+    def folder(self) -> None:
+        """The folder of a run in progress, as far as its journal tells."""
+        run = open_folder(self.path)
+        content = self.path / JOURNAL
+        story = read_lines(content.read_bytes() if content.is_file() else b"")
+        if story.torn:
+            self.remarks.add(JOURNAL, "has a last line that was torn by a crash and never reported")
+        entries = list(entry_names(story.attempts).items())
+        check_entries(self, entries, self.progress)
+        named = {finished.file for finished in story.attempts}
+        for file in sorted(self.path.iterdir()):
+            if file.name not in named | _OWN_FILES:
+                kind = "was never finished" if file.suffix == PART else "is not part of the run"
+                self.remarks.add(file.name, kind)
+        self._agreement(run, story, HEADER, JOURNAL, PLAN)
+
+    def _content(self) -> None:
+        run = read_sealed(self.path)
+        self.root = run.root
+        story = read_lines(run.journal.encode())
+        with safe_hdf5.open_file(self.path) as file:
+            texts = SealedTexts(self.path, file, DamageList(self.path))
+            self._texts(file, texts)
+            not_kept: dict[str, str] = {}
+            with self.problems.noting():
+                not_kept = read_not_kept(texts)
+            self._index(texts, story)
+            told = entry_names(story.attempts)
+            gone = {entry for entry in told if entry in not_kept and entry not in file}
+            reasons: dict[str, list[str]] = {}
+            for entry in sorted(gone):
+                reasons.setdefault(not_kept[entry], []).append(entry)
+                self._without_samples(run, entry, told[entry])
+            for why, entries in reasons.items():
+                more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
+                what = f"no samples of it{more} are kept: {why}; their digests are"
+                self.remarks.add(f"/{entries[0]}", what)
+            there = [(entry, finished) for entry, finished in told.items() if entry not in gone]
+            check_entries(self, there, self.progress)
+            for entry in sorted(not_kept.keys() - told.keys()):
+                self.problems.add("/run/not_kept", f"names {entry!r}, and no such trial finished")
+            for entry in sorted(not_kept.keys() & told.keys()):
+                if entry in file:
+                    what = "is there, and its samples are said not to be kept"
+                    self.problems.add(f"/{entry}", what)
+            for name in safe_hdf5.names(file):
+                if name not in told and name != "run":
+                    known = ENTRY.fullmatch(name) is not None
+                    note = self.problems if known else self.remarks
+                    what = "is there, and no line of the journal says that it finished"
+                    note.add(f"/{name}", what if known else "is nothing that the format knows")
+        self._agreement(run, story, "/run/provenance", "/run/journal", "/run/plan")
+        self._outcome(run, story)
+
+    def _texts(self, file: h5py.File, texts: SealedTexts) -> None:
+        """Every text of the run against the seal."""
+        if texts.seal is None:
+            return  # which was found when the run was opened
+        bound = texts.seal.texts.keys()
+        self.datasets += 1
+        for place in sorted(_REQUIRED - bound):
+            self.problems.add(f"/run/{place}", "is missing from the seal")
+        for place in bound:
+            with self.problems.noting():
+                texts.check(place)
+            self.datasets += 1
+        for place in sorted(set(places(file, "run")) - bound - OUTSIDE):
+            self.remarks.add(f"/run/{place}", "is nothing that the format knows")
+
+    def _index(self, texts: SealedTexts, story: Lines) -> None:
+        """The index has the records that the journal names, and no others."""
+        with self.problems.noting():
+            lines = {text_digest(line) for line in texts.text("index/data").splitlines()}
+            told = {finished.record for finished in story.attempts}
+            if lines != told:
+                count = len(lines ^ told)
+                self.problems.add("/run/index", f"differs from the journal in {count} records")
+
+    def _hash(self) -> None:
+        try:
+            with safe_hdf5.open_file(self.path) as file, safe_hdf5.guarded(self.path):
+                digest, place = safe_hdf5.digest_at(file, f"run/{_HASH}")
+        except ArchiveError:
+            if not self.problems.found:
+                self.problems.add("", UNREADABLE_HASH)
+            return
+        same = sha256_of(self.path, place, self.progress) == digest
+        if not same and not self.problems.found:
+            self.problems.add("", STRUCTURE)
+
+    def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
+        """A trial that has no group: what the index says of it was read when the run was opened."""
+        attempts = run.earlier_attempts.get(finished.trial, ())
+        for archived in (*run.trials, *attempts):
+            if archived.entry == entry:
+                fingerprint = archived.trial.fingerprint
+                self.executed[entry] = Executed.of(entry, f"/{entry}", archived, fingerprint)
+
+    def _agreement(
+        self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str
+    ) -> None:
+        """Whether the parts of the run agree; what cannot be read is told of once."""
+        known = {damage.place for damage in self.problems.found}
+        for damage in run.damaged:
+            if damage.place not in known:
+                self.problems.found.append(damage)
+        broken = {damage.place.split(":")[0] for damage in self.problems.found}
+        if not any(place.startswith(journal) for place in broken) or story.damaged:
+            consistency.check_journal(story, run.header, journal, self.problems)
+            consistency.check_measured(story, journal, self.problems)
+            consistency.check_stages(story, run.header, journal, self.problems)
+            consistency.check_trials(story, self.executed, self.unreadable, self.problems)
+        if not any(place.startswith(plan) for place in broken):
+            executed = self.executed.values()
+            followed = len(run.plan) - len(run.first_stage)
+            consistency.check_plan(run.plan, run.header, executed, plan, self.problems, followed)
+            with self.problems.noting():
+                consistency.check_full_plan(
+                    run.full_plan, run.plan, f"{plan} in full", self.problems
+                )
+        if not any(place.startswith(header_place) for place in broken):
+            consistency.check_protocol(run.header, header_place, self.problems)
+
+    def _outcome(self, run: RunReader, story: Lines) -> None:
+        """The end of a sealed run is the one of its journal."""
+        ended = story.ended
+        if ended is None:
+            if story.entries:
+                self.problems.add("/run/journal", "does not tell of the end of the run")
+            return
+        for what in ("status", "reason", "safe_state"):
+            mine, theirs = str(getattr(run, what)), str(getattr(ended, what))
+            if mine != theirs:
+                told = f"is {mine!r}, and the journal says {theirs!r}"
+                self.problems.add(f"/run/outcome/{what}", told)

@@ -1,0 +1,91 @@
+"""Opening an interrupted, killed or faulted run to continue it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from campaign.archive.layout.files import PART, sha256_of, why
+from campaign.archive.layout.header import PARTIAL, SEALED, RunStatus
+from campaign.archive.layout.journal import JOURNAL, Journal, Story, read_journal
+from campaign.archive.layout.run_folder import read_header
+from campaign.archive.layout.signature_file import set_aside_signature
+from campaign.archive.reading.open_run import read_sealed
+from campaign.archive.writing.remnants import clear_beginning, is_own
+from campaign.archive.writing.run_lock import RunLock
+from campaign.errors import ArchiveError, UsageError
+
+RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
+"""How a run has to stand for somebody to go on with it."""
+
+
+def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
+    """The folder of the run at `path`, what its journal tells, that, and the right to write it.
+
+    A folder that was killed while it was sealed may be reopened whatever it says of its end.
+
+    Raises:
+        UsageError: there is nothing to go on with, or another process writes the run.
+        ArchiveError: the run is damaged, or its folder cannot be written; nothing was changed.
+    """
+    folder, sealed = path.with_suffix(PARTIAL), path.with_suffix(SEALED)
+    if path.suffix not in (PARTIAL, SEALED) or not path.exists():
+        raise UsageError(f"{path}: is no run")
+    with _locked(folder) as lock:
+        clear_beginning(folder.parent, folder.stem)
+        if sealed.is_file():
+            try:
+                _check_sealed(sealed)
+            except ArchiveError as error:
+                raise ArchiveError(f"{error}; it is as it was") from None
+            from campaign.archive.writing.unseal_run import unseal
+
+            unseal(sealed)
+        set_aside_signature(sealed)  # also one that a crash left when its file was gone
+        story = _read_folder(folder)
+        journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
+        return folder, story, journal, lock
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[RunLock]:
+    """The run's lock; given up again when the block fails."""
+    try:
+        lock = RunLock.acquire(folder.parent, folder.stem)
+    except OSError as error:
+        raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
+    try:
+        yield lock
+    except OSError as error:
+        lock.release()
+        raise ArchiveError(f"{folder}: cannot be gone on with: {why(error)}") from None
+    except BaseException:
+        lock.release()
+        raise
+
+
+def _check_sealed(sealed: Path) -> None:
+    run = read_sealed(sealed)
+    if run.status not in RESUMABLE:
+        raise UsageError(
+            f"{sealed}: the run has ended ({run.status}); there is nothing to go on with"
+        )
+
+
+def _read_folder(folder: Path) -> Story:
+    """What is in the folder, checked. Raises ArchiveError naming the trial file that is wrong."""
+    read_header(folder)  # or it is of another format
+    story = read_journal(folder / JOURNAL)
+    for finished in story.files:
+        path = folder / finished.file
+        try:
+            digest = sha256_of(path)
+        except OSError as error:
+            raise ArchiveError(f"{path}: cannot be read: {why(error)}") from None
+        if digest != finished.sha256:
+            raise ArchiveError(f"{path}: is not what the journal says was written")
+    for part in folder.glob(f"*{PART}"):
+        if is_own(part.name):
+            part.unlink()
+    return story

@@ -1,0 +1,135 @@
+"""From the folder of a run to its sealed file.
+
+The file grows in the folder while the trials still run (`Sealer`), so that a long campaign does not
+end with a long wait. It is nothing but a copy until it is whole, checked and renamed: what finished
+is in the folder's trial files and its journal, and from those it can be made anew at any time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import threading
+from pathlib import Path
+
+from campaign.archive.layout.entries import entry_name, entry_names
+from campaign.archive.layout.files import publish, why
+from campaign.archive.layout.header import SEALED
+from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.run_folder import SEALING, read_header
+from campaign.archive.writing.remnants import remove_folder
+from campaign.archive.writing.sealed_file import SealedFile, check_sealed
+from campaign.errors import ArchiveError
+from campaign.recording import Outcome
+
+_FREE = 1 << 28  # bytes that stay free for the trials while their copies are made beside them
+_AT_ONCE = 2  # more than one finishes at a time, so that those that waited are caught up with
+_FAILURES = (OSError, RuntimeError, ValueError, ArchiveError)
+
+
+def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
+    """Make one file of a run's folder, check it, and only then remove the folder.
+
+    The folder's journal says which trials there are. `begun` has the copies of some of them. Raises
+    ArchiveError, leaving the folder as it is and no file, when a trial is not what the journal says
+    or the disk is full.
+    """
+    sealed, part = folder.with_suffix(SEALED), folder / SEALING
+    try:
+        story = read_journal(folder / JOURNAL)
+        if story.ended is None:
+            raise ArchiveError(f"{folder / JOURNAL}: the run has not ended")
+        wanted = entry_names(story.files)
+        if begun is not None and not begun.is_part_of(wanted):
+            begun.discard()
+            begun = None
+        file = begun or SealedFile(part)
+        try:
+            for entry, finished in wanted.items():
+                if entry not in file.copied:
+                    file.copy(folder, finished, entry)
+            file.finish(folder, read_header(folder), story, story.ended)
+        except BaseException:
+            file.discard()
+            raise
+        check_sealed(part, file)
+        file.put_hash()
+        publish(part, sealed)
+    except _FAILURES as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise ArchiveError(
+            f"{sealed}: could not be sealed: {why(error)}; every finished trial is in {folder}"
+        ) from None
+    with contextlib.suppress(OSError):  # a remnant does no harm: the sealed file goes first
+        remove_folder(folder)
+    return sealed
+
+
+class Sealer:
+    """Copies trials into the sealed file while others are executed, by whoever finished one.
+
+    No thread of its own: beside those that execute trials it would only wait with them for h5py's
+    one lock, and on a bench that moves this is done between trials, while the bench is at rest.
+
+    Trials are copied in the order of the plan, so that equal runs make equal files whatever the
+    machine was busy with: a trial waits for those before it, and what did not complete at the first
+    attempt, and may be executed again, waits for the end. Whatever goes wrong here costs time only:
+    `seal` then begins anew.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._busy = threading.Lock()
+        self._file: SealedFile | None = None
+        self._first: dict[int, TrialFinished] = {}
+        self._next = 1
+        self._gave_up = False
+
+    def add(self, finished: TrialFinished) -> None:
+        """A trial's file is on the disk and the journal tells of it."""
+        self._first.setdefault(finished.trial, finished)
+
+    def advance(self) -> None:
+        """Copy what is next, if it is there and no other thread is about it. It never fails."""
+        if not self._busy.acquire(blocking=False):
+            return
+        try:
+            for _ in range(_AT_ONCE):
+                if self._gave_up or self._next not in self._first:
+                    return
+                self._copy(self._first.pop(self._next))
+                self._next += 1
+        except BaseException as error:
+            self._give_up()
+            if not isinstance(error, _FAILURES):
+                raise
+        finally:
+            self._busy.release()
+
+    def seal(self) -> Path:
+        """Make the file whole: `seal_folder`."""
+        with self._busy:
+            begun, self._file = self._file, None
+            self._gave_up = True
+            return seal_folder(self._folder, begun)
+
+    def discard(self) -> None:
+        """Leave no file."""
+        with self._busy:
+            self._give_up()
+
+    def _copy(self, first: TrialFinished) -> None:
+        if first.outcome is not Outcome.COMPLETED or first.attempt != 1:
+            return
+        if shutil.disk_usage(self._folder).free < _FREE + 2 * first.bytes:
+            raise ArchiveError("the room that is left is for the trials")
+        if self._file is None:
+            self._file = SealedFile(self._folder / SEALING)
+        self._file.copy(self._folder, first, entry_name(first.trial))
+
+    def _give_up(self) -> None:
+        self._gave_up = True
+        if self._file is not None:
+            self._file.discard()
+            self._file = None

@@ -1,0 +1,137 @@
+"""From a sealed run back to a folder, so that the run can continue.
+
+The folder is built and checked under a name that no reader takes for a run. It gets its real name
+while the sealed file is still there, and counts from the moment that this is gone: at every instant
+one whole run is on the disk, and it is clear which one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+from campaign.archive.layout.checksums import text_digest
+from campaign.archive.layout.entries import entry_names, file_name
+from campaign.archive.layout.files import (
+    PART,
+    keep_umask,
+    publish,
+    sha256_of,
+    sync_folder,
+    why,
+    write_atomically,
+)
+from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
+from campaign.archive.layout.header import PARTIAL
+from campaign.archive.layout.journal import JOURNAL, Entry, Story, TrialFinished, parse_journal
+from campaign.archive.layout.packed_trial import PackedTrial
+from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, trees_text
+from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
+from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.folder import read_trial_file
+from campaign.archive.reading.packed_trial_reader import packed_entry
+from campaign.archive.reading.seal import SealedTexts
+from campaign.archive.reading.sealed_run import read_not_kept, read_sealed
+from campaign.archive.writing.packed_file import copy_packed
+from campaign.archive.writing.remnants import remove_folder, take_over
+from campaign.errors import ArchiveError
+from campaign.trial import canonical_json
+
+
+def unseal(sealed: Path) -> Path:
+    """Replace a sealed run by its folder; returns that.
+
+    The caller holds the run's lock. Raises ArchiveError, leaving the sealed run as it was, when it
+    is damaged or the folder cannot be written.
+    """
+    folder = sealed.with_suffix(PARTIAL)
+    part = folder.with_name(folder.name + PART)
+    try:
+        _check_sealed(sealed)
+        if part.is_dir() and remove_folder(part):
+            raise ArchiveError(f"{part}: holds files that are not the program's; move them away")
+        keep_umask()
+        part.mkdir()
+        _fill(sealed, part)
+        if folder.is_dir():  # a remnant: where both are found, the sealed run counts
+            take_over(folder, part)
+            remove_folder(folder)
+        part.rename(folder)
+        sync_folder(folder.parent)
+        sealed.unlink()
+    except (OSError, RuntimeError, ValueError, ArchiveError) as error:
+        with contextlib.suppress(OSError):
+            remove_folder(part)
+        raise ArchiveError(
+            f"{sealed}: could not be opened for going on: {why(error)}; it is as it was"
+        ) from None
+    sync_folder(folder.parent)
+    return folder
+
+
+def _check_sealed(sealed: Path) -> None:
+    with safe_hdf5.open_file(sealed) as file:
+        digest, place = safe_hdf5.digest_at(file, "run/outcome/file_sha256")
+    if sha256_of(sealed, place) != digest:
+        raise ArchiveError(f"{sealed}: does not match its own hash; it was damaged or changed")
+
+
+def _fill(sealed: Path, folder: Path) -> None:
+    """Write everything that the run's folder had when it was sealed."""
+    run = read_sealed(sealed)
+    if run.damaged:
+        raise ArchiveError(str(run.damaged[0]))
+    with safe_hdf5.open_file(sealed) as file, safe_hdf5.guarded(sealed, "/run"):
+        texts = SealedTexts(sealed, file, DamageList(sealed))
+        notes = {PLAN: "plan", PLAN_TRIALS: "plan_trials", PLAN_TREES: "trees"}
+        for name, note in notes.items():
+            write_atomically(folder / name, texts.text(f"{note}/data"))
+        write_atomically(folder / HEADER, header_document(run.header))
+        story = parse_journal(sealed, run.journal.encode())
+        lines = {text_digest(line): line for line in texts.text("index/data").splitlines()}
+        trees = parse_trees(texts.text("trees/data"))
+        not_kept = read_not_kept(texts)
+        written = {}
+        for entry, finished in entry_names(story.files).items():
+            if entry in not_kept:
+                packed = _without_samples(lines[finished.record], trees, not_kept[entry])
+            else:
+                packed = packed_entry(sealed, entry)
+            name = file_name(finished.trial, finished.attempt)  # once it had another ending
+            written[finished.file] = _write(folder, sealed, packed, finished, name)
+    write_atomically(folder / JOURNAL, _journal(story, written))
+
+
+def _without_samples(line: str, trees: Trees, not_kept: str) -> PackedTrial:
+    """A trial whose samples were not kept: it has no group in the sealed run."""
+    record = TrialRecord.model_validate_json(line)
+    own = {name: trees[name] for name in record.tree_names}
+    return PackedTrial(record=line, trees=trees_text(own), not_kept=not_kept)
+
+
+def _write(
+    folder: Path, sealed: Path, packed: PackedTrial, finished: TrialFinished, name: str
+) -> TrialFinished:
+    """Write a trial's file and read it back; returns the journal's line of it, as it is now."""
+    part = folder / (name + PART)
+    digest, size = copy_packed(sealed, packed, part)
+    problems = list(read_trial_file(part, finished).problems())
+    if problems:
+        raise ArchiveError("; ".join(problems[:3]))
+    publish(part, folder / name)
+    return finished.model_copy(update={"file": name, "sha256": digest, "bytes": size})
+
+
+def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
+    """The journal as it was, but for the hashes of the trial files, which are new ones."""
+
+    def line(entry: Entry, text: str) -> str:
+        if isinstance(entry, TrialFinished):
+            new = written[entry.file]
+            told = {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
+            return canonical_json(entry.model_copy(update=told).model_dump(mode="json"))
+        return text
+
+    lines = story.text.splitlines()
+    return "".join(line(*both) + "\n" for both in zip(story.entries, lines, strict=True))

@@ -1,0 +1,163 @@
+"""A returned recording: its channels on the trial's time base."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from campaign.backends.handover.excitation import axis_of, facts_of, samples_of
+from campaign.channels import COMMAND, GYRO_RATE, RELATIVE_RATE, info, missing
+from campaign.importing.derived_channels import AT_REST
+from campaign.importing.description import Described
+from campaign.importing.mapped_trials import describe
+from campaign.importing.mapping import Layout, RecordingEntry
+from campaign.importing.reader import RecordingReader
+from campaign.recording import Array, ChannelInfo
+from campaign.trial import Trial
+
+CLOCK = 1e-3
+"""Relative; further apart, two clocks do not run alike: it is another rate."""
+DRIFT = 0.25
+"""of a sample that a recording may drift in all before its samples are put on the trial's clock."""
+
+
+@dataclass(frozen=True)
+class Returned:
+    """What came back, as a recorder wants it.
+
+    Attributes:
+        channels: in the order of the rows of `samples`, shape (channels, n).
+        time: shape (n,), s; sample k at k / `Task.sample_rate`.
+        lost: which samples are missing, shape (n,).
+        rate: at which it was recorded (Hz), by its own clock.
+        duration: of the whole of it (s); what goes on after the trial is not in `samples`.
+        remarks: what was done to it, in sentences.
+    """
+
+    channels: tuple[ChannelInfo, ...]
+    time: Array
+    samples: Array
+    lost: np.ndarray
+    rate: float
+    duration: float
+    remarks: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Array:
+        """Samples of a channel; KeyError where it was not recorded."""
+        return self.by_name[name]
+
+    @property
+    def by_name(self) -> Mapping[str, Array]:
+        """Samples by the name of the channel."""
+        rows = zip(self.channels, self.samples, strict=True)
+        return {channel.name: row for channel, row in rows}
+
+    def cut(self, count: int, remark: str) -> Returned:
+        """Its first samples."""
+        return replace(
+            self,
+            time=self.time[:count],
+            samples=self.samples[:, :count],
+            lost=self.lost[:count],
+            remarks=(*self.remarks, remark),
+        )
+
+
+class OtherRateError(ValueError):
+    """It was sampled at another rate than the trial asks for."""
+
+
+class ColumnsError(ValueError):
+    """What its layout makes of it is not what the trial needs."""
+
+
+def read_returned(
+    trial: Trial, files: Sequence[Path], layout: Layout, wanted: Collection[str]
+) -> Returned:
+    """The recording that lies in `files`, which have one clock.
+
+    Raises RecordingError for files that cannot be read, MappingError for what does not go with the
+    layout, OtherRateError and ColumnsError.
+    """
+    names = [path.name for path in files]
+    entry = RecordingEntry(file=tuple(names))
+    opened, found = describe(entry, layout, files, names, facts_of(trial), wanted)
+    with opened:
+        ((described, _),) = found
+        task, rate = trial.task, described.sample_rate
+        ratio = rate / task.sample_rate
+        if abs(ratio - 1.0) > CLOCK:
+            raise OtherRateError(_other_rate(rate, task.sample_rate))
+        channels = tuple(_announced(trial, made.info) for made in described.channels)
+        _check_channels(trial, described)
+        enough = math.ceil((samples_of(task) - 1) * ratio) + 2
+        read = described.model_copy(update={"samples": min(described.samples, enough)})
+        blocks = list(RecordingReader(read, opened).blocks())
+    samples = np.concatenate([block for _, block, _ in blocks], axis=1)
+    lost = np.concatenate([gone for _, _, gone in blocks])
+    remarks = list(described.remarks)
+    over = described.samples - enough
+    if over > 0:
+        remarks.append(f"what it has after the trial, {over / rate:.4g} s, is left out")
+    samples, lost = _on_the_grid(samples, lost, ratio, samples_of(task), remarks)
+    time = np.arange(samples.shape[1]) / task.sample_rate
+    return Returned(channels, time, samples, lost, rate, described.samples / rate, tuple(remarks))
+
+
+def _check_channels(trial: Trial, described: Described) -> None:
+    """Raises ColumnsError where a channel is lacking, or made as if the hull were at rest."""
+    names = [each.name for each in described.channels]
+    if lacking := missing(trial.requires, names):
+        raise ColumnsError(
+            f"{', '.join(lacking)}: {trial.kind} needs it, and no column is one; there are "
+            f"{', '.join(names)}"
+        )
+    at_rest = any(AT_REST in remark for remark in described.remarks)
+    if at_rest and trial.task.base_acceleration.shape != "zero":
+        raise ColumnsError(
+            f"the hull moves in {trial.name}, so {GYRO_RATE} and {RELATIVE_RATE} have both to be "
+            "recorded"
+        )
+
+
+def _on_the_grid(
+    samples: Array, lost: np.ndarray, ratio: float, count: int, remarks: list[str]
+) -> tuple[Array, np.ndarray]:
+    """At the times of the trial; `ratio` of the recorded rate to the trial's, `count` wanted."""
+    have = samples.shape[1]
+    if abs(ratio - 1.0) * min(have, count) <= DRIFT:
+        return samples[:, :count], lost[:count]
+    at = np.arange(count) * ratio
+    at = np.minimum(at[at <= have - 1 + DRIFT], have - 1.0)
+    rows = np.arange(have)
+    remarks.append(
+        f"its clock differs from the trial's by {1e6 * (ratio - 1.0):.4g} ppm; its samples were "
+        "put on lines between those that were recorded"
+    )
+    placed = np.array([np.interp(at, rows, row) for row in samples])
+    below = np.floor(at).astype(int)
+    gone = lost[below] | lost[np.minimum(below + 1, have - 1)]
+    return placed, gone
+
+
+def _announced(trial: Trial, channel: ChannelInfo) -> ChannelInfo:
+    """The command by the words of the trial's mode. Raises ColumnsError."""
+    if channel.name != COMMAND:
+        return channel
+    due = info(COMMAND, trial.task.mode, axis=axis_of(trial))
+    if due.unit != channel.unit:
+        raise ColumnsError(
+            f"the command is read in {channel.unit}, and the trial commands {due.unit}"
+        )
+    return due
+
+
+def _other_rate(rate: float, wanted: float) -> str:
+    return (
+        f"it was recorded at {rate:.6g} Hz instead of {wanted:.6g} Hz; record at that rate, or "
+        "change the test's sample_rate"
+    )

@@ -1,0 +1,70 @@
+"""Compiling the engine while a command prepares, with a message if it waits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING
+
+from campaign.backends import backends
+from campaign.backends.interface import Backend
+from campaign.backends.sim import SimBackend
+from campaign.cli.output import error_console, print_note
+from campaign.interrupts import unwinding
+from campaign.trial import Trial
+
+if TYPE_CHECKING:
+    from campaign.execution.first_start import FirstStart
+
+COMPILING = "compiling the engine (once per installation)"
+WORTH_A_BLOCK = 2e8
+"""Steps of trials in company that take as long, one after the other, as compiling for blocks."""
+
+
+@contextmanager
+def compiling_meanwhile(backend: str) -> Iterator[FirstStart | None]:
+    """Inside the block the engine is compiled, if that backend runs it and it never was.
+
+    Hand what is yielded to `wait_until_compiled` before the first trial.
+    """
+    kind = backends().get(backend)
+    if kind is None or not kind.simulates:
+        yield None
+        return
+    from campaign.execution.first_start import FirstStart
+    from campaign.physics.compilation import distrusted
+
+    if why := distrusted():
+        print_note(why, "yellow")
+    with FirstStart() as first:
+        yield first
+
+
+def wait_until_compiled(
+    first: FirstStart | None, backend: Backend, trials: Sequence[Trial]
+) -> None:
+    """Make what these trials need, and say what is waited for.
+
+    Where there is no engine for trials side by side, so few are executed without it.
+    """
+    if first is None or not isinstance(backend, SimBackend):
+        return
+    from campaign.physics.machine_code import is_made
+    from campaign.physics.vector import LANES
+
+    if not is_made(LANES):
+        if backend.steps_together(trials) > WORTH_A_BLOCK:
+            first.need(LANES)
+        else:
+            backend.has_blocks = False
+    if not first.is_busy:
+        return
+    make_ready = partial(backend.make_ready, trials)
+    console = error_console()
+    if not console.is_terminal:
+        print_note(COMPILING)
+        first.wait(make_ready)
+        return
+    with unwinding(), console.status(COMPILING):  # which hides the cursor, and shows it again
+        first.wait(make_ready)

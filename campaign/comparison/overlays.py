@@ -1,0 +1,132 @@
+"""Figures of two runs drawn over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import takewhile
+
+from campaign.api.analysis import AnalysedTest
+from campaign.report.palette import OTHERS, Look
+from campaign.result import Curve, Figure, Panel
+
+PARTS = 8
+"""Most panels that a figure is taken apart into."""
+SAMPLES = 20_000
+"""Samples of a figure from which on it is one of recordings, not of numbers."""
+
+
+@dataclass(frozen=True)
+class Letters:
+    """What the two runs are called in a picture."""
+
+    reference: str
+    other: str
+
+    @property
+    def looks(self) -> tuple[Look, Look]:
+        """The reference's and the other's: the first two of those that are nobody's own."""
+        return OTHERS[0], OTHERS[1]
+
+
+def overlays(
+    reference: AnalysedTest, other: AnalysedTest, letters: Letters
+) -> Iterator[Figure | str]:
+    """Figures that both tests have, one over the other; a sentence for each that cannot be so."""
+    theirs = {figure.key: figure for figure in other.result.figures}
+    for figure in reference.result.figures:
+        if figure.key in theirs:
+            yield _overlay(figure, theirs[figure.key], letters)
+
+
+def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
+    if len(one.panels) != len(other.panels) or not all(map(_fits, one.panels, other.panels)):
+        return f"“{one.title}” of the two runs has other axes."
+    if _samples(one) + _samples(other) > SAMPLES:
+        return f"“{one.title}” shows recordings, sample by sample: see both reports."
+    if all(_few(panel) for panel in (*one.panels, *other.panels)):
+        panels = [_both(a, b, letters) for a, b in zip(one.panels, other.panels, strict=True)]
+    elif any(panel.x.unit == "s" for panel in one.panels):
+        return f"“{one.title}” has too many curves over time to be laid over each other."
+    else:
+        panels = [
+            _both(part, partner, letters, part.title)
+            for a, b in zip(one.panels, other.panels, strict=True)
+            for part, partner in _parts(a, b)
+        ]
+    if len(panels) > PARTS:
+        return f"“{one.title}” has too many curves to be laid over each other."
+    across = one.across if len(panels) == len(one.panels) else 2
+    told = f"{letters.reference} and {letters.other} over each other."
+    if one.caption == other.caption:  # else it is of one run
+        told = f"{told} {one.caption}"
+    return replace(one, panels=tuple(panels), caption=told, thesis=(), across=across)
+
+
+def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) -> Panel:
+    """The curves of two panels in one, each run's in its own look."""
+    curves = tuple(
+        _renamed(curve, letter)
+        for letter, panel in ((letters.reference, one), (letters.other, other))
+        for curve in panel.curves
+    )
+    told = _common(one.title, other.title) if title is None else title
+    return replace(one, curves=curves, marks=(), title=told)
+
+
+def _parts(one: Panel, other: Panel) -> Iterator[tuple[Panel, Panel]]:
+    """The curves that both have, in their order, in as few panels as `_few` lets them be."""
+    theirs = {_key(curve): curve for curve in other.curves}
+    parts: list[list[Curve]] = []
+    for curve in one.curves:
+        if _key(curve) not in theirs:
+            continue
+        if not parts or curve.style in [each.style for each in parts[-1]]:
+            parts.append([])
+        parts[-1].append(curve)
+    for curves in parts:
+        head = _common(one.title, other.title)
+        title = f"{head}: {_told(curves[0])}" if head else _told(curves[0])
+        yield (
+            replace(one, curves=tuple(curves), title=title),
+            replace(other, curves=tuple(theirs[_key(each)] for each in curves), title=title),
+        )
+
+
+def _common(one: str, other: str) -> str:
+    """What two titles have in common, comma by comma: behind may stand what one run found."""
+    pieces = zip(one.split(", "), other.split(", "), strict=False)
+    return ", ".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pieces))
+
+
+def _key(curve: Curve) -> tuple[str, str, str]:
+    """What a curve has in common with its partner in the other run."""
+    return curve.label, curve.series, curve.style
+
+
+def _told(curve: Curve) -> str:
+    return curve.label or curve.series
+
+
+def _fits(one: Panel, other: Panel) -> bool:
+    """Whether two panels have the same axes."""
+    return all(
+        (a.label, a.unit, a.scale) == (b.label, b.unit, b.scale)
+        for a, b in ((one.x, other.x), (one.y, other.y))
+    )
+
+
+def _few(panel: Panel) -> bool:
+    """Whether style alone tells a run's curves apart: at most one of points, line and band each."""
+    styles = [curve.style for curve in panel.curves]
+    return len(styles) == len(set(styles))
+
+
+def _renamed(curve: Curve, letter: str) -> Curve:
+    """A run's curve in the run's look; published values beside it would be drawn twice."""
+    label = f"{letter}: {_told(curve)}" if _told(curve) else letter
+    return replace(curve, label=label, series=letter, quantity="")
+
+
+def _samples(figure: Figure) -> int:
+    return sum(len(curve.x) for panel in figure.panels for curve in panel.curves)

@@ -1,0 +1,114 @@
+"""Figures of pairs: changes in percent, and the numbers of both runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from campaign.comparison.finding_pairs import Pair
+from campaign.comparison.overlays import Letters
+from campaign.comparison.quantity_words import condition_words, name_here
+from campaign.estimate import Estimate
+from campaign.estimation.difference import in_unit
+from campaign.references.verdict import Verdict
+from campaign.report.drawing.changes_picture import MOST, PITCH, name_row, rows
+from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.palette import MUTED, Look
+from campaign.text import pretty_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+PANELS = 6
+"""Most quantities of a test that are shown side by side."""
+
+
+def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
+    """Each with its name: `Coulomb friction · direction positive`."""
+    return [
+        (pair, f"{name_here(pair.test, pair.quantity)} · {place}".removesuffix(" · "))
+        for pair, place in zip(pairs, row_names(pairs), strict=True)
+    ]
+
+
+def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
+    """Both runs' numbers of each quantity that has several, a panel each; None without any."""
+    groups: dict[str, list[Pair]] = {}
+    for pair in pairs:
+        told = pair.testable or not any(p.testable and p.quantity == pair.quantity for p in pairs)
+        if told and not (math.isnan(pair.reference.value) or math.isnan(pair.other.value)):
+            groups.setdefault(pair.quantity, []).append(pair)
+    several = [group[:MOST] for group in groups.values() if len(group) > 1][:PANELS]
+    if not several:
+        return None
+    heights = [2 * PITCH * len(group) + 0.75 for group in several]
+    with canvas(WIDTH, sum(heights) + 0.35) as sheet:
+        axes = sheet.subplots(len(several), 1, squeeze=False, height_ratios=heights).ravel()
+        for ax, group in zip(axes, several, strict=True):
+            _draw_group(ax, group, letters)
+        handles, labels = axes[0].get_legend_handles_labels()
+        sheet.legend(handles, labels, loc="outside upper left", ncols=2, borderpad=0)
+        return to_svg(sheet)
+
+
+def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
+    """The numbers of one quantity, the reference's above the other's."""
+    first = pairs[0]
+    unit, names = first.display, row_names(pairs)
+    common = {n: v for n, v in first.conditions.items() if n not in _varied(pairs)}
+    at = condition_words(first.test, common)
+    if at:
+        ax.set_title(at[0].upper() + at[1:], fontsize=7.5, weight="normal", color=MUTED.light)
+    for row, pair in enumerate(pairs):
+        own = zip((pair.reference, pair.other), letters.looks, (-0.16, 0.16), "ro", strict=True)
+        for estimate, look, shift, whose in own:
+            letter = letters.reference if whose == "r" else letters.other
+            _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
+        name_row(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
+    rows(ax, len(pairs))
+    words = name_here(first.test, first.quantity)
+    label = words[:1].upper() + words[1:]
+    ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
+
+
+def _draw_number(ax: Axes, estimate: Estimate, look: Look, y: float, label: str) -> None:
+    low, high = estimate.combined
+    if low is not None and high is not None:
+        ax.plot([low, high], [y, y], color=look.light, linewidth=1.2)
+    ax.plot(
+        [estimate.value],
+        [y],
+        marker=look.marker,
+        markersize=4.5,
+        markeredgewidth=0,
+        linestyle="none",
+        color=look.light,
+        label=label or None,
+    )
+
+
+def row_names(pairs: Sequence[Pair]) -> list[str]:
+    """The conditions of each pair in which others of its test and quantity differ."""
+    groups: dict[tuple[str, str], list[Pair]] = {}
+    for pair in pairs:
+        groups.setdefault((pair.test.name, pair.quantity), []).append(pair)
+    varied = {key: _varied(group) for key, group in groups.items()}
+    return [
+        condition_words(
+            pair.test,
+            {
+                name: value
+                for name, value in pair.conditions.items()
+                if name in varied[pair.test.name, pair.quantity]
+            },
+        )
+        for pair in pairs
+    ]
+
+
+def _varied(pairs: Sequence[Pair]) -> frozenset[str]:
+    """Names of conditions that do not have one value in all pairs."""
+    names = {name for pair in pairs for name in pair.conditions}
+    return frozenset(n for n in names if len({repr(p.conditions.get(n)) for p in pairs}) > 1)

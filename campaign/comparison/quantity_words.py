@@ -1,0 +1,109 @@
+"""Names, conditions and units of findings for a reader."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from campaign.api.analysis import AnalysedTest
+from campaign.axis_kind import axis_terms
+from campaign.estimate import Estimate
+from campaign.experiments.shared.common import OF_NO_OPTION
+from campaign.physics.bench_knowledge import number_at
+from campaign.result import Finding, Value
+from campaign.text import number, pretty_unit, quantity_words
+from campaign.units import Quantity, convert
+
+DISPLAY = {
+    "rad": "deg",
+    "rad/s": "deg/s",
+    "rad/s^2": "deg/s^2",
+    "m": "mm",
+    "m/s": "mm/s",
+    "m/s^2": "mm/s^2",
+}
+"""What is shown in place of an SI unit where no table of the test says anything else."""
+BENCH = "bench."
+"""Before a swept value of the bench."""
+
+
+def display_unit(test: AnalysedTest, finding: Finding) -> str:
+    """The unit in which the test's own tables show this number."""
+    for table in test.result.tables:
+        for column in table.columns:
+            if column.display and column.unit == finding.unit:
+                cells = (row.get(column.name) for row in table.rows)
+                if any(_is(cell, finding.value) for cell in cells):
+                    return column.display
+    return DISPLAY.get(finding.unit, finding.unit)
+
+
+def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:
+    """`direction positive, frequency 0.24 Hz`; a number of unknown unit is SI."""
+    told = (
+        f"{name.removeprefix(BENCH).replace('_', ' ')} {_value(test, name, value)}"
+        for name, value in conditions.items()
+        if value is not None
+    )
+    return ", ".join(told)
+
+
+def name_here(test: AnalysedTest, quantity: str) -> str:
+    """What a quantity is called of the axis of the test's bench: `breakaway force`."""
+    with axis_terms(test.sides):
+        return quantity_words(quantity)
+
+
+def option_quantity(test: AnalysedTest, name: str) -> Quantity | None:
+    """What an option of the test's experiment measures; `speed` is one of the option `speeds`."""
+    fields = test.experiment.options.model_fields if test.experiment else {}
+    for path in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
+        if path in fields:
+            hints = (*fields[path].metadata, fields[path].annotation)
+            quantity = next(_quantities(hints), None)
+            return quantity and quantity.of(test.sides)
+    return None
+
+
+def plain(value: Any, quantity: Quantity | None = None) -> str:
+    """A value (SI) of an option or of a bench as text, with the unit that readers are shown."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {plain(each)}" for key, each in value.items()) or "none"
+    if isinstance(value, list | tuple):
+        return ", ".join(plain(each, quantity) for each in value) or "none"
+    if isinstance(value, int | float):
+        shown = convert(value, quantity.si, quantity.display) if quantity else value
+        text = str(value) if isinstance(shown, int) else number(float(shown), 6)
+        return f"{text} {pretty_unit(quantity.display)}".rstrip() if quantity else text
+    return str(value)
+
+
+def _value(test: AnalysedTest, name: str, value: Value) -> str:
+    if isinstance(value, float):
+        quantity = option_quantity(test, name)
+        if quantity is None and name in OF_NO_OPTION:
+            quantity = OF_NO_OPTION[name].of(test.sides)
+        if quantity is None and name.startswith(BENCH) and test.bench is not None:
+            found = number_at(test.bench, name.removeprefix(BENCH))
+            quantity = None if found is None else found[1]
+        return plain(value, quantity) if quantity else f"{plain(value)} (SI)"
+    return str(value)
+
+
+def _quantities(hints: Any) -> Iterator[Quantity]:
+    """Physical quantities in a field's metadata, or inside a list or an optional type of it."""
+    for hint in hints:
+        if isinstance(hint, Quantity):
+            yield hint
+        else:
+            yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))
+
+
+def _is(cell: object, value: float) -> bool:
+    number = cell.value if isinstance(cell, Estimate) else cell
+    return isinstance(number, float) and math.isclose(number, value, rel_tol=1e-12)

@@ -1,0 +1,203 @@
+"""Comparison of runs with a first one, as data for page, table and terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from campaign.api.analysis import AnalysedTest, analyse_run, source_of, title_of
+from campaign.archive import RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms
+from campaign.comparison.circumstances import Change, changes
+from campaign.comparison.finding_pairs import Pair, pairs_of
+from campaign.comparison.same_quantity import Pairing, pair_tests
+from campaign.comparison.shared_systematics import shared_sources, source_called
+from campaign.errors import UsageError
+from campaign.experiments.interface import Experiment
+from campaign.experiments.shared.systematic import SOURCES
+from campaign.references.verdict import Verdict, with_verdicts
+
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+@dataclass(frozen=True)
+class Side:
+    """A run with what its analyses found; A is the reference."""
+
+    letter: str
+    run: RunReader
+    tests: tuple[AnalysedTest, ...]
+
+    @property
+    def title(self) -> str:
+        header = self.run.header
+        title = header.title or header.protocol_name or header.name
+        return title_of(title, source_of(self.run))
+
+    @property
+    def damaged(self) -> tuple[Damage, ...]:
+        """What of the run is damaged, as far as the analyses looked at it."""
+        found = (damage for test in self.tests for damage in test.damaged)
+        return tuple(dict.fromkeys((*self.run.damaged, *found)))
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why tests of it have no result."""
+        return tuple(f"{self.letter}: {t.name}: {t.problem}" for t in self.tests if t.problem)
+
+
+@dataclass(frozen=True)
+class Against:
+    """Another run against the reference.
+
+    Attributes:
+        pairs: in the order of the reference's tests and findings, judged.
+        shared: by the reference's test, the sources of systematic parts that cancel.
+        changes: what differs besides.
+    """
+
+    reference: Side
+    other: Side
+    pairing: Pairing
+    pairs: tuple[Pair, ...]
+    shared: Mapping[str, frozenset[str]]
+    changes: tuple[Change, ...]
+
+    def of(self, verdict: Verdict) -> tuple[Pair, ...]:
+        """The pairs that came to this, the largest change first where one was declared."""
+        found = [pair for pair in self.pairs if pair.verdict is verdict]
+        if verdict is Verdict.DIFFERENT:
+            found.sort(key=size_of, reverse=True)
+        return tuple(found)
+
+    @property
+    def without_interval(self) -> tuple[Pair, ...]:
+        """Pairs of simulated numbers neither of which has an interval, as without any noise."""
+        return tuple(pair for pair in self.pairs if pair.simulated_bare)
+
+    @property
+    def tested(self) -> int:
+        """How many of the pairs have a p value."""
+        return sum(pair.testable for pair in self.pairs)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs, the first of which is what the others are held against."""
+
+    sides: tuple[Side, ...]
+    against: tuple[Against, ...]
+
+    @property
+    def title(self) -> str:
+        """What is compared with what: by the runs' titles where these tell them apart."""
+        titles = [side.title for side in self.sides]
+        names = [side.run.header.name for side in self.sides]
+        reference, *others = titles if len(set(titles)) == len(titles) else names
+        told = " and ".join(filter(None, (", ".join(others[:-1]), others[-1])))
+        return f"{told} compared with {reference}"
+
+    @property
+    def tested(self) -> int:
+        """Size of the family: all pairs of all runs that have a p value."""
+        return sum(each.tested for each in self.against)
+
+    @property
+    def different(self) -> tuple[Pair, ...]:
+        """What was declared different."""
+        return tuple(pair for each in self.against for pair in each.of(Verdict.DIFFERENT))
+
+
+def size_of(pair: Pair) -> float:
+    """What is sorted by; a change of sign is larger than any share."""
+    share = abs(pair.found.change.value)
+    return math.inf if math.isnan(share) else share
+
+
+def compare_runs(
+    runs: Sequence[RunReader],
+    experiments: Mapping[str, Experiment],
+    exchanged: Sequence[str] = (),
+) -> Comparison:
+    """Analyse the runs and hold all but the first against the first.
+
+    exchanged: sources of systematic parts that are not the same for all runs, although all benches
+        say the same of them: a motor that was exchanged for one of its kind.
+
+    Raises UsageError when runs are not several ones, or have nothing in common.
+    """
+    _check(runs)
+    sides = tuple(
+        Side(letter, run, analyse_run(run, experiments))
+        for letter, run in zip(LETTERS, runs, strict=False)
+    )
+    others = [_exchanged(sides[0], name) for name in exchanged]
+    found = [_against(sides[0], other, others) for other in sides[1:]]
+    verdicts = iter(with_verdicts([pair for each in found for pair in each.pairs]))
+    against = (replace(each, pairs=tuple(next(verdicts) for _ in each.pairs)) for each in found)
+    return Comparison(sides, tuple(against))
+
+
+def _exchanged(reference: Side, name: str) -> str:
+    """The source of this name. Raises UsageError for one that there is not."""
+    axis = next((test.sides for test in reference.tests if test.bench), BOTH_ROTARY)
+    source = source_called(name, SOURCES.values(), axis)
+    if source is None:
+        with axis_terms(axis):
+            known = ", ".join(map(in_axis_terms, SOURCES.values()))
+        raise UsageError(f"--exchanged {name!r}: is none of {known}")
+    return source
+
+
+def _check(runs: Sequence[RunReader]) -> None:
+    if len(runs) < 2:
+        raise UsageError("name two runs or more: the first is what the others are compared with")
+    if len(runs) > len(LETTERS):
+        raise UsageError(
+            f"{len(runs)} runs are too many to tell apart; {len(LETTERS)} are possible"
+        )
+    seen: dict[str, RunReader] = {}
+    for run in runs:
+        for key in (str(run.path.resolve()), run.root):
+            if key and key in seen:
+                raise UsageError(f"{seen[key].path} and {run.path} are the same run")
+            seen[key] = run
+
+
+def _against(reference: Side, other: Side, exchanged: Sequence[str]) -> Against:
+    pairing = pair_tests(reference.tests, other.tests)
+    plants = reference.run.header.truth.plants, other.run.header.truth.plants
+    shared = {
+        tested.reference.name: shared_sources(tested.reference, tested.other, *plants)
+        - set(exchanged)
+        for tested in pairing.tests
+    }
+    pairs = [
+        pair for tested in pairing.tests for pair in pairs_of(tested, shared[tested.reference.name])
+    ]
+    if not pairs:
+        raise UsageError("\n".join(_nothing_common(reference, other)))
+    return Against(
+        reference,
+        other,
+        pairing,
+        tuple(pairs),
+        shared,
+        changes(reference.run, other.run, pairing),
+    )
+
+
+def _nothing_common(reference: Side, other: Side) -> Iterator[str]:
+    """Why two runs cannot be compared, with what each has."""
+    yield (
+        f"{reference.run.name} and {other.run.name} have no finding in common: none is of the same "
+        "quantity under the same conditions"
+    )
+    for side in (reference, other):
+        kinds = dict.fromkeys(test.kind for test in side.tests)
+        quantities = dict.fromkeys(f.quantity for t in side.tests for f in t.result.findings)
+        found = ", ".join(list(quantities)[:8]) + (" ..." if len(quantities) > 8 else "")
+        yield f"  {side.run.name} has {', '.join(kinds) or 'no test'}: {found or 'nothing found'}"
+        yield from (f"    {problem}" for problem in side.problems)

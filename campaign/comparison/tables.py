@@ -1,0 +1,253 @@
+"""Tables of pairs: for the page, as CSV, and for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from campaign.api.analysis import AnalysedTest
+from campaign.comparison.circumstances import Change
+from campaign.comparison.draws import common_draws
+from campaign.comparison.finding_pairs import Pair
+from campaign.comparison.quantity_words import condition_words, name_here
+from campaign.comparison.run_comparison import Against, size_of
+from campaign.estimate import Estimate
+from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.references.verdict import Verdict
+from campaign.result import Cell, Column, Finding, Table
+from campaign.text import interval, pretty_unit
+
+
+def pair_table(
+    key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str], note: str = ""
+) -> Table:
+    """A row per pair, numbers in the unit of the row."""
+    reference, other = letters
+    return Table(
+        key,
+        title,
+        (
+            Column("test", "Test"),
+            Column("finding", "Finding"),
+            Column("quantity", "Quantity"),
+            Column("conditions", "Conditions"),
+            Column("unit", "Unit"),
+            Column("reference", reference),
+            Column("other", other),
+            Column("difference", f"{other} − {reference}"),
+            Column("change", "Change", "", "percent"),
+            Column("p", "p, adjusted", exact=True),
+            Column("verdict", "Verdict"),
+            Column("reason", "Why not judged"),
+        ),
+        tuple(_row(pair) for pair in pairs),
+        note=note,
+    )
+
+
+def shorter(table: Table, *names: str) -> Table:
+    """The table without these columns."""
+    return replace(table, columns=tuple(c for c in table.columns if c.name not in names))
+
+
+def alone_table(against: Against) -> Table | None:
+    """What only one of the runs found; None where both found the same."""
+    rows: list[Mapping[str, Cell]] = []
+    reference, other = against.reference.letter, against.other.letter
+    for tested in against.pairing.tests:
+        rows += _alone(reference, tested.reference, tested.only_reference)
+        rows += _alone(other, tested.other, tested.only_other)
+    for letter, tests in (
+        (reference, against.pairing.only_reference),
+        (other, against.pairing.only_other),
+    ):
+        for test in tests:
+            rows += _alone(letter, test, test.result.findings) or [_no_finding(letter, test)]
+    if not rows:
+        return None
+    return Table(
+        "only-in-one",
+        "Found in one run only",
+        (
+            Column("run", "Run"),
+            Column("test", "Test"),
+            Column("quantity", "Quantity"),
+            Column("conditions", "Conditions"),
+            Column("value", "Value"),
+            Column("unit", "Unit"),
+        ),
+        tuple(rows),
+    )
+
+
+def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
+    """What differs besides, a row per field."""
+    return Table(
+        "circumstances",
+        "What differs between the runs besides",
+        (
+            Column("where", "Where"),
+            Column("path", "Field"),
+            Column("reference", letters[0]),
+            Column("other", letters[1]),
+        ),
+        tuple(
+            {"where": c.where, "path": c.path, "reference": c.reference, "other": c.other}
+            for c in changes
+        ),
+    )
+
+
+def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
+    """`12 of one trial each: ...`: each reason once, the most frequent first."""
+    told = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
+    for reason, count in told.most_common():
+        yield f"{count}: {reason}"
+
+
+def name_of(pair: Pair) -> str:
+    """`coulomb torque, direction positive`."""
+    words = condition_words(pair.test, pair.conditions)
+    name = name_here(pair.test, pair.quantity)
+    return f"{name}, {words}" if words else name
+
+
+def number_of(estimate: Estimate, unit: str) -> str:
+    """An estimate in a unit, without it."""
+    told = in_unit(estimate, unit)
+    low, high = told.combined
+    if told.kind in ("at least", "at most"):
+        sign, end = ("≥", low) if told.kind == "at least" else ("≤", high)
+        return f"{sign} {interval(end, None, None)}"
+    return interval(told.value, low, high)
+
+
+def change_of(pair: Pair) -> str:
+    """`+10.0 % (8.9 to 11.1 %)`; a bound as such; `–` where there is none.
+
+    Where the difference is no share of the reference, it is told in its own unit.
+    """
+    change = pair.found.change
+    value, low, high = (
+        None if end is None else 100 * end for end in (change.value, *change.combined)
+    )
+    if change.kind in ("at least", "at most"):
+        return f"{number_of(change, 'percent')} %"
+    if math.isnan(change.value):
+        return _difference_of(pair)
+    text = interval(value, low, high)
+    if text == "–":
+        return text
+    sign = "+" if value is not None and value > 0 else ""
+    return f"{sign}{text} %"
+
+
+def _difference_of(pair: Pair) -> str:
+    difference = pair.found.difference
+    text = number_of(difference, pair.display)
+    if math.isnan(difference.value) or text == "–":
+        return "–"
+    sign = "+" if difference.value > 0 and difference.kind not in BOUNDS else ""
+    return f"{sign}{text} {pretty_unit(pair.display)}".rstrip()
+
+
+def headline(pair: Pair) -> str:
+    """A declared pair in one sentence, without a full stop."""
+    unit = pretty_unit(pair.display)
+    numbers = [number_of(each, pair.display) for each in (pair.reference, pair.other)]
+    return f"{name_of(pair)}: {change_of(pair)}, from {numbers[0]} to {numbers[1]} {unit}".rstrip()
+
+
+def sentences(against: Against, tested: int) -> Iterator[str]:
+    """What the comparison with one run comes to. `tested`: size of the family."""
+    pairs, judged = against.pairs, against.tested
+    yield from common_draws(against.pairing)
+    several = len(pairs) != 1
+    yield (
+        f"{len(pairs)} number{'s are' if several else ' is'} found in both runs,"
+        f" {judged} of which can be tested."
+    )
+    different = len(against.of(Verdict.DIFFERENT))
+    if different:
+        are = "is" if different == 1 else "are"
+        yield (
+            f"{different} {are} declared different: at most 5 % of what is declared so is expected"
+            f" to be false (Benjamini and Hochberg over {tested} tests)."
+        )
+    elif judged:
+        yield (
+            "No difference is shown. That does not say that there is none: each interval says"
+            " how large it may still be."
+        )
+    bounds = len(against.of(Verdict.BEYOND_BOUND))
+    if bounds:
+        lie = "lies" if bounds == 1 else "lie"
+        yield f"{bounds} more {lie} beyond a bound; no test is made of that."
+    bare = against.without_interval
+    if bare:
+        equal = len(bare) - len(bare_differing(against))
+        yield (
+            f"Of {len(bare)} simulated without an interval {equal}"
+            f" {'is' if equal == 1 else 'are'} equal to the last digit."
+        )
+
+
+def bare_differing(against: Against) -> tuple[Pair, ...]:
+    """Of the simulated numbers without an interval those that differ, the largest change first."""
+    found = [pair for pair in against.without_interval if pair.found.difference.value]
+    return tuple(sorted(found, key=size_of, reverse=True))
+
+
+def bench_lines(against: Against) -> Iterator[str]:
+    """`map: bench: inertia: 1 kg·m² -> 2 kg·m²`: what differs in benches and truths."""
+    for change in against.changes:
+        if change.where.endswith((": bench", ": truth")):
+            path = f" {change.path}:" if change.path else ""
+            yield f"{change.where}:{path} {change.reference} -> {change.other}"
+
+
+def _row(pair: Pair) -> Mapping[str, Cell]:
+    found = pair.found
+    return {
+        "test": pair.test.name,
+        "finding": name_of(pair),
+        "quantity": pair.quantity,
+        "conditions": condition_words(pair.test, pair.conditions),
+        "unit": pretty_unit(pair.display),
+        "reference": in_unit(pair.reference, pair.display),
+        "other": in_unit(pair.other, pair.display),
+        "difference": in_unit(found.difference, pair.display),
+        "change": found.change,
+        "p": pair.adjusted,
+        "verdict": str(pair.verdict),
+        "reason": str(pair.reason),
+    }
+
+
+def _alone(
+    letter: str, test: AnalysedTest, findings: Iterable[Finding]
+) -> list[Mapping[str, Cell]]:
+    return [
+        {
+            "run": letter,
+            "test": test.name,
+            "quantity": name_here(test, finding.quantity),
+            "conditions": condition_words(test, finding.conditions),
+            "value": finding.known,
+            "unit": pretty_unit(finding.unit),
+        }
+        for finding in findings
+    ]
+
+
+def _no_finding(letter: str, test: AnalysedTest) -> Mapping[str, Cell]:
+    return {
+        "run": letter,
+        "test": test.name,
+        "quantity": f"no finding of {test.kind}",
+        "conditions": "",
+        "value": None,
+        "unit": "",
+    }

@@ -1,0 +1,111 @@
+"""A measured response with the uncertainty of each point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.frequency_response import Array, ComplexArray, Response
+from campaign.estimation.intervals import LEVEL, student
+
+ALIKE = 8.0
+"""Neighbours that a bias shifts alike: so many times its square counts against scatter in a fit."""
+LEAST_FREEDOM = 5.0
+"""Below this a variance says too little for a weight: it needs more than 4."""
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """Output over input at n frequencies.
+
+    Attributes:
+        frequency: rising (Hz), shape (n,).
+        values: complex, in the output's unit over the input's, shape (n,).
+        variance: E|error|² of each value by scatter: both parts together, shape (n,).
+        freedom: real degrees of freedom behind `variance`, shape (n,); infinite where it is known.
+        coherence: share of the output's power that the excitation accounts for, shape (n,).
+        bias: what the method itself may do to a value, e.g. a window to a sharp mode: 1 sigma, size
+            of a complex error, shape (n,).
+        method: how it was found, in words.
+    """
+
+    frequency: Array
+    values: ComplexArray
+    variance: Array
+    freedom: Array
+    coherence: Array
+    bias: Array
+    method: str = ""
+
+    @staticmethod
+    def of(response: Response, method: str = "sine by sine") -> MeasuredResponse:
+        """A response measured sine by sine; its errors count as known."""
+        n = len(response.frequency)
+        return MeasuredResponse(
+            response.frequency,
+            response.values,
+            2.0 * response.error**2,
+            np.full(n, np.inf),
+            response.coherence,
+            np.zeros(n),
+            method,
+        )
+
+    @property
+    def error(self) -> Array:
+        """Standard deviation of the real and of the imaginary part, bias included, shape (n,)."""
+        return np.asarray(np.sqrt(0.5 * (self.variance + self.bias**2)))
+
+    @property
+    def widened(self) -> Array:
+        """`error` times Student's t over the normal quantile, for who knows of no freedom, (n,)."""
+        normal = student(np.inf)
+        few = np.array([student(float(each)) for each in self.freedom]) / normal
+        return np.asarray(np.sqrt(0.5 * (self.variance * few**2 + self.bias**2)))
+
+    def radius(self, level: float = LEVEL) -> Array:
+        """Of the disc around each value that holds the true one with that chance, shape (n,).
+
+        |error|² / variance follows F(2, freedom); Bendat and Piersol, "Random Data" (2010), 9.2.
+        The bias adds in squares.
+        """
+        from scipy.stats import chi2, f
+
+        known = np.isinf(self.freedom)
+        with np.errstate(invalid="ignore"):
+            ratio = np.where(known, chi2.ppf(level, 2) / 2.0, f.ppf(level, 2, self.freedom))
+        return np.asarray(np.hypot(np.sqrt(ratio * self.variance), 1.96 * self.bias))
+
+    @property
+    def response(self) -> Response:
+        """As the functions for sines take it; few degrees of freedom widen its errors."""
+        return Response(self.frequency, self.values, self.widened, self.coherence)
+
+    def at(self, kept: NDArray[np.bool_] | NDArray[np.intp] | slice) -> MeasuredResponse:
+        """Some of its points."""
+        parts = ("frequency", "values", "variance", "freedom", "coherence", "bias")
+        return replace(self, **{name: getattr(self, name)[kept] for name in parts})
+
+    def between(self, lowest: float, highest: float) -> MeasuredResponse:
+        """Its points from `lowest` to `highest` (Hz)."""
+        return self.at((self.frequency >= lowest) & (self.frequency <= highest))
+
+    def times(self, factor: ComplexArray | Array) -> MeasuredResponse:
+        """The response times a known function, shape (n,): e.g. 2 pi i f makes angles rates."""
+        size = np.abs(factor)
+        return replace(
+            self,
+            values=self.values * factor,
+            variance=self.variance * size**2,
+            bias=self.bias * size,
+        )
+
+
+def closed_from_open(loop: MeasuredResponse) -> MeasuredResponse:
+    """T = L / (1 + L) of a measured open loop L with unit feedback."""
+    rest = np.where(np.abs(1.0 + loop.values) > 0, 1.0 + loop.values, 1e-300)
+    # dT = dL / (1 + L)².
+    found = loop.times(np.asarray(1.0 / rest**2))
+    return replace(found, values=loop.values / rest)

@@ -1,0 +1,147 @@
+"""Choice of terms: cross-validation by blocks and an information criterion.
+
+A lower criterion on the rows of a fit can be worse on others, so that both are told, and both have
+to fall: each further term must clearly lower the error on blocks that the fit has not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.regression import Piece, Regression, regress
+from campaign.estimation.inverse.rows import in_blocks, part, rows
+from campaign.estimation.inverse.terms import Term
+
+BLOCKS = 10
+"""of rows that follow each other, each left out once."""
+ALIKE = 300.0
+"""Condition number of columns of unit length beyond which two look alike in these motions."""
+CLEARLY = 2.0
+"""Paired standard errors over blocks by which a further term must lower the error."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A set of terms, and how well it does.
+
+    Attributes:
+        fit: on all rows.
+        held_out: norm of what blocks left out leave over, over that of the force.
+        by_block: mean square on each block that was left out, shape (blocks,).
+        criterion: Bayesian information criterion with the effective number of rows.
+    """
+
+    terms: tuple[Term, ...]
+    fit: Regression
+    held_out: float
+    by_block: Array
+    criterion: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its terms."""
+        return tuple(term.name for term in self.terms)
+
+
+def structure(
+    motions: Sequence[Motion],
+    terms: Sequence[Term],
+    filtering: Filtering,
+    delay: float = 0.0,
+    effective: float | None = None,
+) -> Structure:
+    """Fit these terms to all motions, and to all but each block.
+
+    effective: rows that count for the criterion; the fit's own where absent. Criteria that are
+        compared have the same.
+
+    Raises ValueError where columns cannot be told apart, of all rows or of all but some.
+    """
+    pieces = [rows(motion, terms, filtering, delay) for motion in motions]
+    fit = regress(pieces)
+    by_block, norm = held_out(pieces)
+    count = fit.effective if effective is None else effective
+    error = math.sqrt(float(np.sum(by_block[:, 0])) / norm)
+    mean = by_block[:, 0] / by_block[:, 1]
+    return Structure(tuple(terms), fit, error, mean, criterion(fit, count))
+
+
+def criterion(fit: Regression, count: float) -> float:
+    """Bayesian information criterion of a fit whose rows are worth `count` independent ones."""
+    square = max(fit.relative**2, float(np.finfo(float).tiny))
+    return count * math.log(square) + len(fit.values) * math.log(max(count, 2.0))
+
+
+def held_out(pieces: Sequence[Piece]) -> tuple[Array, float]:
+    """Squared error and rows of each block that was left out, shape (blocks, 2); squared force.
+
+    Normal equations of all rows less those of the block: nothing is fitted anew.
+    """
+    whole = sum(p.columns.T @ p.columns for p in pieces)
+    right = sum(p.columns.T @ p.force for p in pieces)
+    found, norm = [], 0.0
+    for piece, blocks in zip(pieces, in_blocks(pieces, BLOCKS), strict=True):
+        for block in blocks:
+            own = part(piece, block)
+            left = whole - own.columns.T @ own.columns
+            if np.linalg.cond(left) > 1.0 / np.finfo(float).eps:
+                raise ValueError("some terms are told by one part of the motion alone")
+            values = np.linalg.solve(left, right - own.columns.T @ own.force)
+            error = own.force - own.columns @ values
+            found.append((float(error @ error), len(error)))
+            norm += float(own.force @ own.force)
+    return np.array(found), norm
+
+
+def choose(
+    motions: Sequence[Motion],
+    start: Sequence[Term],
+    candidates: Sequence[Sequence[Term]],
+    filtering: Filtering,
+    delay: float = 0.0,
+) -> tuple[list[Structure], int]:
+    """Groups of terms added one by one to `start` while blocks left out gain by it.
+
+    Of a family of terms at most one is added. Returns every structure that was tried, the start
+    first, and the index of the chosen one.
+    """
+    tried = [structure(motions, start, filtering, delay)]
+    effective = tried[0].fit.effective
+    chosen, open_groups = 0, list(candidates)
+    while open_groups:
+        found = []
+        for group in open_groups:
+            terms = (*tried[chosen].terms, *group)
+            try:
+                found.append((group, structure(motions, terms, filtering, delay, effective)))
+            except ValueError:  # nothing in these motions tells it
+                continue
+            if found[-1][1].fit.likeness > ALIKE:
+                found.pop()
+        if not found:
+            break
+        tried += [each for _, each in found]
+        group, best = min(found, key=lambda pair: pair[1].held_out)
+        before = tried[chosen]
+        if not (clearly_better(best, before) and best.criterion < criterion(before.fit, effective)):
+            break
+        chosen = next(i for i, each in enumerate(tried) if each is best)
+        families = {term.family for term in group} - {""}
+        open_groups = [
+            each
+            for each in open_groups
+            if each is not group and not families & {term.family for term in each}
+        ]
+    return tried, chosen
+
+
+def clearly_better(new: Structure, old: Structure) -> bool:
+    """Whether blocks left out gain, on average, by more than their scatter explains."""
+    gain = old.by_block - new.by_block
+    error = float(np.std(gain, ddof=1)) / math.sqrt(len(gain)) if len(gain) > 1 else math.inf
+    return float(np.mean(gain)) > CLEARLY * error

@@ -1,0 +1,212 @@
+"""Result of a joint fit below breakaway: simulation, residuals, derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimation.presliding_dynamics.channel import Channel
+from campaign.estimation.presliding_dynamics.parameters import LARGEST_OFFSET, Parameters
+from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.estimation.presliding_dynamics.record import Record
+from campaign.estimation.presliding_dynamics.simulation import (
+    Between,
+    Motion,
+    simulate,
+    steps_per_sample,
+    torque_on_grid,
+)
+
+DIFFERENCE = 1e-6
+"""Step of the Jacobian's differences, in the vector's units."""
+DELAYS = (("rate_delay",), ("angle_delay",))
+"""Parameters that move no load: another look at the same motion."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What drives the simulation of a record.
+
+    Attributes:
+        torque: at every half step, shape (steps, 3): beginning, middle and end of each (N m).
+        per_sample: steps per sample.
+    """
+
+    torque: Array
+    per_sample: int
+
+    @classmethod
+    def of(cls, record: Record, plant: Plant, between: Between) -> Grid:
+        """Fine enough for a plant."""
+        count = steps_per_sample(plant, record.step, record.highest_frequency())
+        return cls(torque_on_grid(record.torque, count, between), count)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A joint fit.
+
+    Attributes:
+        records: that were fitted.
+        parameters: layout of the vector.
+        vector: where the sum of squares is least.
+        channels: of each record.
+        grids: torque of each record, on its grid.
+        doubt_answers: what the channels of each record answer to the columns that its torque may
+            be off by, shape (channels, n, m).
+        taken: the factors of those columns that `grids` have in them, shape (m,).
+        residuals: of each record: measured less simulated, without offset and drift, in
+            deviations, shape (channels, n).
+        jacobians: derivatives of the simulated by the vector, likewise, (channels, n, size).
+        priors: derivatives of what is known beforehand, of each record's own above all, (size,).
+        cost: sum of squares, priors included.
+        reached: whether the search ended in a minimum.
+    """
+
+    records: tuple[Record, ...]
+    parameters: Parameters
+    vector: Array
+    channels: tuple[tuple[Channel, ...], ...]
+    grids: tuple[Grid, ...]
+    doubt_answers: tuple[Array, ...]
+    taken: Array
+    residuals: tuple[Array, ...]
+    jacobians: tuple[Array, ...]
+    priors: Array
+    cost: float
+    reached: bool
+
+    @property
+    def plant(self) -> Plant:
+        """That fits best."""
+        return self.parameters.plant(self.vector)
+
+    def motion(self, number: int, plant: Plant | None = None) -> Motion:
+        """Simulated motion of a record, of this plant or of another."""
+        return _motion(self, number, self.vector, plant)
+
+    def answers(self, number: int, plant: Plant | None = None) -> Array:
+        """Simulated samples of a record's channels, shape (channels, n)."""
+        return _answers(self, number, self.vector, plant)
+
+    @property
+    def information(self) -> Array:
+        """Of all parameters, with what is known beforehand, shape (size, size)."""
+        found = np.diag(self.priors**2)
+        for slopes in self.jacobians:
+            found = found + products(slopes, slopes)
+        return found
+
+    def largest_yielding(self, number: int) -> float:
+        """Largest bristle torque of a record over that at which the bristles slip, as fitted."""
+        bent = self.motion(number).bristle_torque[:, 0]
+        return float(np.max(np.abs(bent))) * abs(self.plant.bristles[0].compliance)
+
+
+def products(one: Array, other: Array) -> Array:
+    """Sums over channels and samples of columns (channels, n, k) and (channels, n, m), (k, m)."""
+    return np.asarray(one.reshape(-1, one.shape[-1]).T @ other.reshape(-1, other.shape[-1]))
+
+
+def with_slopes(fit: Fitted) -> Fitted:
+    """The fit with its derivatives."""
+    every = range(len(fit.records))
+    return replace(fit, jacobians=tuple(slopes_of(fit, number, fit.vector) for number in every))
+
+
+def with_doubts(fit: Fitted) -> Fitted:
+    """With the torque that fits best, and what the plant answers to what it may be off by.
+
+    What the torque is off by is small, so that the plant's answer to it is linear.
+    """
+    fit, found = centred(fit), []
+    for number, record in enumerate(fit.records):
+        here = _answers(fit, number, fit.vector)
+        answers = np.zeros((*here.shape, record.doubts.shape[1]))
+        for index, column in enumerate(record.doubts.T):
+            pushed = with_torque(
+                fit, number, fit.grids[number].torque + _on_grid(fit, number, column)
+            )
+            answers[:, :, index] = _answers(pushed, number, fit.vector) - here
+        found.append(answers)
+    return replace(fit, doubt_answers=tuple(found))
+
+
+def centred(fit: Fitted) -> Fitted:
+    """With the torque that fits best: other plants answer to that as well."""
+    factors = fit.vector[fit.parameters.doubted]
+    moved = replace(fit, taken=factors)
+    for number, record in enumerate(fit.records):
+        more = _on_grid(fit, number, record.doubts @ (factors - fit.taken))
+        moved = with_torque(moved, number, fit.grids[number].torque + more)
+    return moved
+
+
+def _on_grid(fit: Fitted, number: int, torque: Array) -> Array:
+    return torque_on_grid(torque, fit.grids[number].per_sample, fit.parameters.assumed.between)
+
+
+def with_torque(fit: Fitted, number: int, torque: Array) -> Fitted:
+    """With another torque on the grid of a record, shape (steps, 3)."""
+    grids = list(fit.grids)
+    grids[number] = replace(grids[number], torque=torque)
+    return replace(fit, grids=tuple(grids))
+
+
+def _motion(fit: Fitted, number: int, vector: Array, plant: Plant | None) -> Motion:
+    parameters, record = fit.parameters, fit.records[number]
+    grid, own = fit.grids[number], vector[parameters.of_record(number)]
+    scale = LARGEST_OFFSET * record.amplitude
+    moved = grid.torque + scale * own[0]
+    bent, rate = None, 0.0
+    if not record.at_rest:
+        bent = float(moved[0, 0] + scale * own[1])
+        rate = own[2] * scale / parameters.damping_scale
+    return simulate(
+        plant or parameters.plant(vector),
+        moved,
+        record.step,
+        per_sample=grid.per_sample,
+        bristle_torque=bent,
+        rate=rate,
+    )
+
+
+def _answers(fit: Fitted, number: int, vector: Array, plant: Plant | None = None) -> Array:
+    return _seen(fit, number, _motion(fit, number, vector, plant), vector)
+
+
+def _seen(fit: Fitted, number: int, motion: Motion, vector: Array) -> Array:
+    """What the channels of a record show of a motion, shape (channels, n)."""
+    told = []
+    for channel in fit.channels[number]:
+        at = motion.rate_at if channel.name == "rate" else motion.angle_at
+        told.append(at(fit.parameters.delay(vector, channel.name)))
+    return np.array(told) + fit.doubt_answers[number] @ (vector[fit.parameters.doubted] - fit.taken)
+
+
+def residuals_of(fit: Fitted, number: int, vector: Array) -> Array:
+    """Measured less simulated, without offset and drift, in deviations, shape (channels, n)."""
+    answers = _answers(fit, number, vector)
+    pairs = zip(fit.channels[number], answers, strict=True)
+    return np.array([channel.left(channel.samples - told) for channel, told in pairs])
+
+
+def slopes_of(fit: Fitted, number: int, vector: Array) -> Array:
+    """Of the simulated, in deviations, shape (channels, n, size): forward differences."""
+    parameters, channels = fit.parameters, fit.channels[number]
+    own = parameters.of_record(number)
+    here = _motion(fit, number, vector, None)
+    answers = _seen(fit, number, here, vector)
+    found = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
+    doubts = zip(channels, fit.doubt_answers[number], strict=True)
+    found[:, :, parameters.doubted] = [c.left(each) for c, each in doubts]
+    for index in (*range(len(parameters.names)), *range(own.start, own.stop)):
+        moved = vector.copy()
+        moved[index] += DIFFERENCE
+        delay = parameters.names[index : index + 1] in DELAYS
+        motion = here if delay else _motion(fit, number, moved, None)
+        slope = (_seen(fit, number, motion, moved) - answers) / DIFFERENCE
+        found[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
+    return found

@@ -1,0 +1,109 @@
+"""Metrics of a recording at the end of its trial.
+
+It is archived, so that an analysis of tomorrow reads what was found today. The recording is on the
+disk before: nothing that goes wrong here costs it, and an analysis measures what was not archived.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import campaign
+from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.archived_trial import ArchivedTrial
+from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
+from campaign.backends.calls import Call
+from campaign.entry_points import PlugIn
+from campaign.errors import UsageError
+from campaign.estimate import Estimate
+from campaign.execution.safety import describe
+from campaign.experiments.interface import Experiment, measured
+from campaign.plugins import Kinds
+from campaign.recording import Outcome
+from campaign.source_hash import digest, sources_of
+from campaign.stopwatch import UNTIMED, Timing, Work
+from campaign.trial import Role
+
+LIMIT = 60.0
+"""s that one recording may be measured for: the bench waits, and what follows from it."""
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """Measures completed measurements of the experiments that say how; a `Measure`.
+
+    Any thread may use it.
+
+    Attributes:
+        limit: s; what takes longer is left behind, and the trial is archived without metrics.
+    """
+
+    experiments: Kinds[Experiment]
+    timing: Timing = UNTIMED
+    limit: float = LIMIT
+    _authors: dict[str, str] = field(default_factory=dict)  # by kind
+
+    def __call__(self, data: ArchivedTrial) -> Measured:
+        if data.ending.outcome is not Outcome.COMPLETED or data.trial.role is not Role.MEASUREMENT:
+            return Measured()
+        with self.timing.span(Work.MEASURING):
+            return self._in_time(data)
+
+    def _in_time(self, data: ArchivedTrial) -> Measured:
+        """In a thread of its own, since nothing else can be left behind when it hangs."""
+        call = Call(partial(self._measured, data), "measuring")
+        if call.has_ended(self.limit):
+            return call.answer()
+        return Measured(problem=f"measuring did not end within {self.limit:g} s")
+
+    def _measured(self, data: ArchivedTrial) -> Measured:
+        began = time.thread_time()  # of a thread that no span knows
+        try:
+            return self._found(data)
+        finally:
+            self.timing.add(Work.MEASURING, time.thread_time() - began)
+
+    def _found(self, data: ArchivedTrial) -> Measured:
+        try:
+            experiment = self.experiments.get(data.trial.kind)
+            if experiment is None or experiment.measure is None:
+                return Measured()
+            estimates = checked(measured(experiment, data))
+            return Measured(estimates, self._by(data.trial.kind)) if estimates else Measured()
+        except (ValueError, UsageError) as error:
+            with axis_terms(sides_in(data.trial.bench)):
+                return Measured(problem=in_axis_terms(_one_line(str(error))))
+        except BaseException as error:  # noqa: BLE001 - a plug-in must not cost the trial
+            return Measured(problem=_one_line(f"measuring failed: {describe(error)}"))
+
+    def _by(self, kind: str) -> str:
+        if kind not in self._authors:
+            self._authors[kind] = author(self.experiments.plug_in(kind))
+        return self._authors[kind]
+
+
+def checked(found: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """Those that were found at all. Raises ValueError where two have one name."""
+    names = Counter(estimate.name for estimate in found)
+    twice = [name for name, count in names.items() if count > 1]
+    if twice:
+        raise ValueError(f"{twice[0]!r} was measured twice in one recording")
+    return tuple(estimate for estimate in found if math.isfinite(estimate.value))
+
+
+def author(plug_in: PlugIn | None) -> str:
+    """The code of a kind: this program, or a package with the hash of its sources."""
+    program = f"campaign {campaign.__version__}"
+    if plug_in is None:
+        return program
+    sources = digest(sources_of(plug_in.packages))
+    return f"{plug_in.distribution} {plug_in.version} (sha256 {sources}) with {program}"
+
+
+def _one_line(text: str) -> str:
+    return next(iter(text.strip().splitlines()), "")[:300]

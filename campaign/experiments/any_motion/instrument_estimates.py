@@ -1,0 +1,303 @@
+"""Coefficients by instruments: a simulated motion replaces the measured regressors.
+
+Where it is known what motion was wanted, the loop that made the force of it is found, and the
+fitted model is simulated within that loop: nothing in its motion knows of noise or of what else
+disturbed the axis. Where it is not, the model goes along the recorded force, which a loop may have
+made of noise: that is told beside least squares, and decides nothing. Simulated again with what
+instruments say, as refined instrumental variables are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.intervals import LEVEL, shifted_by
+from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS, farthest
+from campaign.estimation.inverse.delay import LONGEST
+from campaign.estimation.inverse.instruments import WEAK, Instrumented, by_instruments
+from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.regression import Piece
+from campaign.estimation.inverse.rows import all_rows, moving
+from campaign.estimation.inverse.simulation import (
+    Loop,
+    driven_motion,
+    find_loop,
+    followed_motion,
+)
+from campaign.estimation.inverse.terms import Term
+from campaign.experiments.any_motion.motions import Moved
+
+ROUNDS = 2
+"""Times that the model is simulated, each time with what instruments said before."""
+ALONG_WANTED = "simulated along the wanted motion"
+ALONG_FORCE = "simulated along the recorded force"
+NORMAL_95 = 1.96
+"""Half of a two-sided 95 % interval over its standard deviation."""
+UNSTABLE = 100.0
+"""Times the fastest measured rate: a simulated motion that is faster is none of this axis."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What instruments say.
+
+    Attributes:
+        along: what the motion was simulated along.
+        of_wanted: whether that is the wanted motion, so that no noise is in it.
+        found: the regression; with `delay` its last coefficient is that of the delay.
+        estimates: of the terms, by name, with what half the band says otherwise.
+        delay: of the force; None where it was taken as known.
+    """
+
+    along: str
+    of_wanted: bool
+    found: Instrumented
+    estimates: dict[str, Estimate]
+    delay: Estimate | None
+
+    def strength(self, index: int) -> float:
+        """F of the first stage of a term."""
+        return float(self.found.strength[index])
+
+
+def instruments(
+    pieces: Sequence[Moved],
+    terms: Sequence[Term],
+    values: Array,
+    filtering: Filtering,
+    delay: float,
+    *,
+    stated: bool = False,
+) -> tuple[Instruments | None, str]:
+    """By the wanted motion where it was recorded, or else along the force; or why there are none.
+
+    Args:
+        values: of the terms, by least squares.
+        delay: of the force (s); found anew with the wanted motion, unless it is `stated`.
+    """
+    wanted = [each.wanted for each in pieces]
+    try:
+        if any(each is None for each in wanted):
+            raise ValueError("nobody recorded what motion was wanted")
+        loops = [
+            find_loop(each.motion, each.wanted, filtering.low_pass)
+            for each in pieces
+            if each.wanted is not None
+        ]
+        for fitted in (False,) if stated else (True, False):
+            found = _iterated(
+                pieces, terms, values, filtering, delay, loops, fitted=fitted, stated=stated
+            )
+            if not fitted or _strong(found, len(terms) + 1):
+                break
+        if weak := _weak(found, terms):
+            raise ValueError(weak)
+    except ValueError as error:
+        why = str(error)
+    else:
+        return found, ""
+    try:
+        found = _iterated(
+            pieces, terms, values, filtering, delay, None, fitted=False, stated=stated
+        )
+    except ValueError as error:
+        return None, f"{why}; along the recorded force: {error}"
+    if weak := _weak(found, terms):
+        return None, f"{why}; along the recorded force: {weak}"
+    return found, why
+
+
+def held_against(
+    squares: Mapping[str, Estimate], found: Instruments | None
+) -> tuple[dict[str, Estimate], bool]:
+    """Coefficients that are told, by name, and whether they are those of instruments.
+
+    Least squares, with what instruments say otherwise as a systematic part. Where the two differ by
+    more than scatter explains, noise of the motion biases least squares: then instruments are told,
+    all of them, where these know of no noise.
+    """
+    if found is None:
+        return dict(squares), False
+    if found.of_wanted and differs(squares, found):
+        return found.estimates, True
+    return {n: _shifted(one, found.estimates[n]) for n, one in squares.items()}, False
+
+
+def differs(squares: Mapping[str, Estimate], found: Instruments) -> bool:
+    """Whether some coefficient of the two differs by more than scatter explains."""
+    return any(_differ(one, found.estimates[name]) for name, one in squares.items())
+
+
+def told_delay(late: Estimate, found: Instruments | None) -> Estimate:
+    """The delay that is told: held against instruments, as coefficients are.
+
+    Without any that know of no noise, nobody knows how much of it a loop makes of noise and of what
+    disturbs the axis: it may be none at all.
+    """
+    if late.origin is Origin.GIVEN:
+        return late
+    if found is None or found.delay is None or not found.delay.has_interval:
+        if math.isnan(late.value):
+            return late
+        return shifted_by(late, "loop", abs(late.value) / NORMAL_95)
+    if math.isnan(late.value) or _differ(late, found.delay):
+        return found.delay
+    return _shifted(late, found.delay)
+
+
+def _differ(one: Estimate, other: Estimate) -> bool:
+    """By more than the scatter of the one and the interval of the other; never without either.
+
+    What is systematic in least squares is, in part, the very noise that instruments are free of.
+    """
+    if one.low is None or one.high is None:
+        return False
+    scatter = 0.5 * (one.high - one.low)
+    return abs(one.value - other.value) > math.hypot(scatter, other.half_width)
+
+
+def _shifted(one: Estimate, other: Estimate) -> Estimate:
+    if not one.has_interval:
+        return one
+    return shifted_by(one, "instruments", abs(one.value - other.value))
+
+
+def _strong(found: Instruments, count: int) -> bool:
+    return bool(np.all(found.found.strength[:count] >= WEAK))
+
+
+def _weak(found: Instruments, terms: Sequence[Term]) -> str:
+    strength = found.found.strength[: len(terms)]
+    index = int(np.argmin(strength))
+    if strength[index] >= WEAK:
+        return ""
+    return f"the simulated motion hardly tells {terms[index].name} (F {strength[index]:.2g})"
+
+
+def _iterated(
+    pieces: Sequence[Moved],
+    terms: Sequence[Term],
+    values: Array,
+    filtering: Filtering,
+    delay: float,
+    loops: Sequence[Loop] | None,
+    *,
+    fitted: bool,
+    stated: bool,
+) -> Instruments:
+    """fitted: whether the delay is found as well; stated: whether it is known.
+
+    Raises ValueError where nothing comes of it.
+    """
+    reach = max(LONGEST, 5.0 / pieces[0].motion.sample_rate)
+    for _ in range(ROUNDS):
+        made = _simulated(pieces, terms, values, delay, loops)
+        found = _regressed(pieces, made, terms, values, filtering, delay, fitted=fitted)
+        at, before = values, delay
+        values = found.fit.values[: len(terms)]
+        if fitted:
+            delay = min(max(delay + float(found.fit.values[-1]), -reach), reach)
+    along = ALONG_FORCE if loops is None else ALONG_WANTED
+    others = {
+        "band": [(filtering.half_band, before)],
+        "slow": [(each, before) for each in filtering.faster],
+    }
+    if not fitted and not stated:
+        doubt = max(1.0 / pieces[0].motion.sample_rate, abs(before) / NORMAL_95)
+        others["delay"] = [(filtering, before - doubt)]
+
+    def other(rows: Filtering, late: float) -> Array:
+        return _regressed(pieces, made, terms, at, rows, late, fitted=fitted).fit.values
+
+    parts = {
+        source: farthest(found.fit.values, [partial(other, *each) for each in every])
+        for source, every in others.items()
+    }
+    told = [
+        _estimate(term.name, term.unit, along, found, index, float(values[index]), parts)
+        for index, term in enumerate(terms)
+    ]
+    told_late = None
+    if fitted and abs(delay) < reach:
+        told_late = _estimate("delay", "s", along, found, len(terms), delay, parts)
+    by_name = {each.name: each for each in told}
+    return Instruments(along, loops is not None, found, by_name, told_late)
+
+
+def _simulated(
+    pieces: Sequence[Moved],
+    terms: Sequence[Term],
+    values: Array,
+    delay: float,
+    loops: Sequence[Loop] | None,
+) -> list[Motion]:
+    made = []
+    for number, each in enumerate(pieces):
+        if loops is None or each.wanted is None:
+            one = driven_motion(each.motion, terms, values, delay)
+        else:
+            one = followed_motion(each.motion, each.wanted, loops[number], terms, values)
+        fastest = float(np.abs(one.rate).max())
+        if not fastest < UNSTABLE * float(np.abs(each.motion.rate).max()):
+            raise ValueError("the model runs away")
+        made.append(one)
+    return made
+
+
+def _regressed(
+    pieces: Sequence[Moved],
+    made: Sequence[Motion],
+    terms: Sequence[Term],
+    values: Array,
+    filtering: Filtering,
+    delay: float,
+    *,
+    fitted: bool,
+) -> Instrumented:
+    """Rows where both move; a column more for the delay: how the model's force changes in time."""
+    own: list[Piece] = []
+    other: list[Piece] = []
+    for piece, one in zip(pieces, made, strict=True):
+        motion = piece.motion.part(slice(len(one.time)))
+        both = moving(motion, filtering) * moving(one, filtering)
+        rows = [all_rows(motion, terms, filtering, delay), all_rows(one, terms, filtering)]
+        for each, into in zip(rows, (own, other), strict=True):
+            columns = each.columns
+            if fitted:
+                # Its coefficient is by how much later still the force acts.
+                change = np.gradient(columns @ values, each.time)
+                columns = np.column_stack([columns, change])
+            into.append(Piece(columns * both[:, None], each.force * both, each.time))
+    try:
+        return by_instruments(own, other)
+    except np.linalg.LinAlgError as error:
+        raise ValueError("the simulated motion cannot tell the model's terms apart") from error
+
+
+def _estimate(
+    name: str,
+    unit: str,
+    along: str,
+    found: Instrumented,
+    index: int,
+    value: float,
+    parts: Mapping[str, Array | None],
+) -> Estimate:
+    fit = found.fit
+    error = float(fit.robust[index])
+    half = fit.quantile * error
+    if fit.freedom < 1.0 or not math.isfinite(half):
+        return Estimate.without_interval(name, value, unit, TOO_FEW_ROWS())
+    one = Estimate(
+        name, value, unit, value - half, value + half, LEVEL,
+        f"instruments {along}", standard_error=error, freedom=fit.freedom,
+    )  # fmt: skip
+    for source, shifts in parts.items():
+        one = shifted_by(one, source, None if shifts is None else float(shifts[index]))
+    return one

@@ -1,0 +1,188 @@
+"""Figures of repeated friction-velocity maps and their parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from campaign.estimate import Estimate
+from campaign.estimation.intervals import LEVEL, student
+from campaign.estimation.stribeck import SYMBOLS, UNITS
+from campaign.experiments.friction_map.curves import Curves
+from campaign.experiments.friction_map.figures import OWN_TORQUE, SPEED, point_bars
+from campaign.experiments.friction_map.runs import DIRECTIONS
+from campaign.experiments.shared.captions import amount, listed
+from campaign.result import Array, Axis, Curve, Figure, Panel
+
+ASIDE = 0.1
+"""How far the dots of a direction are drawn beside the place of their map, in maps."""
+ROUNDING = 1e-9
+"""of a parameter, that two directions may differ by and be the same."""
+SHOWN = 6
+"""Most maps on one another: more cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class MapSet:
+    """One complete map.
+
+    Attributes:
+        name: of its two sets, e.g. "1-2".
+        where: what is particular about it, e.g. `bench.variation.day = 1`.
+        found: by direction and parameter, the exponent free.
+    """
+
+    name: str
+    where: str
+    fits: Curves
+    found: Mapping[str, Mapping[str, Estimate]]
+
+    def value(self, direction: str, parameter: str) -> float:
+        return self.found[direction][parameter].value
+
+
+def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
+    """Figure 4.9: maps on one another, and what each differs from the first."""
+    shown = list(sets[:SHOWN])
+    maps, changes = [], []
+    for direction in DIRECTIONS:
+        curves = [
+            point_bars(each.fits.fits[direction], f"sets {each.name}", f"sets {each.name}")
+            for each in shown
+        ]
+        maps.append(Panel(SPEED, OWN_TORQUE, curves, f"{direction.capitalize()} direction"))
+        changes.append(_change_panel(shown, direction))
+    count = "first maps" if len(sets) > len(shown) else "maps"
+    told = _drifts(shown)
+    return Figure(
+        key="sets",
+        title="Friction-velocity maps on one another",
+        caption=f"The same speeds in {len(shown)} {count}, each direction in its own sign"
+        f"{'; below, what each differs from the first' if len(shown) > 1 else ''}.{told} "
+        "Bars: 95 %, window and scatter between points.",
+        alt="Friction torque over speed on a logarithmic axis, one panel per direction, dots of "
+        "each map, and the differences of the maps from the first.",
+        panels=(*maps, *(changes if len(shown) > 1 else ())),
+        thesis=("4.9",),
+        across=2,
+        one_scale=True,
+        trials=trials,
+    )
+
+
+def _change_panel(sets: Sequence[MapSet], direction: str) -> Panel:
+    curves = []
+    for each in sets[1:]:
+        speed, change = _change(sets[0], each, direction)
+        curves.append(Curve(speed, change, f"sets {each.name}", f"sets {each.name}", "points"))
+    return Panel(SPEED, Axis(f"Less sets {sets[0].name}", "N m", "N m"), curves)
+
+
+def _change(first: MapSet, other: MapSet, direction: str) -> tuple[Array, Array]:
+    """Speeds that both maps have (rad/s), and by how much friction differs there (N m)."""
+    one, two = first.fits.fits[direction], other.fits.fits[direction]
+    _, here, there = np.intersect1d(one.place, two.place, return_indices=True)
+    return two.speed[there], two.torque[there] - one.torque[here]
+
+
+def _drifts(sets: Sequence[MapSet]) -> str:
+    """By how much the level of friction differs from the first map's, on average over speeds."""
+    parts = []
+    for each in sets[1:]:
+        words = []
+        for direction in DIRECTIONS:
+            _, change = _change(sets[0], each, direction)
+            if len(change):
+                ends = [amount(float(end), "N m", digits=2) for end in _ends(change)]
+                mean = amount(float(np.mean(change)), "N m", digits=2)
+                words.append(f"{mean} ({ends[0]} to {ends[1]}) {direction}")
+        if words:
+            parts.append(f"sets {each.name} by {listed(words)}")
+    if not parts:
+        return ""
+    return f" From sets {sets[0].name} differ, mean and range over the speeds, {'; '.join(parts)}."
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    return float(np.min(values)), float(np.max(values))
+
+
+def scatter_figure(
+    sets: Sequence[MapSet],
+    means: Mapping[str, Estimate],
+    deviations: Mapping[str, Estimate],
+    trials: tuple[int, ...],
+) -> Figure:
+    """Each parameter by map and direction, and the mean of all; by parameter the last two."""
+    panels = [_scatter_panel(sets, means[name], deviations[name], name) for name in means]
+    return Figure(
+        key="scatter",
+        title="Scatter of the parameters from map to map",
+        caption="Each dot is one direction of one map, with its own 95 % interval; on the right, "
+        "the mean of all. The percentages are the standard deviation of all dots, relative to "
+        f"their mean.{_apart(sets, means)}",
+        alt="One panel for each parameter with a dot for every map and direction, and their mean.",
+        panels=tuple(panels),
+        across=2,
+        trials=trials,
+    )
+
+
+def _scatter_panel(
+    sets: Sequence[MapSet], mean: Estimate, deviation: Estimate, parameter: str
+) -> Panel:
+    symbol, unit = SYMBOLS[parameter], UNITS[parameter]
+    last = len(sets) + 1.0
+    names = ((k + 1.0, each.name) for k, each in enumerate(sets))
+    sets_axis = Axis("Sets", limits=(0.5, last + 0.5), places=(*names, (last, "mean")))
+    whole = Curve.of(np.array([last]), [mean], "mean of all", "measured")
+    curves = [*_dots(sets, parameter), _named(whole, parameter, {"statistic": "mean"})]
+    told = f"{100 * deviation.value:.1f} %" if np.isfinite(deviation.value) else "its mean is zero"
+    return Panel(sets_axis, Axis(symbol, unit, unit), curves, f"{symbol}: {told}")
+
+
+def _dots(sets: Sequence[MapSet], parameter: str) -> Iterator[Curve]:
+    """One curve for each dot, which is beside another published number than the next."""
+    for direction in DIRECTIONS:
+        for place, each in enumerate(sets, start=1):
+            found = [each.found[direction][parameter]]
+            at = np.array([float(place)])
+            dot = Curve.of(at, found, f"{direction} direction", direction)
+            dot = replace(dot, aside=ASIDE * DIRECTIONS[direction])
+            yield _named(dot, parameter, {"set": each.name, "direction": direction})
+
+
+def _named(curve: Curve, quantity: str, conditions: Mapping[str, str]) -> Curve:
+    return replace(curve, quantity=quantity, conditions=conditions)
+
+
+def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
+    """Which parameters differ between the directions: by the difference in each map, t over maps.
+
+    Both directions of a map share its day, which their difference is free of. As many tests as
+    parameters are one claim, so each may be wrong by its share of it (Bonferroni).
+    """
+    level = 1.0 - (1.0 - LEVEL) / len(means)
+    apart = []
+    for name in means:
+        each = np.array([[one.value(d, name) for d in DIRECTIONS] for one in sets])
+        if _differs(each[:, 1] - each[:, 0], level, ROUNDING * float(np.max(np.abs(each)))):
+            apart.append(SYMBOLS[name])
+    if not apart:
+        return " No parameter differs between the directions, as far as these maps show."
+    word = "s" if len(apart) == 1 else ""
+    sure = f"{100 * LEVEL:.0f} % for all parameters together"
+    return (
+        f" Between the directions differ{word}, beyond what maps scatter ({sure}), {listed(apart)}."
+    )
+
+
+def _differs(values: Array, level: float, spare: float) -> bool:
+    """Whether the mean of independent values, shape (n,), is not zero, and by more than `spare`."""
+    if len(values) < 2 or not np.isfinite(values).all():
+        return False
+    error = float(np.std(values, ddof=1)) / math.sqrt(len(values))
+    return abs(float(np.mean(values))) > max(student(len(values) - 1, level) * error, spare)

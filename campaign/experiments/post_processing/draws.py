@@ -1,0 +1,100 @@
+"""A test with several draws of a random bench, analyzed draw by draw.
+
+Every experiment can be swept so, and knows nothing of it: each draw is analysed as if it were all
+there is, and what the draws found is put side by side here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from campaign.experiments.post_processing.merged_sentences import concluded
+from campaign.published.draws import SEED, together
+from campaign.result import Cell, Column, Finding, Result, Table, Value
+from campaign.trial import Trial, canonical_json
+
+NOTES = 12
+"""Most notes of an analysis that are repeated for other draws than the first."""
+
+
+def draws_of(trials: Iterable[Trial]) -> tuple[Value, ...]:
+    """Seeds that a test sweeps, in plan order; none of a test that sweeps no seed."""
+    seeds = (trial.point[SEED] for trial in trials if SEED in trial.point)
+    return tuple(dict.fromkeys(seed for seed in seeds if isinstance(seed, int)))
+
+
+def merged(results: Mapping[Value, Result]) -> Result:
+    """The results of several draws, by seed: findings and sentences of all, else those of one.
+
+    A table says of every number of which several draws found one how these lie.
+    """
+    seed = next((own for own, result in results.items() if result.tables), next(iter(results)))
+    first = results[seed]
+    others = [result for own, result in results.items() if own != seed]
+    found = tuple(
+        replace(finding, conditions={**finding.conditions, SEED: own})
+        for own, result in results.items()
+        for finding in result.findings
+    )
+    told = f"{len(results)} draws of the bench's scatter; tables and figures are of seed {seed}."
+    more = dict.fromkeys(note for result in others for note in result.notes)
+    notes = [note for note in more if note not in first.notes]
+    if len(notes) > NOTES:
+        notes = [*notes[:NOTES], f"{len(notes) - NOTES} more notes are of other draws."]
+    table = _table(found, tuple(results))
+    return Result(
+        (table, *first.tables) if table.rows else first.tables,
+        first.figures,
+        found,
+        (told, *first.notes, *notes),
+        concluded({own: result.conclusions for own, result in results.items()}),
+        first.telling,
+        tuple(doubt for result in results.values() for doubt in result.doubts),
+    )
+
+
+def _table(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Table:
+    return Table(
+        key="draws",
+        title="What the draws of the bench found",
+        columns=(
+            Column("quantity", "Quantity"),
+            Column("conditions", "Conditions"),
+            Column("unit", "Unit"),
+            Column("draws", "Draws", exact=True),
+            Column("spread", "Median, and one more draw"),
+        ),
+        rows=tuple(_rows(found, seeds)),
+        note=f"Each draw is the bench with another seed of its scatter ({SEED}). The interval is "
+        "where one further draw lies, such as the one that a document prints; that of their mean "
+        "is narrower.",
+    )
+
+
+def _rows(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Iterator[Mapping[str, Cell]]:
+    groups: dict[str, list[Finding]] = {}
+    for finding in found:
+        shared = {name: value for name, value in finding.conditions.items() if name != SEED}
+        key = canonical_json([finding.quantity, finding.unit, shared])
+        groups.setdefault(key, []).append(finding)
+    for group in groups.values():
+        if len(group) < 2:
+            continue
+        told = together(group, seeds)
+        yield {
+            "quantity": told.quantity.replace("_", " "),
+            "conditions": _words(told.conditions),
+            "unit": told.unit,
+            "draws": len(group),
+            "spread": told.known,
+        }
+
+
+def _words(conditions: Mapping[str, Value]) -> str:
+    shown = (
+        f"{name.replace('_', ' ')} {f'{value:.6g}' if isinstance(value, float) else value}"
+        for name, value in conditions.items()
+        if value is not None
+    )
+    return ", ".join(shown)

@@ -1,0 +1,71 @@
+"""Names of swept values that are tables, such as friction models.
+
+A page has room for *lugre* and *stribeck*, not for all of their parameters, which the archive has.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+
+from pydantic import JsonValue
+
+from campaign.trial import canonical_json
+
+KINDS = ("model", "method", "kind")
+"""Entries that say what a table describes, and so come first."""
+
+
+def table_names(values: Sequence[JsonValue]) -> dict[str, str]:
+    """A name for each table among `values`, by its canonical JSON.
+
+    What the table describes, and each number or text in which it differs from another of the same
+    kind: `lugre`, or `lugre, coulomb_torque = 26`. Numbers are SI, as the tables are.
+    """
+    tables = {canonical_json(value): value for value in values if isinstance(value, dict)}
+    leaves = {key: dict(_leaves(table)) for key, table in tables.items()}
+    names = {}
+    for key, own in leaves.items():
+        like = [other for other in leaves.values() if _kind(other) == _kind(own)]
+        telling = [
+            path
+            for path in own
+            if any(path not in other or not _same(other[path], own[path]) for other in like)
+        ]
+        words = [f"{path} = {_text(own[path])}" for path in telling]
+        names[key] = ", ".join(([_kind(own)] if _kind(own) else []) + words) or "as given"
+    return _told_apart(names)
+
+
+def _told_apart(names: Mapping[str, str]) -> dict[str, str]:
+    """The same, numbered where words and six digits do not suffice."""
+    count = Counter(names.values())
+    numbers: Counter[str] = Counter()
+    told = {}
+    for key, name in names.items():
+        numbers[name] += 1
+        told[key] = f"{name} #{numbers[name]}" if count[name] > 1 else name
+    return told
+
+
+def _same(one: JsonValue, other: JsonValue) -> bool:
+    return type(one) is type(other) and one == other
+
+
+def _kind(leaves: Mapping[str, JsonValue]) -> str:
+    return next((str(leaves[name]) for name in KINDS if name in leaves), "")
+
+
+def _leaves(table: Mapping[str, JsonValue], prefix: str = "") -> Iterator[tuple[str, JsonValue]]:
+    """Dotted path and value of all that is no table."""
+    for name, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _text(value: JsonValue) -> str:
+    if value is None:
+        return "none"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

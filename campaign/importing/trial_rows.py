@@ -1,0 +1,139 @@
+"""Rows of a table by trial: from a trial column, or from times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from campaign.importing.defects.clock import SHORTEST, restarts
+from campaign.importing.defects.defect import counted
+from campaign.importing.interface import Array
+
+NEEDED = f"a recording needs {SHORTEST}"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows of a table that are one trial, what tells it from others, and what to remark."""
+
+    first: int
+    rows: int
+    conditions: dict[str, float]
+    remarks: tuple[str, ...] = ()
+
+
+def by_value(values: Array, first: int, name: str, wanted: float | None = None) -> list[Stretch]:
+    """A trial for each stretch in which a column does not change; raises ValueError for none.
+
+    Stretches that are too short for a trial are left out, and the first trial says so.
+
+    Args:
+        values: of the column, shape (n,); `first` is the row of the first.
+        wanted: only stretches of this value.
+    """
+    there = np.isfinite(values)
+    same = (values[1:] == values[:-1]) | ~(there[1:] | there[:-1])
+    edges = np.flatnonzero(~same) + 1
+    bounds = [0, *edges.tolist(), len(values)]
+    found = [(a, b) for a, b in pairwise(bounds) if there[a]]
+    if wanted is not None:
+        found = [(a, b) for a, b in found if values[a] == wanted]
+        if not found:
+            raise ValueError(f"column {name!r} is never {wanted:g}")
+    empty = int(len(values) - there.sum())
+    blank = f"column {name!r} has no value in {counted(empty, 'row')}" if empty else ""
+    if not found:
+        raise ValueError(blank)
+    long, remarks = _long(found, f"column {name!r}", blank)
+    if blank:
+        remarks.append(f"{blank}, which {'is' if empty == 1 else 'are'} in no trial")
+    word = "".join(c if c.isalnum() else "_" for c in name.lower()).strip("_") or "value"
+    cut = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
+    return _numbered(cut, remarks)
+
+
+def by_restart(times: Array, first: int) -> list[Stretch]:
+    """A trial for each stretch in which time (s), shape (n,), goes on. ValueError for one."""
+    bounds = [0, *restarts(times), len(times)]
+    if len(bounds) < 3:
+        raise ValueError("its time begins once")
+    long, remarks = _long(list(pairwise(bounds)), "time")
+    return _numbered([Stretch(first + a, b - a, {}) for a, b in long], remarks)
+
+
+def _long(
+    found: Sequence[tuple[int, int]], what: str, blank: str = ""
+) -> tuple[list[tuple[int, int]], list[str]]:
+    """The stretches that are long enough for a trial, and a remark if others are not.
+
+    Raises ValueError for none, which also tells of the rows without a value.
+    """
+    long = [(a, b) for a, b in found if b - a >= SHORTEST]
+    short = len(found) - len(long)
+    if not long:
+        lengths = [b - a for a, b in found]
+        raise ValueError(
+            f"{what} makes {counted(len(found), 'stretch')}, the shortest of "
+            f"{counted(min(lengths), 'row')} and the longest of {counted(max(lengths), 'row')}; "
+            f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}"
+        )
+    are = "is no trial" if short == 1 else "are no trials"
+    told = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
+    return long, [told] if short else []
+
+
+def by_trigger(
+    values: Array,
+    first: int,
+    name: str,
+    level: float,
+    ends_of: Callable[[np.ndarray], np.ndarray],
+    stop: int,
+) -> list[Stretch]:
+    """A trial from each row in which a column has risen through a level.
+
+    Args:
+        values: of the column, shape (n,); `first` is the row of the first.
+        ends_of: from the rows in which trials begin to those after their ends, shape (k,) each.
+        stop: row after the last; what would end later is left out.
+
+    Raises ValueError for none, and where two trials would have rows in common.
+    """
+    known = np.flatnonzero(np.isfinite(values))  # a lost value is no fall
+    above = values[known] > level
+    rises = known[1:][~above[:-1] & above[1:]] + first
+    ends = ends_of(rises) if len(rises) else rises
+    pairs = [(int(a), int(b)) for a, b in zip(rises, ends, strict=True) if b <= stop]
+    if not pairs:
+        raise ValueError(
+            f"column {name!r} never rises through {level:g} long enough before the end"
+        )
+    for (_, end), (begin, _) in pairwise(pairs):
+        if begin < end:
+            raise ValueError(
+                f"column {name!r} rises through {level:g} again in row {begin + 1}, "
+                f"{counted(end - begin, 'row')} before the trial that is running there ends: no "
+                "row may be in two trials; take a shorter 'duration', or another 'level'"
+            )
+    if (fewest := min(b - a for a, b in pairs)) < SHORTEST:
+        raise ValueError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}")
+    return _numbered([Stretch(a, b - a, {}) for a, b in pairs])
+
+
+def _numbered(stretches: list[Stretch], remarks: Sequence[str] = ()) -> list[Stretch]:
+    """The same, with what the first remarks.
+
+    Where two are told apart by nothing, each is also by its number, from 1.
+    """
+    first, *others = stretches
+    cut = [replace(first, remarks=tuple(remarks)), *others]
+    if len({tuple(each.conditions.items()) for each in cut}) == len(cut):
+        return cut
+    key = "stretch" if "part" in first.conditions else "part"
+    return [
+        replace(each, conditions={**each.conditions, key: number})
+        for number, each in enumerate(cut, 1)
+    ]

@@ -1,0 +1,223 @@
+"""The `[known]` table of a bench: source cells, and uncertainty of its values.
+
+Nothing here acts on motion. `given`, `fitted` and `seen` are what a status of the scoreboard rests
+on; `fingerprint` says of which bench they are true (`bench_fingerprint`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import (
+    BaseModel,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+from campaign.axis_kind import BOTH_ROTARY
+from campaign.options import Options, spelled
+from campaign.physics.friction_paths import Keys, invalid
+from campaign.units import Quantity, split_quantity
+
+NORMAL_95 = 1.959963984540054
+"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
+Number = float | str
+"""SI; text with a unit as long as nobody has looked what it is of."""
+
+
+class KnownValue(Options):
+    """How well one value of the bench is known."""
+
+    interval: tuple[Number, Number] | None = None
+    """Ends of its 95 % interval, in the unit of the value."""
+    standard_uncertainty: Number | None = None
+    """Its standard deviation, in the unit of the value or in percent; instead of the interval."""
+    origin: Literal["given", "measured", "fitted", "assumed"] = "given"
+    """Where it comes from: a document or data sheet, a measurement, a calibration, a guess."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.interval is not None and self.standard_uncertainty is not None:
+            raise ValueError("'interval' and 'standard_uncertainty' say the same; remove one")
+        return self
+
+    @property
+    def standard_deviation(self) -> float | None:
+        """1 sigma (SI); None when nobody has said how well the value is known."""
+        if self.interval is not None:
+            low, high = (float(end) for end in self.interval)
+            return (high - low) / (2.0 * NORMAL_95)
+        return None if self.standard_uncertainty is None else float(self.standard_uncertainty)
+
+
+class FingerprintOptions(Options):
+    """Which bench it is that something is known of; `campaign fingerprint` writes it."""
+
+    bench: Annotated[str, spelled(r"[0-9a-f]{16}", "16 hexadecimal digits")]
+    """Of all that acts on motion but the compensations."""
+    compensation: dict[str, str] = {}
+    """Of each compensation, by its name."""
+
+
+class IdentifiedOptions(Options):
+    """What `campaign identify` took the values from that it wrote."""
+
+    run: str
+    """The run, and its test where one was named."""
+    digest: str
+    """Which stands for all of that run."""
+    program: str
+    """And its version."""
+    command: str
+    """That was given."""
+
+
+class KnownOptions(Options):
+    """What is known of a bench, and which published cells it was made from.
+
+    Cells are named by `table`, `table/row` or `table/row/column`; `*` stands for any name.
+    """
+
+    document: str = ""
+    """Whose cells are meant: "thesis", or a file of published values, relative to the bench."""
+    given: tuple[str, ...] = ()
+    """Published cells it was given: what a test finds of them is `recovered`."""
+    fitted: tuple[str, ...] = ()
+    """Published cells it was fitted to: those are `calibrated`."""
+    seen: tuple[str, ...] = ()
+    """Published cells that were looked at while its structure was chosen: they are `selected`."""
+    operating: tuple[str, ...] = ()
+    """Paths of the bench that a test may change without altering the bench: preload, day."""
+    values: dict[str, KnownValue] = {}
+    """How well values are known, by their path, e.g. "motor.torque_constant"."""
+    correlations: tuple[tuple[str, str, float], ...] = ()
+    """Pairs of paths in `values` whose errors go together, with their correlation coefficient."""
+    fingerprint: FingerprintOptions | None = None
+    """Which bench all of this is said of."""
+    identified: IdentifiedOptions | None = None
+    """Which recordings values were identified from."""
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A bench that nobody identified is archived as before: trials keep their fingerprints."""
+        tree: dict[str, Any] = dump(self)
+        if self.identified is None:
+            tree.pop("identified", None)
+        return tree
+
+    @property
+    def describes(self) -> bool:
+        """Whether it says anything that holds for one bench only."""
+        return bool(self.given or self.fitted or self.seen or self.fingerprint)
+
+
+def number_at(bench: BaseModel, path: str) -> tuple[float, Quantity | None] | None:
+    """The number at a dotted path of a bench (SI) and its quantity; None where there is none."""
+    here: Any = bench
+    quantity: Quantity | None = None
+    sides = getattr(bench, "sides", BOTH_ROTARY)
+    for key in path.split("."):
+        if isinstance(here, Mapping) and key in here:
+            here = here[key]
+        elif isinstance(here, BaseModel) and key in type(here).model_fields:
+            field = type(here).model_fields[key]
+            if getattr(here, "side", "") == "motor":
+                sides = sides.at_motor
+            quantity = next(_quantities((*field.metadata, field.annotation)), None)
+            here = getattr(here, key)
+        else:
+            return None
+    if isinstance(here, bool) or not isinstance(here, int | float):
+        return None
+    return float(here), quantity and quantity.of(sides)
+
+
+def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:
+    """Physical quantities among the hints of a field, or inside an optional type."""
+    for hint in hints:
+        if isinstance(hint, Quantity):
+            yield hint
+        else:
+            yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))
+
+
+def known_in_si(bench: Any) -> KnownOptions:
+    """What a bench as written says is known of it, with SI numbers in place of text.
+
+    Raises pydantic's error for a path that leads to no number, and for a value that is none there.
+    """
+    known: KnownOptions = bench.known
+    faults: list[tuple[Keys, str]] = []
+    values: dict[str, KnownValue] = {}
+    for path, entry in known.values.items():
+        at = number_at(bench, path)
+        values[path] = entry if at is None else _parsed(entry, *at, ("values", path), faults)
+    faults += _wrong_paths(known, bench)
+    if faults:
+        raise invalid([(("known", *keys), message) for keys, message in faults])
+    return known.model_copy(update={"values": values})
+
+
+def _wrong_paths(known: KnownOptions, bench: BaseModel) -> Iterator[tuple[Keys, str]]:
+    """Paths that lead to no number of the bench: keys below `known`, and the message."""
+    for path in known.values:
+        if number_at(bench, path) is None:
+            yield ("values", path), f"the bench has no number at '{path}'"
+    for index, path in enumerate(known.operating):
+        if number_at(bench, path) is None:
+            yield ("operating", index), f"the bench has no number at '{path}'"
+        elif path in known.values and known.values[path].origin == "fitted":
+            message = f"'{path}' was fitted; a test that changes it is of another bench"
+            yield ("operating", index), message
+    for index, (one, other, share) in enumerate(known.correlations):
+        for place, path in enumerate((one, other)):
+            if path not in known.values:
+                yield ("correlations", index, place), f"'{path}' is none of known.values"
+        if not -1.0 <= share <= 1.0:
+            yield ("correlations", index, 2), f"{share:g} is no correlation; it is from -1 to 1"
+
+
+def _parsed(
+    entry: KnownValue,
+    value: float,
+    quantity: Quantity | None,
+    keys: Keys,
+    faults: list[tuple[Keys, str]],
+) -> KnownValue:
+    def number(written: Number, *below: str | int) -> float:
+        try:
+            return _number(written, value, quantity, relative=below[0] == "standard_uncertainty")
+        except ValueError as error:
+            faults.append(((*keys, *below), str(error)))
+            return math.nan  # and no second complaint
+
+    if entry.interval is not None:
+        low, high = (number(end, "interval", index) for index, end in enumerate(entry.interval))
+        if low > high:
+            faults.append(((*keys, "interval"), "the lower end comes first"))
+        return entry.model_copy(update={"interval": (low, high)})
+    if entry.standard_uncertainty is None:
+        return entry
+    sigma = number(entry.standard_uncertainty, "standard_uncertainty")
+    if sigma < 0:
+        faults.append(((*keys, "standard_uncertainty"), "a standard deviation is not negative"))
+    return entry.model_copy(update={"standard_uncertainty": sigma})
+
+
+def _number(written: Number, value: float, quantity: Quantity | None, *, relative: bool) -> float:
+    """SI value of what is written; ValueError with a message for the user."""
+    if not isinstance(written, str):
+        if quantity is not None:
+            raise ValueError(
+                f"{written:g} has no unit; write it as text, such as {quantity.example}"
+            )
+        return written
+    share, unit = split_quantity(written)
+    if unit == "%" and relative:
+        return abs(value) * share / 100.0
+    if quantity is None:
+        raise ValueError(f"'{written}' is text, and the value is a number without a unit")
+    return quantity.parse_own(written)

@@ -1,0 +1,238 @@
+"""numba compilation with a cache that notices changed callees.
+
+numba's own cache compares only the file a function stands in: edit a function that it calls in
+another file, and the old machine code goes on giving the old numbers. Here the cache folder's name
+is a hash of every source file that the function may call, so any edit starts afresh:
+
+- for a function of `campaign.physics`, all of `campaign.physics`, which calls nothing outside;
+- for any other, also the rest of this program, its own distribution, the folders and editable
+  installs that it imports from (`campaign.source_hash`), and which libraries are installed.
+
+Where that cannot be known (a notebook's cell, a source edited since the process began) nothing is
+kept. What a module reads from data files while it is imported is not seen.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import stat
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+from campaign.entry_points import packages_of
+from campaign.source_hash import digest, sources_of
+
+_CONFIG: Any = numba.config
+_PHYSICS = Path(__file__).parent
+_CHOSEN_BY_USER: str = _CONFIG.CACHE_DIR  # NUMBA_CACHE_DIR
+_DECORATING = threading.RLock()
+_IMPORTED_AT = time.time()
+CLOCK_TICK = 0.02
+"""s, by which the time of a file may lie before that of its writing: Linux counts in ticks."""
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@cache
+def cache_folder(module: str) -> Path | None:
+    """Where machine code of a module's functions is kept; None: it is not kept.
+
+    The folder lies in the user's cache (in NUMBA_CACHE_DIR, where that is set), or in a temporary
+    folder if that is shut, or if another user may have written in it (`distrust`).
+    """
+    try:
+        name = _key(module)
+    except OSError:  # a source that is gone, or that may not be read
+        name = None
+    if name is None:
+        return None
+    folder = _user_cache() / name
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        trusted = not distrust(folder)
+    except OSError:
+        trusted = False
+    if not trusted:
+        folder = Path(tempfile.mkdtemp(prefix="campaign-compiled-"))
+    return folder
+
+
+@cache
+def distrust(folder: Path) -> str:
+    """Why another user may have written what lies in a folder, which would be run; "" if none may.
+
+    A folder that others cannot enter may hold files that their group may write, as a umask of 002
+    makes them. On Windows a user's cache is the user's.
+    """
+    if os.name != "posix":
+        return ""
+    loose = 0o022 if folder.stat().st_mode & 0o077 else 0o002
+    inside = (
+        Path(base, name) for base, folders, files in os.walk(folder) for name in (*folders, *files)
+    )
+    for path in (folder, folder.resolve(), *inside):
+        with suppress(FileNotFoundError):  # another process is writing there
+            about = path.lstat()
+            if about.st_uid != os.geteuid():
+                return f"{path} belongs to another user"
+            if stat.S_ISLNK(about.st_mode):
+                if path != folder:
+                    return f"{path} is a link"
+            elif about.st_mode & loose:
+                return f"{path} can be written by other users"
+    return ""
+
+
+def distrusted() -> str:
+    """What to say of the engine's folder where it is not used for that; "" where it is."""
+    folder = _user_cache() / digest_of_sources(_PHYSICS)
+    why = distrust(folder) if folder.is_dir() else ""
+    return why and (
+        f"the machine code kept in {folder} is not used: {why}; remove that folder, or let "
+        "NUMBA_CACHE_DIR name one of your own"
+    )
+
+
+def is_kept_for_good(folder: Path) -> bool:
+    """Whether a cache folder is the user's, and not a temporary one of this process."""
+    return folder.parent == _user_cache()
+
+
+def _user_cache() -> Path:
+    import platformdirs
+
+    if _CHOSEN_BY_USER:
+        return Path(_CHOSEN_BY_USER) / "campaign"
+    return platformdirs.user_cache_path("campaign") / "compiled"
+
+
+def _key(module: str) -> str | None:
+    """16 hexadecimal digits that change with whatever a module's functions may call."""
+    physics = digest_of_sources(_PHYSICS)
+    if f"{module}.".startswith("campaign.physics."):
+        return physics
+    own = sources_of(packages_of(module))
+    if not own or _is_newer(own):
+        return None
+    parts = (physics, digest(sources_of(("campaign",))), digest(own), *_libraries())
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def digest_of_sources(folder: Path) -> str:
+    """16 hexadecimal digits that change with numba, Python, or any source file in `folder`."""
+    digest = hashlib.sha256(f"{numba.__version__} {platform.python_version()}".encode())
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(source.relative_to(folder).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _is_newer(sources: Mapping[str, Path]) -> bool:
+    """Whether a source was written after this process may have imported what it was before."""
+    return any(path.stat().st_mtime > _IMPORTED_AT - CLOCK_TICK for path in sources.values())
+
+
+def _libraries() -> list[str]:
+    """Names, versions and times of all that is installed where modules are looked for."""
+    folders = (Path(folder) for folder in dict.fromkeys(sys.path) if folder)
+    abouts = (about for folder in folders for about in folder.glob("*.dist-info"))
+    return sorted(f"{about.name} {about.stat().st_mtime_ns}" for about in abouts)
+
+
+class ByModule:
+    """Numba's name for where a function is kept: by its module, not by the path of its file.
+
+    The folder has a hash of the sources, so that machine code is that of every copy of them: an
+    environment made anew, or another checkout, compiles nothing again.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._folder = Path(_CONFIG.CACHE_DIR) / function.__module__
+        self._file = Path(file)
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> ByModule | None:
+        """As numba asks for it; None for a function without a file."""
+        return cls(function, file) if Path(file).is_file() else None
+
+    def ensure_cache_path(self) -> None:
+        """Raises OSError."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """What is kept under another one is not used."""
+        return hashlib.sha256(self._file.read_bytes()).hexdigest()
+
+    def get_disambiguator(self) -> str:
+        """What tells functions of one name apart."""
+        return str(self._line)
+
+
+@contextmanager
+def _kept_in(folder: Path | None) -> Iterator[None]:
+    """Numba chooses the cache folder when it decorates; other packages keep their own."""
+    own = {"CACHE_DIR": str(folder), "CACHE_LOCATOR_CLASSES": f"{__name__}.{ByModule.__name__}"}
+    with _DECORATING:
+        before = {name: getattr(_CONFIG, name, "") for name in own}
+        for name, value in (own if folder is not None else before).items():
+            setattr(_CONFIG, name, value)
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                setattr(_CONFIG, name, value)
+
+
+def compiled(function: F, **options: Any) -> F:
+    """Decorator: compile at the first call, keep on disk, release the GIL while running."""
+    folder = cache_folder(function.__module__)
+    with _kept_in(folder):
+        compile_ = numba.njit(cache=folder is not None, nogil=True, error_model="numpy", **options)
+        return cast(F, compile_(function))
+
+
+def entry(function: F) -> F:
+    """Decorator: as `compiled`, for what makes no arrays: counting of references is left out.
+
+    The engine's structures have dozens of arrays: counting doubled the time it took to compile.
+    """
+    return compiled(function, _nrt=False)
+
+
+def inlined(function: F) -> F:
+    """Decorator: a part of the engine's loop, pasted into its caller so that it costs no call."""
+    return cast(F, numba.njit(inline="always", error_model="numpy")(function))
+
+
+def called(function: F) -> F:
+    """Decorator: a part of the engine that is compiled for itself, where a call costs little.
+
+    As `entry`, it makes no arrays.
+    """
+    return cast(F, numba.njit(error_model="numpy", _nrt=False)(function))
+
+
+def compiled_callback(signature: Any, function: Callable[..., Any], module: str) -> Any:
+    """Compile `function`, which calls one of `module`, now; the result has an `address`.
+
+    Whether it is kept is asked anew each time: the module may have been edited and loaded again.
+    """
+    folder = cache_folder.__wrapped__(module)
+    with _kept_in(folder):
+        return numba.cfunc(signature, cache=folder is not None, error_model="numpy")(function)

@@ -1,0 +1,93 @@
+"""Torque of a friction model along a given motion.
+
+No loop is closed and no drive simulated, so that nothing of a rig needs to be known: friction meets
+the rate with its own state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from campaign.physics.bench import Bench
+from campaign.physics.complete import CompleteBench, complete
+from campaign.physics.friction import FrictionField
+from campaign.physics.simulate import FrictionAlong
+from campaign.signals import Polyline, Sine
+from campaign.trial import Task
+
+Array = NDArray[np.float64]
+
+_LOOP = {"form": "parallel", "proportional": 1.0, "integral": 0.0}
+_NOBODYS: Mapping[str, Any] = {
+    "name": "friction alone",
+    "axis": {"name": "none", "inertia": 1.0},
+    "motor": {
+        "torque_constant": 1.0,
+        "back_emf_constant": 0.0,
+        "resistance": 1.0,
+        "inductance": 1.0,
+    },
+    "gear": {"ratio": 1.0},
+    "controller": {"rate": _LOOP, "current": _LOOP},
+    "limits": dict.fromkeys(
+        ("angle", "rate", "acceleration", "torque", "current", "duration"), 1e9
+    ),
+}
+"""What a simulation asks for; a prescribed motion uses none of it."""
+
+
+class Along:
+    """A motion, ready to be met by friction again and again."""
+
+    def __init__(self, task: Task) -> None:
+        """task: prescribed, of a rate in rad/s (or m/s); a sample is a step at most."""
+        self._count = round(task.duration * task.sample_rate)
+        self._met = FrictionAlong(_nobody(), task, 1.0 / task.sample_rate)
+
+    @classmethod
+    def rates(cls, rates: Array, sample_rate: float, start: float = 0.0) -> Along:
+        """rates: rad/s (or m/s), shape (n,), at `sample_rate` (Hz). start: position (rad, or m)."""
+        times = np.arange(len(rates)) / sample_rate
+        command = Polyline(times=tuple(times.tolist()), values=tuple(rates.tolist()))
+        return cls(_task(command, len(rates), sample_rate, start))
+
+    @classmethod
+    def sine(cls, rate: float, frequency: float, cycles: int, per_cycle: int) -> Along:
+        """rate: amplitude (rad/s); it begins at an end of the way, with rate 0."""
+        sample_rate = per_cycle * frequency
+        command = Sine(amplitude=rate, frequency=frequency)
+        start = -rate / (2.0 * np.pi * frequency)
+        return cls(_task(command, cycles * per_cycle, sample_rate, start))
+
+    def friction(self, options: Mapping[str, Any]) -> Array:
+        """Friction force (N m, or N), shape (n,), of an interface with these options (SI)."""
+        load = _friction().validate_python(options, context={"si": True})
+        return self._met.of({"load": load})[: self._count]
+
+
+def _task(command: Polyline | Sine, count: int, sample_rate: float, start: float) -> Task:
+    duration = count / sample_rate
+    return Task(
+        mode="prescribed",
+        command=command,
+        duration=duration,
+        window=(0.0, duration),
+        sample_rate=sample_rate,
+        start_angle=start,
+    )
+
+
+@cache
+def _nobody() -> CompleteBench:
+    return complete(Bench.model_validate(_NOBODYS, context={"si": True}))
+
+
+@cache
+def _friction() -> TypeAdapter[Any]:
+    return TypeAdapter(FrictionField)

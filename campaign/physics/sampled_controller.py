@@ -1,0 +1,229 @@
+"""One sample of a sampled controller: sensors, loop, compensation, output."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from campaign.physics.blocks import Array, Controller, Elements, Memory
+from campaign.physics.compilation import inlined
+from campaign.physics.elementary import nearest, where
+from campaign.physics.friction_lines import ask
+from campaign.physics.rows import (
+    CURRENT,
+    CURRENT_SENSOR,
+    ENCODER,
+    GYRO,
+    KEPT_CURRENT,
+    KEPT_ENCODER,
+    KEPT_GYRO,
+    KEPT_INTEGRAL,
+    KEPT_LOAD_RATE,
+    KEPT_MOTOR_RATE,
+    KEPT_POINTING,
+    KEPT_RESOLVER,
+    KEPT_TORQUE,
+    MEAN,
+    MEETS_PER_STEP,
+    MEETS_POSITION,
+    MEETS_RATE_END,
+    MEETS_RATE_MEAN,
+    MEETS_RATE_START,
+    MEETS_STEP,
+    RATE,
+    RELATIVE_ANGLE,
+    RESOLVER,
+)
+from campaign.physics.step_function import AN_INSTANT
+from campaign.physics.vector import rows_on_the_stack
+
+
+@inlined
+def sample(
+    lanes: int,
+    controller: Controller,
+    compensation: Elements,
+    memory: Memory,
+    x: Array,
+    command: float,
+    noise: Array,
+    reading: int,
+) -> None:
+    """One sample of the controller: read the sensors, put the current command that is next.
+
+    x: states of the plant.   command: rad/s, or N m where there is no rate loop.
+    reading: of `noise`, counted from where it begins.
+    """
+    number = memory.counters[1]
+    memory.counters[1] += 1
+    ring = memory.readings.shape[1]
+    place = number % ring
+    _read_sensors(controller, memory.readings, place, x, noise, reading)
+    if number == 0:
+        _stand_still(memory.readings)
+    gyro = _reading(controller, memory.readings, GYRO, place)
+    encoder = _reading(controller, memory.readings, ENCODER, place)
+    resolver = _reading(controller, memory.readings, RESOLVER, place) / controller.ratio
+    current = _reading(controller, memory.readings, CURRENT_SENSOR, place)
+    memory.kept[KEPT_CURRENT] = current
+    gyro = _rates(controller, memory.kept, number == 0, gyro, encoder, resolver)
+    motor_torque = controller.torque_per_current * current
+    torque = _compensate(lanes, controller, compensation, memory, gyro, motor_torque)
+    memory.kept[KEPT_TORQUE] = torque
+    _command(controller, memory, number, command, gyro, torque)
+
+
+@inlined
+def _read_sensors(
+    controller: Controller, readings: Array, place: int, x: Array, noise: Array, reading: int
+) -> None:
+    """What the sensors read now: the truth, with noise, in whole counts; into their ring."""
+    readings[GYRO, place] = x[RATE]
+    readings[ENCODER, place] = x[RELATIVE_ANGLE]
+    readings[RESOLVER, place] = x[RELATIVE_ANGLE] * controller.ratio
+    readings[CURRENT_SENSOR, place] = x[CURRENT]
+    for s in range(4):
+        value, count = readings[s, place], controller.resolution[s]
+        if controller.noisy[s] >= 0:
+            value = value + noise[reading, controller.noisy[s]]
+        if controller.counts[s] > 0:
+            counted = nearest(value / where(count > 0.0, count, 1.0)) * count
+            value = where(count > 0.0, counted, value)
+        readings[s, place] = value
+
+
+@inlined
+def _stand_still(readings: Array) -> None:
+    """Before the first sample everything stood as it does then."""
+    for s in range(4):
+        for before in range(1, readings.shape[1]):
+            readings[s, before] = readings[s, 0]
+
+
+@inlined
+def _reading(controller: Controller, readings: Array, sensor: int, place: int) -> Any:
+    """What the controller has of a sensor by now."""
+    delayed = place - controller.delay[sensor]
+    return readings[sensor, delayed if delayed >= 0 else delayed + readings.shape[1]]
+
+
+@inlined
+def _rates(
+    controller: Controller,
+    kept: Array,
+    first: bool,
+    gyro: float,
+    encoder: float,
+    resolver: float,
+) -> Any:
+    """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates.
+
+    Returns the rate that the loop is fed by: the gyro's, or the encoder's where that does it.
+    """
+    if first:
+        kept[KEPT_ENCODER], kept[KEPT_RESOLVER] = encoder, resolver
+    pole = controller.filter_pole
+    share = (1.0 - pole) / controller.period
+    load_rate = pole * kept[KEPT_LOAD_RATE] + share * (encoder - kept[KEPT_ENCODER])
+    motor_rate = pole * kept[KEPT_MOTOR_RATE] + share * (resolver - kept[KEPT_RESOLVER])
+    kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE] = load_rate, motor_rate
+    rate = load_rate if controller.fed_by_encoder else gyro
+    if not first:
+        turned = 0.5 * controller.period * (kept[KEPT_GYRO] + rate)
+        kept[KEPT_POINTING] = kept[KEPT_POINTING] * controller.pointing_pole + turned
+    kept[KEPT_ENCODER], kept[KEPT_RESOLVER], kept[KEPT_GYRO] = encoder, resolver, rate
+    return rate
+
+
+@inlined
+def _compensate(
+    lanes: int,
+    controller: Controller,
+    compensation: Elements,
+    memory: Memory,
+    gyro: float,
+    motor_torque: float,
+) -> float:
+    """The torque of the compensation: its linear block, and its friction models now."""
+    relative, d = memory.kept[KEPT_LOAD_RATE], controller.d
+    torque: float = d[0] * gyro + d[1] * motor_torque + d[2] * relative
+    torque = _linear(lanes, controller, memory.linear, gyro, motor_torque, relative, torque)
+    if compensation.viscous.shape[0] > 0:
+        _meet(compensation, memory.kept)
+        _ask_over(compensation, controller.period)
+        _ask_over(compensation, AN_INSTANT)
+        torque = torque + compensation.answer[MEAN]
+        for e in range(compensation.viscous.shape[0]):
+            rate = compensation.met[compensation.side[e], MEETS_RATE_END]
+            torque = torque + compensation.viscous[e] * rate
+    return torque
+
+
+@inlined
+def _meet(compensation: Elements, kept: Array) -> None:
+    """Give the friction models the newest filtered rates and the newest angle.
+
+    A rate is constant: a difference of angles is the mean rate of the sample that has ended.
+    """
+    load, motor = compensation.met[0], compensation.met[1]
+    for row in (MEETS_RATE_START, MEETS_RATE_MEAN, MEETS_RATE_END):
+        load[row], motor[row] = kept[KEPT_LOAD_RATE], kept[KEPT_MOTOR_RATE]
+    load[MEETS_POSITION], motor[MEETS_POSITION] = kept[KEPT_ENCODER], kept[KEPT_ENCODER]
+
+
+@inlined
+def _ask_over(compensation: Elements, duration: Array | float) -> None:
+    """Ask the friction models over `duration` (s).
+
+    Over the sample that has ended it advances their states; then, over an instant, it gives the
+    torque of the states and rates that are there now.
+    """
+    load, motor = compensation.met[0], compensation.met[1]
+    load[MEETS_STEP], motor[MEETS_STEP] = duration, duration
+    load[MEETS_PER_STEP], motor[MEETS_PER_STEP] = 1.0 / duration, 1.0 / duration
+    ask(compensation)
+
+
+@inlined
+def _command(
+    controller: Controller,
+    memory: Memory,
+    number: int,
+    command: float,
+    gyro: float,
+    torque: float,
+) -> None:
+    """The current command of this sample, into its ring; the one that is next comes out of it."""
+    kept, outputs = memory.kept, memory.outputs
+    place = number % outputs.shape[0]
+    if controller.closes_rate_loop:
+        error = command - gyro
+        integral = kept[KEPT_INTEGRAL] + controller.integral * controller.period * error
+        kept[KEPT_INTEGRAL] = integral
+        current = controller.proportional * error + integral
+    else:
+        current = command / controller.torque_per_current
+    outputs[place] = current + torque / controller.torque_per_current
+    memory.held[0] = outputs[place + 1 if place + 1 < outputs.shape[0] else 0]
+
+
+@inlined
+def _linear(
+    lanes: int,
+    controller: Controller,
+    state: Array,
+    gyro: float,
+    motor_torque: float,
+    relative: float,
+    torque: float,
+) -> float:
+    """Advance the linear compensation over a sample; `torque` and its torque together."""
+    order, b, new = state.shape[0], controller.b, rows_on_the_stack(lanes)
+    for row in range(order):
+        torque = torque + controller.c[row] * state[row]
+        total = b[row, 0] * gyro + b[row, 1] * motor_torque + b[row, 2] * relative
+        for column in range(order):
+            total = total + controller.a[row, column] * state[column]
+        new[row] = total
+    for row in range(order):
+        state[row] = new[row]
+    return torque

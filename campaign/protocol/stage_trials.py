@@ -1,0 +1,172 @@
+"""From a stage's requests to checked trials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
+from campaign.physics.bench import Bench
+from campaign.physics.limits import margins
+from campaign.physics.plan_loops import loops_used
+from campaign.physics.resolution import resolution_margins
+from campaign.protocol.expand import (
+    channels_of,
+    check_recording,
+    first_line,
+    place_hash,
+    samples_of,
+)
+from campaign.protocol.limit_check import in_display_units, one_count
+from campaign.protocol.loop_check import in_words
+from campaign.protocol.schema import ExperimentKind
+from campaign.protocol.stages import PlannedStage
+from campaign.protocol.swept_value_text import told_point
+from campaign.trial import Most, Trial, TrialRequest, canonical_json
+
+ROUNDING = 1e-9
+"""of a stage's duration that is no more than was said."""
+
+Refusal = Callable[[Trial], str]
+"""Why a trial cannot be executed; empty when it can."""
+
+
+class TooMuchError(Exception):
+    """A stage asks for more than it said that it would."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The trials of a stage.
+
+    Attributes:
+        trials: in the order of execution, numbered.
+        refused: those that may not be executed: label, and why.
+    """
+
+    trials: tuple[Trial, ...]
+    refused: tuple[tuple[str, str], ...] = ()
+
+
+def follow(
+    stage: PlannedStage,
+    experiment: ExperimentKind,
+    requests: Iterable[TrialRequest],
+    planned: Trial,
+    first: int,
+    refusal: Refusal,
+) -> Followed:
+    """The trials for which a stage asks; one that may not be executed is refused by itself.
+
+    Args:
+        requests: as the experiment yields them; no more are taken than the stage may ask for.
+        planned: a planned trial of the same point, whose bench, options and setup they share.
+        first: number of the first of them.
+        refusal: what a backend says of a trial.
+
+    Raises TooMuchError when there are more than were planned for; what `requests` raises.
+    """
+    asked = list(islice(requests, stage.most.trials + 1))
+    _check_size(stage.most, asked)
+    bench = Bench.model_validate(planned.bench, context={"si": True})
+    trials: list[Trial] = []
+    refused: list[tuple[str, str]] = []
+    for index, request in enumerate(asked):
+        trial = _trial(stage, experiment, request, planned, first + len(trials), index)
+        try:
+            own = bench
+            if request.bench is not None:
+                own = Bench.model_validate(request.bench, context={"si": True})
+                if planned.truth:
+                    raise ValueError("it wants a bench of its own, and the truth is another's")
+                trial = trial.model_copy(update={"bench": own.model_dump(mode="json")})
+            if swept := request.point.keys() & stage.point.keys():
+                raise ValueError(f"it chooses {', '.join(sorted(swept))}, which is swept")
+            _check(trial, own, experiment)
+            why = refusal(trial)
+        except (ValueError, ArithmeticError) as error:
+            why = first_line(error)
+        if why:
+            refused.append((trial.label, why))
+        else:
+            trials.append(trial)
+    return Followed(tuple(trials), tuple(refused))
+
+
+def _check_size(most: Most, asked: Sequence[TrialRequest]) -> None:
+    if len(asked) > most.trials:
+        raise TooMuchError(f"it asks for more than the {most.trials} trials it said at most")
+    duration = sum(request.task.duration for request in asked)
+    if duration > most.duration * (1.0 + ROUNDING):
+        raise TooMuchError(
+            f"its trials take {duration:.4g} s, and it said {most.duration:.4g} s at most"
+        )
+    samples = sum(samples_of(request.task) for request in asked)
+    if samples > most.samples:
+        raise TooMuchError(
+            f"its trials record {samples} samples, and it said {most.samples} at most"
+        )
+
+
+def _trial(
+    stage: PlannedStage,
+    experiment: ExperimentKind,
+    request: TrialRequest,
+    planned: Trial,
+    number: int,
+    index: int,
+) -> Trial:
+    """A trial of a stage. Its seed follows from its place, whatever else was refused or executed:
+    the test's seed, the point, the stage, and its index among what the stage asks for.
+    """
+    requires, can_use = channels_of(experiment, request)
+    with axis_terms(sides_in(planned.bench)):
+        note = in_axis_terms(request.note)
+        told = told_point(experiment.options, {}, request.point)
+    return Trial.model_construct(  # as in a plan: what there is to check of it, `_check` does
+        number=number,
+        test=planned.test,
+        kind=planned.kind,
+        role=request.role,
+        point={**stage.point, **request.point},
+        told={**planned.told, **told},
+        options=planned.options,
+        seed=place_hash("stage", stage.seed, stage.point, stage.number, index),
+        bench=planned.bench,
+        truth=planned.truth,
+        task=request.task,
+        note=note,
+        setup=planned.setup,
+        set_by_operator=planned.set_by_operator,
+        requires=requires,
+        can_use=can_use,
+        windows=request.windows,
+    )
+
+
+def _check(trial: Trial, bench: Bench, experiment: ExperimentKind) -> None:
+    """ValueError with every reason for which a plan with this trial would be refused."""
+    name, names = trial.task.compensation, ["none", *bench.compensation]
+    if name not in names:
+        raise ValueError(f"the bench has no compensation {name!r}; it has {', '.join(names)}")
+    check_recording(trial.task)
+    canonical_json(trial.model_dump(mode="json"))  # the journal has room for finite numbers only
+    if reasons := [*_broken(trial, bench), *_unstable(trial, bench, experiment)]:
+        raise ValueError("; ".join(reasons))
+
+
+def _broken(trial: Trial, bench: Bench) -> Iterator[str]:
+    for margin in (*margins(bench, trial.task), *resolution_margins(bench, trial.task)):
+        if margin.broken:
+            value, bound = in_display_units(margin)
+            what = one_count(margin) if margin.sensor else f"{margin.called} up to {value}"
+            yield f"{what}, limit {bound}"
+
+
+def _unstable(trial: Trial, bench: Bench, experiment: ExperimentKind) -> Iterator[str]:
+    if not experiment.seeks_instability:
+        for use in loops_used([(trial.number, trial.task, bench)]):
+            if not use.margins.stable:
+                yield f"its loop is unstable: {in_words(use)}"
+                return

@@ -1,0 +1,234 @@
+"""Covariates of trends: time, order, temperature, a tag, another number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaign.channels import TEMPERATURE
+from campaign.errors import UsageError
+from campaign.text import pretty_unit
+from campaign.trends.members import Member
+from campaign.trends.series import Series
+from campaign.trial import Outcome, Role
+from campaign.units import split_quantity
+
+TIME, ORDER = "time", "order"
+DAY = 86_400.0
+MONTH = 30.4375
+"""days: a twelfth of a year of 365.25."""
+ZERO_CELSIUS = 273.15
+BLURRED = 0.1
+"""Share of the variance of a covariate that its own errors may be: beyond, slopes come out too
+flat by more than a tenth."""
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """What numbers are held against.
+
+    Attributes:
+        label: at an axis.
+        unit: of its values.
+        per: what an effect is told per: `month`, `K`.
+        step: that, in `unit`.
+        ordered: whether numbers can jump along it.
+        at: its value for a test of a run ("": for all of it); NaN where nobody knows it.
+        of: the number that it is, where it is one of those that the runs found.
+    """
+
+    name: str
+    label: str
+    unit: str
+    per: str
+    step: float
+    ordered: bool
+    at: Callable[[Member, str], float]
+    of: Series | None = None
+
+
+def covariate_of(over: str, members: Sequence[Member], series: Sequence[Series]) -> Covariate:
+    """What `--over` means. Raises UsageError with what there is where it means nothing."""
+    if over == TIME:
+        return _time(members)
+    if over == ORDER:
+        return Covariate(
+            ORDER, "Run", "", "run", 1.0, ordered=True, at=lambda member, _: float(member.number)
+        )
+    tags = [_tagged(member, over) for member in members]
+    if over == TEMPERATURE:
+        return _temperature(members)
+    if any(tag is not None for tag in tags):
+        return _tag(over, members)
+    return _finding(over, members, series)
+
+
+def _time(members: Sequence[Member]) -> Covariate:
+    first = members[0].created
+    if members[-1].created == first:
+        raise UsageError("all runs began at the same time; `--over order` takes them as they come")
+    days = {m.number: (m.created - first).total_seconds() / DAY for m in members}
+    # Within days nobody asks for a drift per month.
+    last = days[members[-1].number]
+    per, step = ("month", MONTH) if last > 14 else ("day", 1.0) if last > 0.5 else ("h", 1 / 24)
+    label, unit, size = ("Time since", "d", 1.0) if last > 0.5 else ("Time since", "h", 24.0)
+    return Covariate(
+        TIME,
+        f"{label} {first:%Y-%m-%d %H:%M} UTC",
+        unit,
+        per,
+        step * size,
+        ordered=True,
+        at=lambda member, _: size * days[member.number],
+    )
+
+
+def _temperature(members: Sequence[Member]) -> Covariate:
+    known: dict[tuple[int, str], float] = {}
+
+    def at(member: Member, test: str) -> float:
+        key = (member.number, test)
+        if key not in known:
+            known[key] = _measured_temperature(member, test)
+        return known[key]
+
+    if not any(math.isfinite(at(member, "")) for member in members):
+        raise UsageError(
+            "no run has a channel `temperature`, or a tag such as `temperature=23.5`: nothing is "
+            "known to follow"
+        )
+    return Covariate(TEMPERATURE, "Temperature", "degC", "K", 1.0, ordered=False, at=at)
+
+
+def _measured_temperature(member: Member, test: str) -> float:
+    """degC: median over the test's trials of their medians; else what a tag says.
+
+    Raises ArchiveError for a temperature that is damaged; what the analyses found so is left out.
+    """
+    found = []
+    for each in (trial for one in member.tests for trial in one.trials):
+        trial, completed = each.trial, each.ending.outcome is Outcome.COMPLETED
+        if not completed or trial.role is not Role.MEASUREMENT or test not in ("", trial.test):
+            continue
+        unit = next((c.unit for c in each.channels() if c.name == TEMPERATURE), None)
+        if unit is None or each.not_kept:
+            continue
+        samples = each.recording()[TEMPERATURE]
+        samples = samples[np.isfinite(samples)]
+        if samples.size:
+            found.append(float(np.median(samples)) - (ZERO_CELSIUS if unit == "K" else 0.0))
+    if found:
+        return float(np.median(found))
+    tag = _tagged(member, TEMPERATURE)
+    if tag is None:
+        return math.nan
+    value, unit = tag
+    if unit in ("", "degC", "°C", "C"):
+        return value
+    if unit == "K":
+        return value - ZERO_CELSIUS
+    raise UsageError(f"{member.name}: tag temperature={value:g} {unit}: write it in degC or in K")
+
+
+def _tagged(member: Member, name: str) -> tuple[float, str] | None:
+    """Number and unit of a tag `name=...`; None where there is none, or no number in it."""
+    for tag in member.run.header.tags:
+        key, sign, text = tag.partition("=")
+        if sign and key.strip() == name:
+            try:
+                value, unit = split_quantity(text.strip())
+            except ValueError:
+                return None
+            return (value, unit.strip()) if math.isfinite(value) else None
+    return None
+
+
+def _tag(name: str, members: Sequence[Member]) -> Covariate:
+    from campaign.units import factor
+
+    told = {m.number: tag for m in members if (tag := _tagged(m, name)) is not None}
+    unit = next(iter(told.values()))[1]
+    values: dict[int, float] = {}
+    for number, (value, own) in told.items():
+        try:
+            values[number] = value if own == unit else value * float(factor(own, unit))
+        except ValueError:
+            raise UsageError(
+                f"{members[number - 1].name}: its tag {name} is in {own or 'no unit'}, "
+                f"that of others in {unit or 'no unit'}"
+            ) from None
+    return Covariate(
+        name,
+        name[:1].upper() + name[1:],
+        unit,
+        pretty_unit(unit) or f"unit of {name}",
+        1.0,
+        ordered=False,
+        at=lambda member, _: values.get(member.number, math.nan),
+    )
+
+
+def _finding(over: str, members: Sequence[Member], series: Sequence[Series]) -> Covariate:
+    """Another number of the same runs: by its quantity, or by the words that single it out."""
+    wanted = over.replace("_", " ").lower().split()
+    named = [s for s in series if s.quantity == over]
+    found = named or [
+        s
+        for s in series
+        if all(w in f"{s.test} {s.quantity} {s.name}".replace("_", " ").lower() for w in wanted)
+    ]
+    if not found:
+        tags = sorted({t.partition("=")[0] for m in members for t in m.run.header.tags if "=" in t})
+        quantities = list(dict.fromkeys(s.quantity for s in series))
+        more = " ..." if len(quantities) > 8 else ""
+        raise UsageError(
+            f"--over {over!r}: is neither time, order nor temperature, nor a tag NAME=NUMBER "
+            f"({', '.join(tags) or 'there are none'}), nor found by the runs "
+            f"({', '.join(quantities[:8])}{more})"
+        )
+    if len(found) > 1:
+        told = "; ".join(f"{s.test}: {s.name}" for s in found[:6])
+        raise UsageError(
+            f"--over {over!r}: means {len(found)} numbers; add words of one of them ({told})"
+        )
+    return _of_series(found[0])
+
+
+def _of_series(one: Series) -> Covariate:
+    if one.reason:
+        raise UsageError(f"--over: {one.name}: {one.reason}")
+    own, values = np.diag(one.own()[0]), one.values
+    if one.bare or float(np.mean(own)) > BLURRED * float(np.var(values, ddof=1)):
+        raise UsageError(
+            f"--over: {one.name} varies too little between runs for how well each knows it: "
+            "trends along it would come out too flat"
+        )
+    from campaign.units import convert
+
+    shown = {
+        p.member.number: float(convert(p.estimate.value, one.unit, one.display)) for p in one.points
+    }
+    return Covariate(
+        f"{one.test}: {one.name}",
+        one.name[:1].upper() + one.name[1:],
+        one.display,
+        pretty_unit(one.display) or "unit",
+        1.0,
+        ordered=False,
+        at=lambda member, _: shown.get(member.number, math.nan),
+        of=one,
+    )
+
+
+def together(members: Sequence[Member], one: Covariate, other: Covariate) -> float:
+    """Correlation of two covariates over the runs; NaN where fewer than three know both."""
+    pairs: Mapping[int, tuple[float, float]] = {
+        m.number: (one.at(m, ""), other.at(m, "")) for m in members
+    }
+    known = np.array([pair for pair in pairs.values() if np.all(np.isfinite(pair))])
+    if len(known) < 3 or np.any(np.ptp(known, axis=0) == 0):
+        return math.nan
+    return float(np.corrcoef(known.T)[0, 1])

@@ -1,0 +1,113 @@
+"""Figures of numbers over runs: points with intervals, lines, jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.estimation.difference import in_unit
+from campaign.estimation.intervals import LEVEL
+from campaign.result import Axis, Curve, Figure, Mark, Panel
+from campaign.trends.covariates import Covariate
+from campaign.trends.rig_trends import Followed, Trends, Verdict
+from campaign.units import convert
+
+Array = NDArray[np.float64]
+
+ALONG = 25
+"""Places at which a line's band is worked out: it is a smooth curve."""
+SMALL = 12
+"""Most small panels; the tables have all numbers."""
+TITLE = 38
+"""Letters of a small panel's title."""
+
+
+def declared_figure(each: Followed, trends: Trends, headline: str, place: int) -> Figure:
+    """One number that was declared to change."""
+    return Figure(
+        f"declared-{place}",
+        each.series.name[:1].upper() + each.series.name[1:],
+        f"{headline}. Bars are 95 % intervals of each run by itself"
+        + ("; the band is that of the line." if each.verdict is not Verdict.JUMPED else
+           "; lines are the levels before and behind."),
+        headline,
+        (_panel(each, trends.covariate, small=False),),
+    )  # fmt: skip
+
+
+def small_multiples(rest: Sequence[Followed], covariate: Covariate) -> Figure | None:
+    """What was judged and shows nothing, the smallest p values first; None without any."""
+    shown = rest[:SMALL]
+    if not shown:
+        return None
+    more = f" {len(rest) - SMALL} more are in the table." if len(rest) > SMALL else ""
+    return Figure(
+        "no-trend-shown",
+        "No trend shown",
+        "Points are runs with their 95 % intervals, lines what a trend would be, and bands its "
+        f"95 % interval: as far as a horizontal line fits into them.{more}",
+        "; ".join(each.series.name for each in shown),
+        tuple(_panel(each, covariate, small=True) for each in shown),
+        across=2,
+    )
+
+
+def _panel(each: Followed, covariate: Covariate, *, small: bool) -> Panel:
+    series = each.series
+    found = [in_unit(point.estimate, series.display) for point in series.points]
+    curves = [Curve.of(each.x, found, "" if small else "runs", "measured")]
+    marks: list[Mark] = []
+    if each.verdict is Verdict.JUMPED:
+        curves += _levels(each)
+        marks = [_mark(each, jump.place) for jump in each.jumps]
+    elif each.change is not None and each.change.trend is not None:
+        curves.append(_line(each, "" if small else "trend"))
+    name, _, words = (series.name[:1].upper() + series.name[1:]).partition(", ")
+    title = f"{series.test}: {words}" if words else series.test
+    title = title if len(title) <= TITLE else f"{title[: TITLE - 1]}…"
+    return Panel(
+        Axis(covariate.label if not small else _short(covariate), covariate.unit),
+        Axis(name, series.display),
+        tuple(curves),
+        title if small else "",
+        tuple(marks),
+    )
+
+
+def _short(covariate: Covariate) -> str:
+    return "Time" if covariate.label.startswith("Time since") else covariate.label
+
+
+def _line(each: Followed, label: str) -> Curve:
+    assert each.change is not None and each.change.trend is not None  # noqa: S101, PT018
+    trend = each.change.trend
+    x = np.linspace(float(np.min(each.x)), float(np.max(each.x)), ALONG)
+    own = float(convert(1.0, each.series.unit, each.series.display))
+    known = [trend.at(float(at)) for at in x]
+    ends = own * np.array([mixture.interval(LEVEL) for mixture in known])
+    y = own * np.array([mixture.value for mixture in known])
+    low, high = np.minimum(*ends.T), np.maximum(*ends.T)
+    return Curve(x, y, label, "fit", "line", low=low, high=high)
+
+
+def _levels(each: Followed) -> list[Curve]:
+    """The mean of each stretch between jumps, weighed as in the search for them."""
+    values = np.array([
+        in_unit(point.estimate, each.series.display).value for point in each.series.points
+    ])  # fmt: skip
+    places = [0, *(jump.place for jump in each.jumps), len(values)]
+    curves = []
+    for n, (first, stop) in enumerate(pairwise(places)):
+        level = float(np.mean(values[first:stop]))
+        ends = each.x[[first, stop - 1]]
+        curves.append(Curve(ends, np.array([level, level]), "" if n else "mean level", "fit"))
+    return curves
+
+
+def _mark(each: Followed, place: int) -> Mark:
+    before, behind = float(each.x[place - 1]), float(each.x[place])
+    number = each.series.points[place].member.number
+    return Mark(f"before run {number}", x=0.5 * (before + behind), series="alternative")

@@ -1,0 +1,214 @@
+"""Analyzed runs of one rig in order, and their differences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+from campaign.api.analysis import AnalysedTest, analyse_run, source_of
+from campaign.archive import RunReader
+from campaign.archive.reading.damage import Damage
+from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
+from campaign.comparison.circumstances import Change, changes
+from campaign.comparison.draws import SIMULATION
+from campaign.comparison.same_quantity import pair_tests
+from campaign.comparison.shared_systematics import constants, source_called
+from campaign.errors import UsageError
+from campaign.experiments.interface import Experiment
+from campaign.trial import Outcome, Role
+
+LEAST = 3
+"""Runs: two can be compared, and show no trend."""
+LISTED = 6
+"""Most runs that a message names."""
+OWN_OF_EACH = ("operator", "machine", "status", "title", "seed")
+"""What differs between runs and explains no number of theirs."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One of the runs.
+
+    Attributes:
+        number: its place in time, from 1.
+        tests: without figures, of which 200 runs would have too many.
+        constants: of the bench, by the name of the systematic part that they make; what is the
+            same text in two runs is the same constant.
+        exchanged: those of them that are another piece's from this run on, whatever the bench says.
+    """
+
+    number: int
+    run: RunReader
+    created: datetime
+    tests: tuple[AnalysedTest, ...]
+    constants: Mapping[str, str] = field(default_factory=dict)
+    exchanged: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return self.run.name
+
+    @property
+    def sides(self) -> Sides:
+        """Of the rig, in the words of which it is told."""
+        return next((test.sides for test in self.tests if test.bench), BOTH_ROTARY)
+
+    @property
+    def damaged(self) -> tuple[Damage, ...]:
+        """What of the run is damaged, as far as anybody looked at it."""
+        found = (damage for test in self.tests for damage in test.damaged)
+        return tuple(dict.fromkeys((*self.run.damaged, *found)))
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why tests of it have no result."""
+        return tuple(f"{self.name}: {t.name}: {t.problem}" for t in self.tests if t.problem)
+
+    @cached_property
+    def identical(self) -> Mapping[str, tuple[str, ...]]:
+        """By test, what determines the samples of its simulated trials; rigs never repeat."""
+        return {test.name: prints for test in self.tests if (prints := _fingerprints(test))}
+
+
+def members_of(
+    runs: Sequence[RunReader], experiments: Mapping[str, Experiment]
+) -> tuple[Member, ...]:
+    """The runs in the order of their beginnings, analysed.
+
+    Raises UsageError for fewer than three, for a run that is named twice, and for runs of several
+    rigs.
+    """
+    _check(runs)
+    begun = sorted(runs, key=lambda run: (_begun(run), run.name))
+    _of_one_rig(begun)
+    return tuple(_member(n, run, experiments) for n, run in enumerate(begun, start=1))
+
+
+def with_exchanged(
+    members: Sequence[Member], exchanged: Sequence[tuple[str, Path]]
+) -> tuple[Member, ...]:
+    """The same runs, told what no bench file says.
+
+    exchanged: systematic parts, each with the path of the run from which on its piece was another
+        one of its kind: an error that runs before and behind do not have in common.
+
+    Raises UsageError for what is no constant of these runs, or none of the runs but the first.
+    """
+    for name, path in exchanged:
+        told = f"--exchanged {name}@{path.stem}"
+        known = dict.fromkeys(source for member in members for source in member.constants)
+        source = source_called(name, known, members[0].sides)
+        if source is None:
+            with axis_terms(members[0].sides):
+                there = ", ".join(map(in_axis_terms, known)) or "nothing"
+            raise UsageError(f"{told}: {name!r} is none of {there}")
+        first = next((each.number for each in members if each.run.path == path), None)
+        if first is None:
+            raise UsageError(f"{told}: none of the runs that are followed")
+        if first == 1:
+            raise UsageError(f"{told}: the first run; name the first one with the new piece")
+        members = [
+            each if each.number < first else _with_another(each, source, first) for each in members
+        ]
+    return tuple(members)
+
+
+def _with_another(member: Member, source: str, first: int) -> Member:
+    if source not in member.constants:
+        return member
+    constant = f"{member.constants[source]}, exchanged before run {first}"
+    new = (source,) if member.number == first else ()
+    return replace(
+        member,
+        constants={**member.constants, source: constant},
+        exchanged=(*member.exchanged, *new),
+    )
+
+
+def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
+    """For each run but the first, what differs from the one before it besides what it found."""
+    return tuple(
+        tuple(
+            change
+            for change in changes(one.run, other.run, pair_tests(one.tests, other.tests))
+            if change.path not in OWN_OF_EACH
+        )
+        + tuple(_exchanges(other))
+        for one, other in pairwise(members)
+    )
+
+
+def _exchanges(member: Member) -> Iterator[Change]:
+    for source in member.exchanged:
+        with axis_terms(member.sides):
+            yield Change("rig", in_axis_terms(source), "one piece", "another")
+
+
+def _check(runs: Sequence[RunReader]) -> None:
+    seen: dict[str, RunReader] = {}
+    for run in runs:
+        for key in (str(run.path.resolve()), run.root):
+            if key and key in seen:
+                raise UsageError(f"{seen[key].path} and {run.path} are the same run")
+            seen[key] = run
+    if len(runs) == 2:
+        raise UsageError(
+            "two runs show no trend; name three or more, or hold them against each other with "
+            f"`campaign compare {runs[0].name} {runs[1].name}`"
+        )
+    if len(runs) < LEAST:
+        raise UsageError("name three runs of one rig or more; one shows no trend")
+
+
+def _of_one_rig(runs: Sequence[RunReader]) -> None:
+    """Raises UsageError where benches, or what executed the trials, are not the same."""
+    for what, of in (("different rigs", _benches), ("different kinds", _kinds)):
+        groups: dict[str, list[str]] = {}
+        for run in runs:
+            groups.setdefault(of(run), []).append(run.name)
+        if len(groups) > 1:
+            told = "; ".join(f"{key}: {_listed(names)}" for key, names in groups.items())
+            raise UsageError(f"the runs are of {what}, which no trend leads through ({told})")
+
+
+def _benches(run: RunReader) -> str:
+    names = {str(t.trial.bench.get("name", "")) for t in run.trials}
+    return "bench " + " and ".join(sorted(names)) if names else "no bench"
+
+
+def _kinds(run: RunReader) -> str:
+    return source_of(run) or "origin of the samples not stated"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
+
+
+def _begun(run: RunReader) -> datetime:
+    return datetime.fromisoformat(run.header.created).astimezone(UTC)
+
+
+def _member(number: int, run: RunReader, experiments: Mapping[str, Experiment]) -> Member:
+    tests = tuple(
+        replace(test, result=replace(test.result, figures=()))
+        for test in analyse_run(run, experiments)
+    )
+    known: dict[str, str] = {}
+    for test in tests:
+        known |= constants(test, run.header.truth.plants)
+    return Member(number, run, _begun(run), tests, known)
+
+
+def _fingerprints(test: AnalysedTest) -> tuple[str, ...]:
+    if test.source != SIMULATION:
+        return ()
+    return tuple(
+        each.trial.fingerprint
+        for each in test.trials
+        if each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
+    )

@@ -1,0 +1,109 @@
+"""Parameters of one model structure fitted to all runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from campaign.errors import UsageError
+from campaign.experiments.interface import Experiment, bench_of
+from campaign.identify.identification import Section, fitted_again, identify
+from campaign.identify.material import Chosen
+from campaign.trends.members import Member
+from campaign.trends.series import TWIN, Point, Series, add_point, made
+from campaign.trial import Outcome, Role
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What one method made of the runs.
+
+    Attributes:
+        problems: runs that it could not use, and why.
+    """
+
+    method: str
+    series: tuple[Series, ...]
+    problems: tuple[str, ...]
+
+
+def fit_models(
+    members: Sequence[Member], known: Mapping[str, Experiment], models: Sequence[str]
+) -> tuple[Fitted, ...]:
+    """Each method's parameters over the runs.
+
+    Raises UsageError for names that no method has.
+    """
+    unknown = [name for name in models if name not in known]
+    if unknown:
+        raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(known)}")
+    return tuple(_fitted(members, known, name) for name in dict.fromkeys(models))
+
+
+def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> Fitted:
+    first: Section | None = None
+    found: dict[str, tuple[Section, list[Point], list[str]]] = {}
+    problems: list[str] = []
+    seen: dict[tuple[str, ...], Member] = {}
+    for member in members:
+        why, section = _section(member, known, name, first)
+        if section is None or section.result is None:
+            problems.append(f"{member.name}: {name}: {why}")
+            continue
+        if first is None:
+            first = section
+            found = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
+        prints = tuple(text for own in member.identical.values() for text in own)
+        twin = seen.setdefault(prints, member) if prints else member
+        same = "" if twin is member else f"{TWIN} {twin.name}"
+        for parameter in section.identified.parameters:
+            if parameter.estimate.name in found:
+                _, points, left_out = found[parameter.estimate.name]
+                estimate = parameter.estimate
+                add_point(points, left_out, member, "", estimate, _unit(found, estimate.name), same)
+    series = tuple(
+        made(
+            points,
+            left_out,
+            test=name,
+            title=known[name].model.summary,
+            quantity=each,
+            name=each.replace("_", " "),
+            unit=_unit(found, each),
+            display=_display(section, each),
+        )
+        for each, (section, points, left_out) in found.items()
+    )
+    return Fitted(name, series, tuple(problems))
+
+
+def _section(
+    member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
+) -> tuple[str, Section | None]:
+    """The method's section of a run, by the structure that the first one settled on."""
+    trials = tuple(
+        each
+        for each in member.run.trials
+        if each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
+    )
+    if not trials:
+        return "no trial was completed", None
+    chosen = Chosen(member.run, "", trials)
+    try:
+        if first is not None:
+            section = fitted_again(first, bench_of(trials[0].trial), chosen)
+        else:
+            (section,) = identify(chosen, known, models=[name]).sections
+    except UsageError as error:
+        return str(error), None
+    return section.problem, section
+
+
+def _unit(found: Mapping[str, tuple[Section, list[Point], list[str]]], name: str) -> str:
+    parameters = found[name][0].identified.parameters
+    return next(p.estimate.unit for p in parameters if p.estimate.name == name)
+
+
+def _display(section: Section, name: str) -> str:
+    own = next(p for p in section.identified.parameters if p.estimate.name == name)
+    return own.display or own.estimate.unit

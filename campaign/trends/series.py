@@ -1,0 +1,257 @@
+"""One number of a rig over its runs, with its uncertainty.
+
+Findings go together as `campaign compare` pairs them. Of the errors of each point, those that all
+runs have in common shift all points alike: no trend is made or hidden by them, and they take no
+part. A constant of the bench that was determined anew between runs shifts those alike that rest on
+the same value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.api.analysis import AnalysedTest
+from campaign.comparison.not_judged import DERIVED, FOLLOWS
+from campaign.comparison.quantity_words import condition_words, display_unit, name_here
+from campaign.comparison.same_quantity import pair_tests
+from campaign.estimate import Estimate, Origin
+from campaign.estimation.contrast import is_student
+from campaign.estimation.difference import BOUNDS, in_unit
+from campaign.estimation.intervals import LEVEL, student
+from campaign.estimation.trends.own_errors import moderated
+from campaign.reason import NONE, Cause, Reason
+from campaign.references.verdict import WRONG_MODEL
+from campaign.result import Finding, Value
+from campaign.trends.members import LEAST, Member
+
+Array = NDArray[np.float64]
+
+TWIN = "the same simulation as"
+TOO_FEW_RUNS = Cause("too few runs", "found in {runs} runs{lost}: three are the least")
+SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last digit")
+
+
+@dataclass(frozen=True)
+class Point:
+    """The number as one run found it.
+
+    Attributes:
+        member: of which run.
+        test: the test of that run; "" for all of it.
+        estimate: in the unit of its series.
+    """
+
+    member: Member
+    test: str
+    estimate: Estimate
+
+
+@dataclass
+class _Collected:
+    """A finding of the reference and what the runs have of it."""
+
+    test: AnalysedTest
+    finding: Finding
+    points: list[Point] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    wrong: list[Reason] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Series:
+    """One number over runs.
+
+    Attributes:
+        test: name of the test, or of the method that identified it.
+        name: for people, with its conditions.
+        unit: SI, of all points.
+        display: what a reader is shown.
+        points: in the order of time.
+        left_out: why others are not among them.
+        reason: why it is not followed; `NONE` where it is.
+    """
+
+    test: str
+    title: str
+    quantity: str
+    name: str
+    unit: str
+    display: str
+    points: tuple[Point, ...]
+    left_out: tuple[str, ...] = ()
+    reason: Reason = NONE
+    conditions: Mapping[str, Value] = field(default_factory=dict)
+
+    @property
+    def values(self) -> Array:
+        """Shape (n,), in `unit`."""
+        return np.array([point.estimate.value for point in self.points])
+
+    @property
+    def bare(self) -> str:
+        """Why the points are taken without errors of their own; "" where they have them."""
+        without = sum(_own(point.estimate) is None for point in self.points)
+        if not without:
+            return ""
+        told = "none" if without == len(self.points) else f"{without} of {len(self.points)}"
+        have = "has" if without == len(self.points) else "have no"
+        return f"{told} {have} {'an ' if have == 'has' else ''}interval: weighed alike"
+
+    def own(self) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+        """Covariance of the points' own errors (n, n), and the sources that cancel, and that might.
+
+        The last are constants that are not the same in all runs, and nobody said how uncertain.
+        """
+        found = np.diag(np.square(_own_errors([point.estimate for point in self.points])))
+        cancelled, unknown = [], []
+        for source in _sources(self.points):
+            keys = [point.member.constants.get(source, "") for point in self.points]
+            sizes = np.array([_size(point.estimate, source) for point in self.points])
+            if len(set(keys)) == 1 and keys[0]:
+                cancelled.append(source)
+            elif np.any(np.isnan(sizes)) and any(keys):
+                unknown.append(source)
+            else:
+                sizes = np.nan_to_num(sizes)
+                alike = np.array([[a == b and a != "" for b in keys] for a in keys])
+                found += np.where(alike | np.eye(len(keys), dtype=bool), np.outer(sizes, sizes), 0)
+        return found, tuple(cancelled), tuple(unknown)
+
+
+def series_of(members: Sequence[Member]) -> list[Series]:
+    """Every finding of the run that found most, with its partners in the others."""
+    reference = max(
+        members, key=lambda m: (sum(len(t.result.findings) for t in m.tests), -m.number)
+    )
+    found = {
+        (i, k): _Collected(test, finding)
+        for i, test in enumerate(reference.tests)
+        for k, finding in enumerate(test.result.findings)
+        if not finding.recomputed
+    }
+    places = {id(each.finding): each for each in found.values()}
+    seen: dict[tuple[str, tuple[str, ...]], Member] = {}
+    for member in members:
+        for pair in pair_tests(reference.tests, member.tests).tests:
+            twin = _twin(seen, member, pair.other.name, pair.reference.name)
+            for one, other in pair.findings:
+                mine = places[id(one)]
+                why = f"{TWIN} {twin.name}" if twin else ""
+                test, number = pair.other.name, other.known
+                add_point(mine.points, mine.left_out, member, test, number, one.unit, why)
+                if number.origin is Origin.CONTRADICTED:
+                    mine.wrong.append(number.reason)
+    return [_series(each) for each in found.values()]
+
+
+def add_point(
+    points: list[Point],
+    left_out: list[str],
+    member: Member,
+    test: str,
+    estimate: Estimate,
+    unit: str,
+    why: str = "",
+) -> None:
+    """Take a number in, or say why not: not found, a bound, or what `why` says."""
+    estimate = in_unit(estimate, unit)
+    if not why and not math.isfinite(estimate.value):
+        why = "not found"
+    if not why and estimate.kind in BOUNDS:
+        why = "a bound"
+    if not why and estimate.origin is Origin.GIVEN:
+        why = "given, not measured"
+    if why:
+        left_out.append(f"{member.name}: {why}")
+    else:
+        points.append(Point(member, test, estimate))
+
+
+def made(
+    points: Sequence[Point], left_out: Sequence[str], reason: Reason = NONE, **more: object
+) -> Series:
+    """A series, with the reason why it is not followed: the given one, or another."""
+    values = [point.estimate.value for point in points]
+    if not reason and len(points) < LEAST:
+        whys = Counter(why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in left_out)
+        told = "; ".join(f"{why} in {count}" for why, count in whys.items())
+        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {told}" if told else "")
+    if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
+        reason = SAME_IN_ALL()
+    return Series(
+        points=tuple(points),
+        left_out=tuple(left_out),
+        reason=reason,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def _series(found: _Collected) -> Series:
+    test, finding = found.test, found.finding
+    words = condition_words(test, finding.conditions)
+    name = name_here(test, finding.quantity)
+    reason = FOLLOWS() if finding.quantity in DERIVED else NONE
+    if not reason and 2 * len(found.wrong) > len(found.points):
+        reason = WRONG_MODEL(side="most of it", why=found.wrong[0])
+    return made(
+        found.points,
+        found.left_out,
+        reason,
+        test=test.name,
+        title=test.title,
+        quantity=finding.quantity,
+        name=f"{name}, {words}" if words else name,
+        unit=finding.unit,
+        display=display_unit(test, finding),
+        conditions=finding.conditions,
+    )
+
+
+def _twin(
+    seen: dict[tuple[str, tuple[str, ...]], Member], member: Member, test: str, of: str
+) -> Member | None:
+    """An earlier run whose trials of a test are the same simulation, to the seed."""
+    prints = member.identical.get(test, ())
+    if not prints:
+        return None
+    first = seen.setdefault((of, prints), member)
+    return first if first is not member else None
+
+
+def _own_errors(found: Sequence[Estimate]) -> Array:
+    """Standard deviations of the points' scatter, shape (n,); zeros where any is not known."""
+    known = [error for each in found if (error := _own(each)) is not None]
+    if len(known) < len(found):
+        return np.zeros(len(found))
+    if all(is_student(each) and each.standard_error for each in found):
+        errors = np.array([each.standard_error for each in found], dtype=float)
+        return moderated(errors, np.array([each.freedom or math.inf for each in found]))
+    return np.array(known)
+
+
+def _own(estimate: Estimate) -> float | None:
+    """Standard deviation of a point's scatter; None where nobody knows it.
+
+    That of its interval as if it were normal: wider where few repeats are behind it, as the
+    deviation of Student's t is.
+    """
+    low, high = estimate.low, estimate.high
+    if low is None or high is None or estimate.kind == "quantile" or estimate.level != LEVEL:
+        return None
+    return 0.5 * (high - low) / student(math.inf)
+
+
+def _sources(points: Sequence[Point]) -> Iterator[str]:
+    yield from dict.fromkeys(part.source for p in points for part in p.estimate.systematic)
+
+
+def _size(estimate: Estimate, source: str) -> float:
+    """1 sigma of a source in one number, 0 where it has none, NaN where it is unknown."""
+    own = [p.standard_uncertainty for p in estimate.systematic if p.source == source]
+    return math.nan if None in own else math.hypot(*(size or 0.0 for size in own))

@@ -1,0 +1,375 @@
+"""Tables and sentences of trends."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from campaign.estimate import Estimate
+from campaign.estimation.difference import in_unit
+from campaign.estimation.family import RATE
+from campaign.estimation.trends.changes import LEAST_FOR_A_JUMP, Jump
+from campaign.reason import Cause
+from campaign.result import Cell, Column, Table
+from campaign.text import interval, number, pretty_unit
+from campaign.trends.covariates import ORDER, TIME, Covariate
+from campaign.trends.rig_trends import JUMP, TREND, Followed, Trends, Verdict
+from campaign.units import convert
+
+MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
+CIRCUMSTANCES = 4
+"""Most changes beside a jump that a sentence names; the table has them all."""
+
+
+def followed_table(key: str, title: str, rows: Sequence[Followed], covariate: Covariate) -> Table:
+    """A row per number, in the unit of the row."""
+    per = covariate.per
+    columns = [
+        Column("test", "Test"),
+        Column("quantity", "Quantity"),
+        Column("unit", "Unit"),
+        Column("runs", "Runs", exact=True),
+        Column("mean", "Mean"),
+        Column("trend", f"Trend per {per}"),
+        Column("trend_share", f"Trend per {per}, share of the mean", "", "percent"),
+        Column("p_trend", "p of the trend", exact=True),
+        Column("p_trend_adjusted", "adjusted", exact=True),
+        Column("detectable_trend", f"Seen from, per {per}", exact=True),
+    ]
+    if covariate.ordered:
+        columns += [
+            Column("jump_before", "Jump before run"),
+            Column("jump", "Jump"),
+            Column("jump_share", "Jump, share of the mean", "", "percent"),
+            Column("p_jump", "p of a jump", exact=True),
+            Column("p_jump_adjusted", "adjusted", exact=True),
+            Column("detectable_jump", "Jump seen from", exact=True),
+        ]
+    columns += [
+        Column("scatter", "Scatter between runs", exact=True),
+        Column("correlation", "Correlation of neighbours", exact=True),
+        Column("verdict", "Verdict"),
+        Column("reason", "Why not judged"),
+        Column("notes", "Notes"),
+    ]
+    return Table(key, title, tuple(columns), tuple(_row(each, covariate) for each in rows))
+
+
+def page_table(rows: Sequence[Followed], covariate: Covariate) -> Table:
+    """The same for a page, which has less room: an effect and its share in one cell."""
+    columns = [
+        Column("test", "Test"),
+        Column("quantity", "Quantity"),
+        Column("verdict", "Verdict"),
+        Column("p", "p, adjusted", exact=True),
+        Column("mean", "Mean"),
+        Column("trend", f"Trend per {covariate.per}"),
+        Column("seen", "Seen from"),
+    ]
+    if covariate.ordered:
+        columns += [
+            Column("jump", "Jump"),
+            Column("before", "Before run"),
+            Column("jump_seen", "Seen from"),
+        ]
+    return Table("judged", "What was followed", tuple(columns), tuple(
+        _page_row(each, covariate) for each in rows
+    ))  # fmt: skip
+
+
+def _page_row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
+    mean, effects = each.mean, effect(each, covariate)
+    row: dict[str, Cell] = {
+        "test": each.series.test,
+        "quantity": each.series.name,
+        "mean": _words(mean, each, sign=False),
+        "trend": "–" if effects is None else _short(*effects, each),
+        "seen": detectable_words(each, TREND, covariate, per=False),
+        "p": each.smallest,
+        "verdict": str(each.verdict),
+    }
+    jump = each.change.jump if each.change is not None else None
+    if jump is not None:
+        row |= {
+            "jump": _short(*jump_of(each, jump), each),
+            "before": _before(each, each.jumps) or "–",
+            "jump_seen": detectable_words(each, JUMP, covariate),
+        }
+    return row
+
+
+def points_table(trends: Trends) -> Table:
+    """Every point of every number, as the runs found it."""
+    columns = (
+        Column("test", "Test"),
+        Column("quantity", "Quantity"),
+        Column("unit", "Unit"),
+        Column("number", "Run no.", exact=True),
+        Column("run", "Run"),
+        Column("x", trends.covariate.label, exact=True),
+        Column("value", "Value"),
+    )
+    rows: list[dict[str, Cell]] = []
+    for each in trends.followed:
+        for place, point in zip(each.x, each.series.points, strict=True):
+            rows.append(
+                {
+                    "test": each.series.test,
+                    "quantity": each.series.name,
+                    "unit": pretty_unit(each.series.display),
+                    "number": point.member.number,
+                    "run": point.member.name,
+                    "x": float(place) if math.isfinite(place) else None,
+                    "value": in_unit(point.estimate, each.series.display),
+                }
+            )
+    return Table("points", "All points", columns, tuple(rows))
+
+
+def circumstances_table(trends: Trends) -> Table:
+    """What differs between each run and the one before it."""
+    columns = (
+        Column("from", "Run"),
+        Column("to", "and the next"),
+        Column("where", "Where"),
+        Column("path", "Field"),
+        Column("before", "Before"),
+        Column("after", "After"),
+    )
+    rows = [
+        {
+            "from": f"{n}",
+            "to": f"{n + 1}",
+            "where": change.where,
+            "path": change.path,
+            "before": change.reference,
+            "after": change.other,
+        }
+        for n, found in enumerate(trends.circumstances, start=1)
+        for change in found
+    ]
+    return Table("circumstances", "What differs between neighbouring runs", columns, tuple(rows))
+
+
+def runs_table(trends: Trends) -> Table:
+    """The runs, numbered in the order of time."""
+    columns = (
+        Column("number", "No.", exact=True),
+        Column("run", "Run"),
+        Column("started", "Started"),
+        Column("x", trends.covariate.label, trends.covariate.unit, exact=True),
+        Column("status", "Status"),
+        Column("damaged", "Damaged places", exact=True),
+    )
+    rows: list[dict[str, Cell]] = []
+    for member in trends.members:
+        x = trends.covariate.at(member, "")
+        rows.append(
+            {
+                "number": member.number,
+                "run": member.name,
+                "started": member.run.header.created,
+                "x": x if math.isfinite(x) else None,
+                "status": str(member.run.status),
+                "damaged": len(member.damaged),
+            }
+        )
+    return Table("runs", "The runs", columns, tuple(rows))
+
+
+def effect(each: Followed, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
+    """The trend per `covariate.per`, in the unit that is shown and as a share of the mean."""
+    if each.change is None or each.change.trend is None:
+        return None
+    slope, size = each.change.trend.slope, covariate.step
+    return (
+        each.estimate("trend", slope, each.series.display, size),
+        _shared(each, each.estimate("trend", slope, "", size)),
+    )
+
+
+def jump_of(each: Followed, jump: Jump) -> tuple[Estimate, Estimate]:
+    """A jump in the unit that is shown, and as a share of the mean."""
+    return (
+        each.estimate("jump", jump.size, each.series.display),
+        _shared(each, each.estimate("jump", jump.size, "")),
+    )
+
+
+def headline(each: Followed, trends: Trends) -> str:
+    """A declared number in one sentence, without a full stop."""
+    name = each.series.name[:1].upper() + each.series.name[1:]
+    told = [f"{name} ({each.series.test})"]
+    if each.verdict is not Verdict.JUMPED:
+        follows = trends.covariate.name in (TIME, ORDER)
+        verb = "drifts by" if follows else f"follows {trends.covariate.name}:"
+        if each.verdict is Verdict.CHANGED:
+            verb = "changes; as a drift, by"
+        told.append(f"{verb} {_effect_words(each, trends.covariate)}")
+    jumps = each.jumps
+    if each.verdict is Verdict.CHANGED and each.change is not None and each.change.jump is not None:
+        jumps = (each.change.jump,)
+    for jump in jumps:
+        as_ = "or as a jump" if each.verdict is Verdict.CHANGED else "jumped"
+        told.append(f"{as_} {_jump_words(each, jump, trends)}")
+    return f"{told[0]} {', '.join(told[1:])}"
+
+
+def beside_the_jump(each: Followed, jump: Jump, trends: Trends) -> str:
+    """What else changed where a number jumped; "" for nothing."""
+    first, last = _runs_around(each, jump)
+    found = [c for gap in trends.circumstances[first - 1 : last - 1] for c in gap]
+    if not found:
+        return ""
+    told = [
+        f"{c.where}{f' {c.path}' if c.path else ''} from {c.reference} to {c.other}"
+        for c in found[:CIRCUMSTANCES]
+    ]
+    more = f", and {len(found) - CIRCUMSTANCES} more" if len(found) > CIRCUMSTANCES else ""
+    return f"Between runs {first} and {last} changed, too: {'; '.join(told)}{more}."
+
+
+def sentences(trends: Trends) -> Iterator[str]:
+    """What it all comes to."""
+    count, judged = len(trends.members), trends.judged
+    several = judged != 1
+    yield (
+        f"{count} runs have {len(trends.followed)} numbers in common, of which {judged} "
+        f"{'are' if several else 'is'} judged."
+    )
+    declared = len(trends.declared)
+    along = trends.covariate.name
+    if declared:
+        are = "is" if declared == 1 else "are"
+        yield (
+            f"{declared} {are} declared to change: at most {100 * RATE:g} % of what is declared "
+            f"so is expected to be false (Benjamini and Hochberg over {trends.tested} tests)."
+        )
+    elif judged:
+        yield (
+            f"No trend over {along} is shown. That does not say that there is none: the table says "
+            "of each number how large one would have been seen."
+        )
+    if trends.covariate.ordered and count < LEAST_FOR_A_JUMP:
+        yield f"Whether anything has jumped is not determined: that takes {LEAST_FOR_A_JUMP} runs."
+    yield from trends.notes
+
+
+def not_judged(trends: Trends) -> Iterator[str]:
+    """`12: ...`: each reason once, the most frequent first."""
+    told = Counter(str(each.reason) for each in trends.of(Verdict.NOT_JUDGED))
+    for reason, count in told.most_common():
+        yield f"{count}: {reason}"
+
+
+def detectable_words(each: Followed, name: str, covariate: Covariate, *, per: bool = True) -> str:
+    """`0.12 N·m per month (1.3 %)`: the smallest effect that would have been seen."""
+    size = _detectable(each, name, covariate)
+    if size is None:
+        return "–"
+    share = size * each.share
+    part = f" ({number(100 * share, 2)} %)" if math.isfinite(share) else ""
+    unit = pretty_unit(each.series.display)
+    along = f" per {covariate.per}" if per and name == TREND else ""
+    return f"{number(size, 2)} {unit}".rstrip() + f"{along}{part}"
+
+
+def _row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
+    row: dict[str, Cell] = {
+        "test": each.series.test,
+        "quantity": each.series.name,
+        "unit": pretty_unit(each.series.display),
+        "runs": len(each.series.points),
+        "verdict": str(each.verdict),
+        "reason": str(each.reason),
+        "notes": "; ".join((*each.notes, *each.series.left_out)),
+    }
+    effects = effect(each, covariate)
+    if effects is None or each.change is None or each.change.trend is None:
+        return row
+    own = float(convert(1.0, each.series.unit, each.series.display))
+    adjusted = each.adjusted or {}
+    row |= {
+        "mean": each.mean,
+        "trend": effects[0],
+        "trend_share": effects[1],
+        "p_trend": each.p.get(TREND),
+        "p_trend_adjusted": adjusted.get(TREND),
+        "detectable_trend": _detectable(each, TREND, covariate),
+        "scatter": own * each.change.trend.scatter,
+        "correlation": each.change.trend.correlation,
+    }
+    jump = each.change.jump
+    if jump is None:
+        return row
+    sizes = jump_of(each, jump)
+    return row | {
+        "jump_before": _before(each, each.jumps or (jump,)),
+        "jump": sizes[0],
+        "jump_share": sizes[1],
+        "p_jump": jump.p,
+        "p_jump_adjusted": adjusted.get(JUMP),
+        "detectable_jump": _detectable(each, JUMP, covariate),
+    }
+
+
+def _detectable(each: Followed, name: str, covariate: Covariate) -> float | None:
+    size = (each.detectable or {}).get(name)
+    if size is None:
+        return None
+    own = float(convert(1.0, each.series.unit, each.series.display))
+    return size * own * (covariate.step if name == TREND else 1.0)
+
+
+def _shared(each: Followed, estimate: Estimate) -> Estimate:
+    """As a share of the mean; without any where the mean may be 0."""
+    share = each.share
+    if not math.isfinite(share):
+        return Estimate.without_interval(estimate.name, math.nan, "", MEAN_NEAR_ZERO())
+    ends = [None if end is None else share * end for end in (estimate.low, estimate.high)]
+    return replace(estimate, value=share * estimate.value, unit="", low=ends[0], high=ends[1])
+
+
+def _short(size: Estimate, share: Estimate, each: Followed) -> str:
+    """`+1.53 (1.38 to 1.70) N·m, 5.9 %`."""
+    part = f", {number(100 * share.value, 2)} %" if math.isfinite(share.value) else ""
+    return f"{_words(size, each)}{part}"
+
+
+def _effect_words(each: Followed, covariate: Covariate) -> str:
+    effects = effect(each, covariate)
+    if effects is None:
+        return "–"
+    size, share = effects
+    return f"{_words(size, each)} per {covariate.per}{_percent(share)}"
+
+
+def _jump_words(each: Followed, jump: Jump, trends: Trends) -> str:
+    size, share = jump_of(each, jump)
+    first, last = _runs_around(each, jump)
+    return f"by {_words(size, each)}{_percent(share)} between runs {first} and {last}"
+
+
+def _words(size: Estimate, each: Followed, *, sign: bool = True) -> str:
+    plus = "+" if sign and size.value > 0 else ""
+    unit = pretty_unit(each.series.display)
+    return f"{plus}{interval(size.value, size.low, size.high)} {unit}".rstrip()
+
+
+def _percent(share: Estimate) -> str:
+    if not math.isfinite(share.value) or share.low is None or share.high is None:
+        return ""
+    return f" ({interval(100 * share.value, 100 * share.low, 100 * share.high)} %)"
+
+
+def _before(each: Followed, jumps: Sequence[Jump]) -> str:
+    return ", ".join(str(each.series.points[jump.place].member.number) for jump in jumps)
+
+
+def _runs_around(each: Followed, jump: Jump) -> tuple[int, int]:
+    """Numbers of the runs between which the number jumped, as far as the points say."""
+    points = each.series.points
+    low, high = jump.between
+    return points[low - 1].member.number, points[high].member.number
