@@ -1,7 +1,7 @@
 """Numbers called measured on rigs that nobody has seen, by protocols that `campaign init` writes.
 
 Run with `python -m benchmarks.blind_rigs run FILE [--rigs 200] [--text WORDS]`, then
-`python -m benchmarks.blind_rigs write FILE`, which puts the table into docs/trust.md. The rigs
+`python -m benchmarks.blind_rigs show FILE`, which prints the tables of docs/trust.md. The rigs
 (`benchmarks.drawn_rigs`) are drawn by a text: the hash of the last commit that changed code, so
 that nothing can have been tuned on them. FILE gets a line for each rig, and a run that was stopped
 goes on; `list` shows every draw.
@@ -59,7 +59,6 @@ from tests.coverage.truths import IN_TORQUE, Truths
 from tests.experiments.laboratory import Done
 
 CODE = ("campaign", "protocols", "templates")
-PAGE = Path(__file__).parents[1] / "docs" / "trust.md"
 STATED = frozenset({"torque constant", "inertia"})
 TELLING = 0.20
 """Half-width of the Cramér-Rao bound over the value below which a parameter can be determined."""
@@ -338,7 +337,7 @@ def read(file: Path) -> list[dict[str, Any]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=("run", "show", "list", "write"))
+    parser.add_argument("what", choices=("run", "show", "list"))
     parser.add_argument("file", type=Path)
     parser.add_argument("--rigs", type=int, default=200)
     parser.add_argument("--text", default="", help="that draws; the last commit's hash without it")
@@ -354,17 +353,7 @@ def main() -> None:
                 out.flush()
         return
     rigs = read(given.file)
-    if given.what == "list":
-        print(listed(rigs))
-        return
-    print(page(rigs))
-    if given.what == "write":
-        text = PAGE.read_text(encoding="utf-8")
-        before, rest = text.split("<!-- blind -->\n", 1)
-        _, after = rest.split("<!-- /blind -->", 1)
-        PAGE.write_text(
-            f"{before}<!-- blind -->\n{page(rigs)}\n<!-- /blind -->{after}", encoding="utf-8"
-        )
+    print(listed(rigs) if given.what == "list" else page(rigs))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.document import DOCS, table
+from benchmarks.document import table
 from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Origin
 from campaign.parameter import Identified
@@ -200,24 +200,12 @@ def missed(method: str, found: Iterable[Told], rigs: Sequence[BlindRig]) -> Iter
             yield f"{method}: rig {each.rig}, {each.name} {far} ({facts})"
 
 
-def write(text: str, page: str = "identification.md", name: str = "coverage") -> None:
-    """Replace what stands between `<!-- coverage -->` and `<!-- /coverage -->`."""
-    path = DOCS / page
-    whole = path.read_text(encoding="utf-8")
-    before, begin, rest = whole.partition(f"<!-- {name} -->\n")
-    _, end, after = rest.partition(f"<!-- /{name} -->")
-    if not begin or not end:
-        raise ValueError(f"{path} has no section {name}")
-    path.write_text(f"{before}{begin}{text.strip()}\n{end}{after}", encoding="utf-8")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--rigs", type=int, default=100, help="for inverse dynamics")
     parser.add_argument("--whole", type=int, default=24, help="of these, for whole models")
     parser.add_argument("--seed", type=int, default=4711)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--write", action="store_true", help="into docs/identification.md")
     options = parser.parse_args()
     rigs = blind_rigs(options.rigs, options.seed)
     jobs = list(enumerate(rigs))
@@ -234,12 +222,9 @@ def main() -> None:
         *rows("`whole_model`", whole),
     ]
     headings = ["method", "number", "hold", "95 % interval of that", "without", "half-width"]
-    text = table(headings, made)
-    print(text)
+    print(table(headings, made))
     for line in (*missed("inverse", inverse, rigs), *missed("whole", whole, rigs)):
         print(line)
-    if options.write:
-        write(text)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""`python -m tests.coverage run FILE`, then `python -m tests.coverage write FILE...`.
+"""`python -m tests.coverage run FILE`, then `python -m tests.coverage show FILE...`.
 
-`run` executes tests and adds a JSON line for each estimate that has a truth; `write` makes
-`docs/trust.md` and its picture of all of them.
+`run` executes tests and adds a JSON line for each estimate that has a truth; `show` prints
+the tables of `docs/trust.md` by direction, and draws its picture.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from tests.coverage.benches import BENCHES, make_case
 from tests.coverage.judging import Entry, as_tree, entries
 from tests.coverage.laboratory import KINDS, run
-from tests.coverage.page import write_page
+from tests.coverage.page import draw_picture, tables
 
 
 def main() -> None:
@@ -28,11 +28,13 @@ def main() -> None:
     running.add_argument("--kind", action="append", choices=KINDS)
     running.add_argument("--benches", type=int, nargs=2, default=(0, BENCHES))
     running.add_argument("--draws", type=int, nargs=2, default=(0, 1))
-    writing = commands.add_parser("write")
-    writing.add_argument("files", type=Path, nargs="+")
+    showing = commands.add_parser("show")
+    showing.add_argument("files", type=Path, nargs="+")
     given = parser.parse_args()
-    if given.command == "write":
-        write_page(read(given.files))
+    if given.command == "show":
+        found = read(given.files)
+        sys.stdout.write(tables(found))
+        draw_picture(found)
         return
     with given.file.open("a", encoding="utf-8") as out:
         for number in range(*given.benches):

@@ -1,4 +1,4 @@
-"""`docs/trust.md`: the table of coverages, and the picture of all estimates."""
+"""Tables of coverages, and the picture of all estimates for `docs/trust.md`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from tests.coverage.benches import BENCHES
 from tests.coverage.judging import Entry, Pooled, pooled
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE, PICTURE = DOCS / "trust.md", DOCS / "images" / "coverage.png"
-BEGIN, END = "<!-- coverage -->", "<!-- end of coverage -->"
+PICTURE = DOCS / "images" / "coverage.png"
 TITLES = {
     "velocity_map": "Friction-velocity map",
     "breakaway": "Breakaway and presliding",
@@ -19,16 +18,8 @@ TITLES = {
 }
 
 
-def write_page(found: Sequence[Entry]) -> None:
-    """Put the table between its marks, and draw the picture."""
-    text = PAGE.read_text(encoding="utf-8")
-    before, rest = text.split(BEGIN, 1)
-    _, after = rest.split(END, 1)
-    PAGE.write_text(f"{before}{BEGIN}\n{_tables(found)}{END}{after}", encoding="utf-8")
-    _draw(found)
-
-
-def _tables(found: Sequence[Entry]) -> str:
+def tables(found: Sequence[Entry]) -> str:
+    """Markdown, a table for each experiment."""
     groups = pooled(found)
     lines = []
     for kind, title in TITLES.items():
@@ -67,7 +58,7 @@ def _line(group: Pooled) -> str:
     )
 
 
-def _draw(found: Sequence[Entry]) -> None:
+def draw_picture(found: Sequence[Entry]) -> None:
     """Distance from the truth over the half-width, of every estimate, by parameter and bench."""
     import matplotlib as mpl
 

@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.slow,
 ]
 
-PROTOCOL = SEA.replace('"simulink"', '"platform"\nrepeat = 40\nseed = 5')
+PROTOCOL = SEA.replace('"simulink"', '"platform"\nrepeat = 12\nseed = 5')
 OTHER = """
 import campaign
 campaign.__version__ = "0.0.9"
