@@ -45,6 +45,14 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Two workers for each core: a third of the time a test waits for a clock, disk or process."""
+    cores = (
+        os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    )
+    return 2 * len(cores)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Files with the most slow tests come first; a sample that is cut off is one of a draw."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))

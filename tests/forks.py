@@ -30,7 +30,7 @@ import importlib, pkgutil
 import matplotlib.pyplot
 import campaign
 for found in pkgutil.walk_packages(campaign.__path__, "campaign."):
-    if not found.name.endswith(("__main__", "preloaded")):  # the latter looks for plug-ins
+    if not found.name.endswith(("__main__", "report.preload")):  # the latter looks for plug-ins
         importlib.import_module(found.name)
 import functools, typer.main
 from campaign.cli.main import app

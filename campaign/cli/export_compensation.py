@@ -17,6 +17,7 @@ from campaign.cli.output import print_line, print_note
 from campaign.controller_code.c_code import SINGLE, c_code, vectors_code
 from campaign.controller_code.compensation import INPUTS, Sampled
 from campaign.errors import UsageError
+from campaign.physics.bench_knowledge import KnownValue
 from campaign.physics.complete import CompleteBench
 from campaign.protocol.bench_file import bench_source, simulable
 from campaign.protocol.loop_check import margins_in_words
@@ -127,11 +128,24 @@ def _head(bench: str, made: Sampled) -> Iterator[str]:
     yield f"The compensation '{made.name}' of the bench '{its.name}', by campaign {__version__}."
     yield f"Bench file: {bench}, SHA-256 {hashlib.sha256(source.text.encode()).hexdigest()[:16]}"
     yield f"Sampled every {number(1e3 * float(made.controller.period[0]), 4)} ms; SI units."
-    yield from (f"{path} = {value}" for path, value in _leaves(its.compensation[made.name]))
+    if (run := its.known.identified) is not None:
+        yield f"Values that are measured: from {run.run}, digest {run.digest[:16]}"
+    for path, value in _leaves(its.compensation[made.name]):
+        known = its.known.values.get(f"compensation.{made.name}.{path}")
+        yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
     for each in _loops(its, made.name):
         told = each.verdict if each.margins is None else margins_in_words(each.margins)
         yield f"Loop, {each.regime}, {each.mode} command: {told}"
     yield "Not in it: delays and resolutions of sensors; the rate loop."
+
+
+def _uncertainty(known: KnownValue) -> str:
+    """Interval or standard deviation (SI), and the origin."""
+    if known.interval is not None:
+        low, high = (number(float(end), 6) for end in known.interval)
+        return f"95 %: {low} to {high}; {known.origin}"
+    deviation = known.standard_deviation
+    return known.origin if deviation is None else f"± {number(deviation, 3)}, 1σ; {known.origin}"
 
 
 def _loops(bench: CompleteBench, name: str) -> list[CheckedLoop]:

@@ -229,7 +229,9 @@ def _edited(text: str, values: Mapping[str, Any], stale: Sequence[str]) -> str:
         here: Any = document
         for depth, name in enumerate(tables):
             if name not in here:
-                here[name] = tomlkit.table(is_super_table=depth + 1 < len(tables))
+                inline = isinstance(here, tomlkit.items.InlineTable)  # as of `friction = {}`
+                outer = depth + 1 < len(tables)
+                here[name] = tomlkit.inline_table() if inline else tomlkit.table(outer)
             here = here[name]
         here[key] = value
     return document.as_string().replace("\n", newline)

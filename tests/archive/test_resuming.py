@@ -357,8 +357,8 @@ spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
 kit = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(kit)
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
-from campaign.archive.writing import sealing
-from campaign.archive.writing import unsealing
+from campaign.archive.writing import seal_run
+from campaign.archive.writing import unseal_run
 template, results = Path(sys.argv[2]), Path(sys.argv[3])
 told = dict(at=kit.ENDED, host={}, versions={}, command=())
 seen, limit = 0, 0

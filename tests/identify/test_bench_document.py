@@ -108,6 +108,14 @@ def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # t
     assert load.negative.static_torque is None
 
 
+@pytest.mark.parametrize("before", ["", "friction = {}"])
+def test_a_curve_is_written_whatever_form_the_table_has(write, before: str) -> None:  # type: ignore[no-untyped-def]
+    """An inline table, as of a bench whose friction is not known, holds inline tables only."""
+    name, axis = HEAD.split("\n", 1)
+    bench = write(f"{name}\n{before}\n{axis}", friction_map=Identified(CURVE, settings=STRIBECK))
+    assert bench.friction["load"].coulomb_torque == 10.0
+
+
 OPEN = {
     "friction.load.model": ("lugre", "", "fitted"),
     "friction.load.static_torque": (30.0, "N m", "the motion leaves it open"),
