@@ -1,4 +1,4 @@
-"""Writing what was measured into docs/performance.md, between two comments that name it."""
+"""Writing measurements into docs/developers/performance.md, between two marks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "performance.md"
+PAGE = DOCS / "developers" / "performance.md"
 IMAGES = DOCS / "images"
 
 

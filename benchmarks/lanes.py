@@ -4,7 +4,7 @@
 
 Each trial has a plant of its own; all outputs are recorded every millisecond, at a step of 1 ms.
 Minima of short stretches, in turn: what counts are the ratios, since a busy machine disturbs all.
-`--write` puts the table into docs/performance.md.
+`--write` puts the table into docs/developers/performance.md.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def rows() -> Iterator[list[str]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--write", action="store_true", help="into docs/performance.md")
+    parser.add_argument("--write", action="store_true", help="into docs/developers/performance.md")
     found = table(["ns per trial and step", "alone", f"in {LANES} lanes", "ratio"], list(rows()))
     print(found)
     if parser.parse_args().write:

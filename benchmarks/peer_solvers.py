@@ -1,7 +1,7 @@
 """The stabilization trial of the thesis for general solvers, with a compiled right-hand side.
 
-Nothing of `campaign` is used. The equations are those of docs/physics.md with the numbers of the
-thesis' appendix; the right-hand side is written for this one loop, as fast as numba makes it.
+Nothing of `campaign` is used. The equations are those of docs/developers/physics.md with the
+numbers of the thesis' appendix; the right-hand side is written for this loop and compiled by numba.
 
 With `noise` the rate controller runs at 1 kHz and reads a gyro with white noise, which is held
 over the sample: a solver has to begin anew each millisecond.

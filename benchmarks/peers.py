@@ -8,7 +8,7 @@ Everybody integrates the same equations, and with noise the same numbers of it; 
 get a compiled right-hand side. The error is that of the stabilization error, the standard deviation
 of the pointing angle after the transient, and the largest error of that angle beside its largest
 value. Runs alternate; minima and medians are told. `--write` puts table and picture into
-docs/performance.md. Numbalsoda takes part where it is installed.
+docs/developers/performance.md. Numbalsoda takes part where it is installed.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ def draw(results: list[tuple[Case, list[Entry]]], path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--write", action="store_true", help="into docs/performance.md")
+    parser.add_argument("--write", action="store_true", help="into docs/developers/performance.md")
     arguments = parser.parse_args()
     text, results = [f"{machine()}. Fastest and median of {arguments.repeats} runs in turn."], []
     if not any(solver.name == "numbalsoda" for solver in solvers()):

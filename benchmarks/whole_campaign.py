@@ -2,7 +2,7 @@
 
     python -m benchmarks.whole_campaign [--protocol thesis] [--workers N] [--write]
 
-The engine is compiled before. `--write` puts the table into docs/performance.md.
+The engine is compiled before. `--write` puts the table into docs/developers/performance.md.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--protocol", default="thesis")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--write", action="store_true", help="into docs/performance.md")
+    parser.add_argument("--write", action="store_true", help="into docs/developers/performance.md")
     arguments = parser.parse_args()
     campaign("warmup")
     options = ["--report", "--profile", "--workers", str(arguments.workers)]

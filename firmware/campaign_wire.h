@@ -1,4 +1,4 @@
-/* Framing of the serial protocol (docs/serial-protocol.md): COBS, CRC-32, frames.
+/* Framing of the serial protocol (docs/developers/serial-protocol.md): COBS, CRC-32, frames.
  *
  * Portable C99: no allocation, no operating system, no alignment or byte order assumed. An octet is
  * the low 8 bits of a char-sized cell, so a DSP whose char has 16 bits stores one octet per cell.

@@ -251,12 +251,12 @@ print(json.dumps([list(friction_models()), friction_models().plug_in("grease").v
     assert said(packages, code) == [sorted([*OWN, "grease"]), "2.0"]
 
 
-PAGE = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "developers" / "plug-ins.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
 def page(packages: Packages) -> Packages:
-    """The package of docs/plug-ins.md."""
+    """The package of docs/developers/plug-ins.md."""
     found = re.findall(r"^```\w+ ([\w./]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     files = dict(found)
     assert set(files) == {"pyproject.toml", "grease_film/model.py", "tests/test_model.py"}

@@ -1,7 +1,7 @@
 """The archive: a run in progress is a folder that no crash can spoil; a sealed run is one file.
 
 `RunWriter` writes, `open_run` reads, `find_run` and `list_runs` look around a results folder. The
-format is described in `docs/archive-format.md`. Importing this package does not import h5py.
+format is that of `docs/developers/archive-format.md`. Importing this package does not import h5py.
 """
 
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus

@@ -1,4 +1,4 @@
-"""The `serial` backend: a servo controller on a serial port or TCP (docs/serial-protocol.md)."""
+"""The `serial` backend: a controller on a port or TCP; docs/developers/serial-protocol.md."""
 
 from __future__ import annotations
 

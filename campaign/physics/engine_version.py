@@ -13,7 +13,7 @@ FIRST = 1
 """That of archives which do not say."""
 ERRORS = {1: 1.1e-3, 2: 2e-4, 3: 2e-4, 4: 2e-4}
 """By engine, the largest relative rms error of a rate or a current at its default step: the table
-of docs/physics.md."""
+of docs/developers/physics.md."""
 TORQUE_ERRORS = {1: 1.2e-2, 2: 2e-4, 3: 2e-4, 4: 2e-4}
 """The same of a recorded friction or compensation torque; engine 1 recorded it half a step late."""
 DRY_ERRORS = {1: 1.1e-2, 2: 1.1e-2}

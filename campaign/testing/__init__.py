@@ -1,4 +1,4 @@
-"""What a lab tests its own kinds with; `docs/writing-a-backend.md` shows how.
+"""What a lab tests its own kinds with; `docs/developers/writing-a-backend.md` shows how.
 
 ```python
 @pytest.mark.parametrize("name", backend_checks())

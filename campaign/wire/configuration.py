@@ -1,6 +1,6 @@
 """A trial as named values for a controller, and back to a tree.
 
-Names are dotted paths; `docs/serial-protocol.md` lists them. All values are SI. `task.`,
+Names are dotted paths; `docs/developers/serial-protocol.md` lists them. All values are SI. `task.`,
 `controller.`, `limits.` and `compensation.` are every controller's business; `rehearsal.` is what
 only a simulated bench can be told.
 """

@@ -9,7 +9,7 @@ import pytest
 from campaign.archive import RunHeader
 from campaign.archive.layout.storage import CHUNK
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "archive-format.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "developers" / "archive-format.md"
 
 
 @pytest.fixture(scope="module")

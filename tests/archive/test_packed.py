@@ -1,4 +1,4 @@
-"""The file of one trial: as `docs/archive-format.md` says, and refused where it is not."""
+"""The file of one trial: as docs/developers/archive-format.md says, else refused."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from campaign.archive.layout.journal import (
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "archive-format.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "developers" / "archive-format.md"
 RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {"name": "other"}, "versions": {}, "command": []}
 
 

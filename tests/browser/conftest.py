@@ -59,7 +59,7 @@ window.moved = async () => {
 def missing(what: str) -> NoReturn:
     if os.environ.get("BROWSER_TESTS") == "required":
         pytest.fail(f"{what}, although BROWSER_TESTS=required")
-    pytest.skip(f"{what}; docs/testing.md says how to install it")
+    pytest.skip(f"{what}; docs/developers/testing.md says how to install it")
 
 
 @pytest.fixture(scope="session")

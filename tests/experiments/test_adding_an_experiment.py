@@ -1,4 +1,4 @@
-"""What docs/adding-an-experiment.md shows is a whole experiment that works."""
+"""What docs/developers/adding-an-experiment.md shows is a whole experiment that works."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.experiments.asked import asked, suitable
 from tests.experiments.laboratory import execute, failed, table
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "adding-an-experiment.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "developers" / "adding-an-experiment.md").read_text(encoding="utf-8")
 
 
 def block(kind: str) -> str:

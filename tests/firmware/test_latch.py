@@ -1,4 +1,4 @@
-"""The latch in C, sentence by sentence of docs/serial-protocol.md."""
+"""The latch in C, sentence by sentence of docs/developers/serial-protocol.md."""
 
 import pytest
 

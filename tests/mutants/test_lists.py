@@ -1,4 +1,4 @@
-"""What `make mutants` reads is there, and docs/testing.md names what it excuses."""
+"""What `make mutants` reads is there, and docs/developers/testing.md names what it excuses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_what_is_attacked_and_its_tests_are_there(file: str) -> None:
 
 
 def test_every_equivalent_is_named_with_its_reason() -> None:
-    document = (ROOT / "docs" / "testing.md").read_text("utf-8")
+    document = (ROOT / "docs" / "developers" / "testing.md").read_text("utf-8")
     for one in EQUIVALENTS:
         assert one["file"] in ATTACKED
         place = f"`{one['file']}`, `{one['function']}`"

@@ -1,8 +1,8 @@
 """Any bench with a continuous controller a second time: its equations, for scipy's solvers.
 
 Of `campaign.physics` only the values of a `Bench` are read. The equations are those of
-docs/physics.md, written out here state by state; the relative rate v is a state itself, so that
-the creep of a stuck load is not lost in the rate of the hull.
+docs/developers/physics.md, written out here state by state; the relative rate v is a state itself,
+so that the creep of a stuck load is not lost in the rate of the hull.
 
     J dv/dt = N Kt i - T + Td + k a + c da/dt - J dwb/dt       w = v + wb
     L di/dt = Kpc (i* - i) + Kic integral of (i* - i) - R i - Ke N v

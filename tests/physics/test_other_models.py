@@ -170,6 +170,7 @@ def test_ten_elements_give_back_what_they_store() -> None:
     assert MAXWELL.stored_energy(options, state) == pytest.approx(0.5 * 20000 * 2e-4**2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_bench_with_ten_elements_is_the_same_alone_and_in_company() -> None:
     push = Polyline(times=(0.0, 0.15, 0.3), values=(0.0, 40.0, -40.0))
     turning = task(mode="torque", command=push, duration=0.3)
@@ -245,7 +246,7 @@ def test_a_model_of_the_former_kind_is_refused_by_name() -> None:
         line[0] = 0.0
 
     fields = {name: getattr(MAXWELL, name) for name in MAXWELL.__dataclass_fields__}
-    with pytest.raises(TypeError, match=r"'maxwell'.*v0, v1, h.*docs/plug-ins\.md"):
+    with pytest.raises(TypeError, match=r"'maxwell'.*v0, v1, h.*docs/developers/plug-ins\.md"):
         FrictionModel(**{**fields, "step": former})
     with pytest.raises(TypeError, match=r"'maxwell'.*fixed state size"):
         FrictionModel(**{**fields, "state_size": 10})

@@ -195,7 +195,7 @@ def test_a_path_that_a_plug_in_does_not_declare_is_refused(lab: Laboratory) -> N
 
 
 def sha256(folder: Path, *names: str) -> str:
-    """As `docs/archive-format.md` says it."""
+    """As `docs/developers/archive-format.md` says it."""
     whole = hashlib.sha256()
     for name in sorted(names):
         content = (folder / name).read_bytes()

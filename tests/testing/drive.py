@@ -1,4 +1,4 @@
-"""The other end of docs/writing-a-backend.md: a TX-1 that moves exactly as it is told."""
+"""The device of docs/developers/writing-a-backend.md: a TX-1 that moves as commanded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/writing-a-backend.md: its backend passes the kit, and runs a protocol as a plug-in."""
+"""docs/developers/writing-a-backend.md: its backend passes the kit, and runs as a plug-in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.forks import MODULES, forks_of
 from tests.testing.drive import Drive
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "writing-a-backend.md").read_text()
+PAGE = (ROOT / "docs" / "developers" / "writing-a-backend.md").read_text()
 CHECKS = backend_checks()
 
 

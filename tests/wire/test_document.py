@@ -1,4 +1,4 @@
-"""docs/serial-protocol.md says what the code does: numbers, tables, frames in hexadecimal."""
+"""docs/developers/serial-protocol.md agrees with the code: numbers, tables, frames."""
 
 import re
 import struct
@@ -11,7 +11,9 @@ from campaign.wire.codes import COMMANDS, VERSION, Code, Tag
 from campaign.wire.frames import MAX_BODY, MAX_ENCODED, FrameDecoder, encode_frame
 from campaign.wire.statemachine import after, after_hello, after_silence
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "serial-protocol.md").read_text("utf-8")
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "developers" / "serial-protocol.md").read_text(
+    "utf-8"
+)
 FLAT = " ".join(DOCUMENT.split())
 
 

@@ -3,7 +3,7 @@
 Its leaves are logical: the samples of a series as numbers, in blocks, however HDF5 lays them out.
 A trial's record names every series with its unit and its leaf; the run's seal names the digest of
 every record and of every text. So whoever has the digest of the seal has the whole run, and nothing
-in it can change places. `docs/archive-format.md` defines each digest for other programs.
+in it can change places. `docs/developers/archive-format.md` defines each digest for other programs.
 """
 
 from __future__ import annotations

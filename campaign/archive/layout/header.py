@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from campaign.trial import Role, Tree, Trial
 
 FORMAT = 3
-"""Version of the archive format (`docs/archive-format.md`); a reader reads its own alone."""
+"""Version of the archive format (`docs/developers/archive-format.md`); readers read no other."""
 
 SEALED = ".nxs"
 PARTIAL = ".partial"

@@ -189,7 +189,7 @@ class FrictionModel:
             raise TypeError(
                 f"the friction model {self.name!r} has a step function of "
                 f"({', '.join(form)}) or a fixed state size, as models had before engine 2: "
-                "docs/plug-ins.md says under 'A friction model of before engine 2' what to change"
+                "see 'A friction model of before engine 2' in docs/developers/plug-ins.md"
             )
         if len(inspect.signature(self.state_size).parameters) != 2:
             raise TypeError(
