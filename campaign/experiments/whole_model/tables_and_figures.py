@@ -19,6 +19,10 @@ from campaign.experiments.whole_model.whole_model_fit import Fit, Whole
 from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
 
+MOST_DRAWN = 5
+"""Models whose curves a figure shows: more have the same looks, or hide one another."""
+MOST_LEFT_OVER = 4
+"""Models, the plain regression among them, whose residuals a figure shows."""
 FINE = 200
 """Rates of one direction at which friction is drawn."""
 PLAIN = "plain regression"
@@ -91,19 +95,28 @@ def _curve_figure(found: Whole, plain: InverseDynamics | None) -> Figure:
     curves = [Curve(rate, rest, "rows", "measured", "points")]
     if plain is not None:
         curves.append(Curve(sweep, _regressed(_plainest(plain), sweep), PLAIN, PLAIN))
+    drawn = _drawn(found, MOST_DRAWN)
     curves += [
-        Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in found.fits
+        Curve(sweep, _steady(each, sweep), each.model.name, each.model.name) for each in drawn
     ]
+    left_out = len(found.fits) - len(drawn)
+    which = f" Without the {left_out} models that predict omitted blocks worst." if left_out else ""
     return Figure(
         key="steady-friction",
         title="Friction of the fitted models",
         caption="Torque less what accelerates the inertia (dots: rows), and the friction of steady "
         "sliding of each fitted model; the plain regression is least squares without any delay. "
-        "Rows beside the lines were not steady.",
+        f"Rows beside the lines were not steady.{which}",
         alt="Friction torque over rate with the curves of the fitted models.",
         panels=(Panel(RATE, FORCE, tuple(curves), marks=(Mark("", y=0.0),)),),
         trials=tuple(dict.fromkeys(piece.trial for piece in found.pieces)),
     )
+
+
+def _drawn(found: Whole, most: int) -> list[Fit]:
+    """The best model and those that predict omitted blocks best, in their order."""
+    order = sorted(range(len(found.fits)), key=lambda i: (i != found.best, found.fits[i].held_out))
+    return [found.fits[i] for i in sorted(order[:most])]
 
 
 def _measured(found: Whole, best: Fit) -> tuple[Array, Array]:
@@ -150,10 +163,11 @@ def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[M
         reference = _plainest(plain)
         if reference.predictions:
             told.append((PLAIN, together(reference.predictions)))
-    told += [(each.model.name, together(each.predictions)) for each in found.fits]
+    fits = _drawn(found, MOST_LEFT_OVER - len(told))
+    told += [(each.model.name, together(each.predictions)) for each in fits]
     place = _places(found, unseen)
     panels = []
-    for name, prediction in told[-4:]:
+    for name, prediction in told:
         left = prediction.residuals
         title = f"{name}: {100 * prediction.relative:.2f} %"
         panels += [
