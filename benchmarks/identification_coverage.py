@@ -4,8 +4,7 @@ Run with `python -m benchmarks.identification_coverage [--rigs 100] [--whole 24]
 The rigs, half of them linear, are those of `tests.estimation.blind_rigs`: simulated without
 this program, with encoders, tachometers, noise, delays, and friction of many kinds; truth is read
 when everything has been identified. Columns: how many intervals hold (with the 95 % interval of
-that share, Clopper and Pearson), how many have none, their median half-width. The table goes into
-docs/identification.md with `--write`.
+that share, Clopper and Pearson), how many have none, their median half-width.
 """
 
 from __future__ import annotations
