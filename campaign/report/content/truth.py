@@ -158,22 +158,19 @@ def biases(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _bias(quantity: str, off: Array, source: str) -> str:
-    """`stiffness at rest: all 4 lie below what is true, by 7 to 10 %, more than ...`.
+    """`stiffness at rest: bias −7 to −10 % (4 of 4; exceeds scatter)`.
 
     Where they lie on both sides: the mean, and from where to where they range.
     """
     mean, low, high = float(np.mean(off)), float(np.min(off)), float(np.max(off))
-    side = "below" if mean < 0 else "above"
     if low > 0 or high < 0:
-        ends = " to ".join(number(end, 2) for end in sorted((abs(low), abs(high))))
-        where = f"all {len(off)} lie {side} what is true, by {ends} %, more than their scatter"
+        ends = " to ".join(_signed(end) for end in sorted((low, high), key=abs))
+        where = f"bias {ends} % ({len(off)} of {len(off)}; exceeds scatter)"
     else:
-        where = (
-            f"on average {number(abs(mean), 2)} % {side} what is true ({_signed(low)} to"
-            f" {_signed(high)} %), more than the scatter of the {len(off)}"
-        )
-    told = f"{quantity}: {where} explains"
-    return f"{told} (largest systematic part: {in_axis_terms(source)})" if source else told
+        ends = f"{_signed(low)} to {_signed(high)} %"
+        where = f"bias {_signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
+    told = f"{quantity}: {where}"
+    return f"{told}; largest systematic part: {in_axis_terms(source)}" if source else told
 
 
 def _signed(value: float) -> str:
