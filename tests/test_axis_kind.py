@@ -291,13 +291,13 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
     with axis_terms(DIRECT):
         assert list(remarks(table)) == [remark]
         assert systematic(found) == "force constant unknown"
-        assert "(largest systematic part: force constant)" in _bias(
+        assert "; largest systematic part: force constant" in _bias(
             "f", np.array([1.0, 2.0, 3.0]), "torque constant"
         )
     assert systematic(found) == "torque constant unknown"
 
 
-def test_who_is_spoken_of_ends_with_what_was_said() -> None:
+def test_axis_terms_end_with_their_block() -> None:
     def told() -> Any:
         for _ in range(2):
             yield is_linear()
