@@ -79,7 +79,7 @@ def vectors(made: Sampled) -> Array:
 
 
 def _c(made: Sampled, head: list[str], *, single: bool = False) -> dict[str, str]:
-    name = f"compensation_{made.name.replace('-', '_')}"
+    name = made.identifier
     return {
         f"{name}.c": c_code(made, head, single=single),
         f"{name}_test.c": vectors_code(made, vectors(made), single=single),
@@ -118,7 +118,7 @@ def _json(made: Sampled, head: list[str]) -> dict[str, str]:
         "vectors": np.column_stack([inputs, made.torques(inputs)]).tolist(),
     }
     text = json.dumps(tree, indent=1, ensure_ascii=False) + "\n"
-    return {f"compensation_{made.name.replace('-', '_')}.json": text}
+    return {f"{made.identifier}.json": text}
 
 
 def _head(bench: str, made: Sampled) -> Iterator[str]:

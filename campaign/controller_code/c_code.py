@@ -31,7 +31,7 @@ SINGLE = 1e-3
 
 def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
     """The whole of `NAME.c`; head: lines that stand above it. single: in floats."""
-    name, program = f"compensation_{made.name.replace('-', '_')}", Program(single=single)
+    name, program = made.identifier, Program(single=single)
     interfaces = tuple(made.interfaces)
     called = [_step(program, each) for each in interfaces]
     sine = _sine(program) if any(each.ripple[0] for each in interfaces) else ""
@@ -40,7 +40,7 @@ def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
         for e, each in enumerate(interfaces)
     ]
     parts = [
-        "/*", *(f" * {line}".rstrip() for line in head), " */",
+        "/*", *(f" * {_comment(line)}".rstrip() for line in head), " */",
         "#include <math.h>", "#include <stdint.h>", "#include <string.h>", "",
         SINGLE_PRELUDE if single else PRELUDE, TYPES, *program.texts, *numbers, "",
         _state(name, made), _reset(name),
@@ -49,12 +49,17 @@ def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
     return "\n".join(parts)
 
 
+def _comment(line: str) -> str:
+    """Text of a bench file, which may end no comment and begin none."""
+    return " ".join(line.split()).replace("*/", "* /").replace("/*", "/ *")
+
+
 def vectors_code(made: Sampled, inputs: Array, *, single: bool = False) -> str:
     """A program that ends with 0 where the code gives the torques of `Sampled.torques`.
 
     To the bit; in single precision to `SINGLE` of the largest.
     """
-    name = f"compensation_{made.name.replace('-', '_')}"
+    name = made.identifier
     torques = made.torques(inputs)
     rows = np.column_stack([inputs, torques])
     told = ",\n".join("    {" + ", ".join(map(float.hex, map(float, row))) + "}" for row in rows)

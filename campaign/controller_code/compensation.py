@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numba
@@ -42,6 +43,11 @@ class Sampled:
     name: str
     bench: CompleteBench
     lanes: Lanes
+
+    @property
+    def identifier(self) -> str:
+        """The name in C and of files: a bench may call its compensations anything."""
+        return "compensation_" + re.sub(r"[^A-Za-z0-9]", "_", self.name)
 
     @classmethod
     def of(cls, bench: CompleteBench, name: str) -> Sampled:

@@ -173,6 +173,21 @@ def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_p
     assert subprocess.run(["./test"], cwd=folder, check=False).returncode == 1
 
 
+def test_names_of_a_bench_stay_words_in_comments_and_identifiers(tmp_path: Path) -> None:
+    """Whoever wrote the bench file writes no code for the controller."""
+    evil = "*/ #error gone\n#error /*"
+    tree = with_friction(TRIES["coulomb"] | {"model": "coulomb"}).model_dump()
+    tree["name"], tree["compensation"] = evil, {f"../{evil}": tree["compensation"]["tried"]}
+    tree.pop("plant", None)
+    bench = complete(Bench.model_validate(tree, context={"si": True}))
+    made = Sampled.of(bench, f"../{evil}")
+    assert made.identifier.isidentifier()
+    code = c_code(made, [f"The bench {evil}", f"run {evil}"])
+    path = tmp_path / f"{made.identifier}.c"
+    path.write_text(code, encoding="utf-8")
+    subprocess.run([COMPILERS[0], *FLAGS, "-c", path.name], cwd=tmp_path, check=True)
+
+
 def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     made = Sampled.of(simulable("platform"), "observer")
     name = "compensation_observer"

@@ -195,7 +195,7 @@ def _notes(best: Fit) -> Iterator[str]:
 
 
 def _conclusions(best: Fit, as_good: Sequence[str]) -> Iterator[Conclusion]:
-    told = [best.fit.estimates[each.name] for each in best.model.numbers if each.leading]
+    told = [best.fit.estimates[each.name] for each in best.model.numbers if each.is_coulomb]
     parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
     for index, each in enumerate(told):
         way = each.name.rpartition("_")[2] if len(told) > 1 else ""

@@ -13,6 +13,7 @@ from campaign.text import nearest
 
 USUAL = ("stribeck", "lugre")
 """What is tried unless something else is said; the first one with directions alike, too."""
+WAYS = (("directions alike", False), ("by direction", True))
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,7 @@ def models(sizes: Sizes, names: Sequence[str] = USUAL) -> Sequence[Model]:
         if unknowns is None:
             there = ", ".join(each for each in known if known[each].unknowns is not None)
             raise ValueError(f"{name} does not say what is fitted of it; there are {there}")
-        ways = (
-            [("by direction", True)]
-            if found
-            else [("directions alike", False), ("by direction", True)]
-        )
-        for way, by_direction in ways:
+        for way, by_direction in WAYS[1:] if found else WAYS:
             stated = unknowns(sizes, by_direction)
             numbers = tuple(each for each in stated if isinstance(each, FrictionUnknown))
             derived = tuple(each for each in stated if isinstance(each, DerivedOption))

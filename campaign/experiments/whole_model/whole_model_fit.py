@@ -228,8 +228,8 @@ def _fitted(
     other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
-    fit = _with_delay(with_bases(_with_band(fit, again), model), doubt)
-    fit = resolved(fit, model, motions, filtering)
+    fit = _with_delay(_with_band(fit, again), doubt)
+    fit = with_bases(resolved(fit, model, motions, filtering), model)
     say("blocks left out")
     forces = [
         late_force(motion, filtering).at(0.0) * moving(motion, filtering) for motion in motions
@@ -312,7 +312,8 @@ def with_bases(fit: ModelFit, model: Model) -> ModelFit:
     found = dict(fit.estimates)
     for each in model.numbers:
         bases = [found[name] for name in each.rests_on]
-        if bases and all(base.origin is not Origin.MEASURED for base in bases):
+        lost = bases and all(base.origin is not Origin.MEASURED for base in bases)
+        if lost and found[each.name].origin is Origin.MEASURED:
             reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
             found[each.name] = _open(found[each.name], reason)
     return replace(fit, estimates=found)
