@@ -19,6 +19,7 @@ import numpy as np
 from campaign.estimation.inverse.motion import Filtering, motion_of_position
 from campaign.experiments.any_motion.motions import Moved
 from campaign.experiments.whole_model.whole_model_fit import Whole, find
+from campaign.physics.friction import friction_models
 from campaign.physics.friction_response import Along
 
 LINE: dict[str, Any] = {
@@ -42,6 +43,7 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "gms": {**CURVE, "bristle_stiffness": 200.0, "attraction": 20.0},
 }  # fmt: skip
 """N m, rad, s."""
+FITTED = tuple(name for name in TRUTHS if friction_models()[name].unknowns is not None)
 INERTIA, RATE = 0.8, 1000.0
 TORQUE_NOISE, ANGLE_NOISE = 0.02, 2e-6
 
@@ -74,11 +76,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=10)
     parser.add_argument("--starts", type=int, default=1, help="fits of each model")
-    parser.add_argument("--truth", choices=TRUTHS, action="append")
-    parser.add_argument("--models", choices=TRUTHS, nargs="+", default=tuple(TRUTHS))
+    parser.add_argument("--truth", choices=FITTED, action="append")
+    parser.add_argument("--models", choices=FITTED, nargs="+", default=FITTED)
     arguments = parser.parse_args()
     rows = []
-    for truth in arguments.truth or TRUTHS:
+    for truth in arguments.truth or FITTED:
         named = alone = 0
         for seed in range(arguments.draws):
             found = identified(truth, seed, arguments.models, starts=arguments.starts)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.model_choice import identified
+from benchmarks.model_choice import FITTED, INERTIA, TRUTHS, identified
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_position
 from campaign.estimation.unknowns import Unknown
@@ -238,6 +238,29 @@ def test_intervals_hold_and_a_jump_of_friction_has_no_bristles(count: int) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("truth", ["armstrong", "bliman-sorine"])
+@pytest.mark.parametrize("count", [1, pytest.param(24, marks=pytest.mark.statistics)])
+def test_intervals_of_a_models_own_numbers_hold(truth: str, count: int) -> None:
+    """Of every option by direction, fitted or derived, and of the inertia."""
+    whole = TRUTHS[truth]
+    true = {
+        "inertia": INERTIA,
+        **whole,
+        **{f"negative.{k}": v for k, v in whole.items() if k != "negative"},
+    }
+    true |= {f"negative.{key}": value for key, value in whole["negative"].items()}
+    held: list[bool] = []
+    for seed in range(20, 20 + count):
+        one = identified(truth, seed, (truth,)).fits[1]
+        told = [(each.key, one.fit.estimates[each.name]) for each in one.model.numbers if each.key]
+        told += [(each.key, derived(each, one.values, one.fit)) for each in one.model.derived]
+        told.append(("inertia", one.fit.estimates["inertia"]))
+        held += [holds(each, true[key]) for key, each in told if each.has_interval]
+    assert len(held) >= 6 * count
+    assert rejected({"all": held}, "less") == {}
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("truth", ["coulomb", "dahl", "lugre"])
 def test_the_model_that_a_rig_has_is_named(truth: str) -> None:
     """LuGre can be Dahl and Coulomb friction as well, with numbers that tell nothing."""
@@ -246,15 +269,10 @@ def test_the_model_that_a_rig_has_is_named(truth: str) -> None:
     assert all(each.startswith(truth) for each in found.as_good)
 
 
-def test_a_model_that_states_no_unknowns_is_refused_by_name(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_model_that_states_no_unknowns_is_refused_by_name() -> None:
     sizes = Sizes((2.0, 2.0), (0.01, 0.01), 0.5, 1.0)
-    silent = {**friction_models(), "silent": replace(friction_models()["coulomb"], unknowns=None)}
-    with monkeypatch.context() as patched:
-        patched.setattr("campaign.experiments.whole_model.models.friction_models", lambda: silent)
-        with pytest.raises(ValueError, match="silent does not say what is fitted of it; there are"):
-            models(sizes, ("silent",))
+    with pytest.raises(ValueError, match="karnopp does not say what is fitted of it; there are"):
+        models(sizes, ("karnopp",))
     with pytest.raises(ValueError, match="no friction model 'lugr'; did you mean 'lugre'"):
         models(sizes, ("lugr",))
     assert [each.name for each in models(sizes, ("gms", "dahl"))] == [
@@ -264,7 +282,7 @@ def test_a_model_that_states_no_unknowns_is_refused_by_name(
     ]
 
 
-@pytest.mark.parametrize("name", friction_models())
+@pytest.mark.parametrize("name", FITTED)
 def test_what_a_model_states_makes_valid_options(name: str) -> None:
     """At the start and at both bounds of every unknown."""
     sizes = Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5)

@@ -11,6 +11,9 @@ break-away torque Ts; then it is at rest, held by what acts, up to Ts. Both agre
 where they are Equation 3.3. The engine finds where within a step the load stops and breaks away,
 as for every dry model (`campaign.physics.dry_step`), so nothing chatters; a band is then no need
 of numerics. Where a step crosses the jump of s at DV, that step is of first order.
+
+It states no unknowns: the residual of a fit jumps with DV, searches end in local optima, and of 24
+rigs the intervals of Ts held 4 of 13, those of vs none.
 """
 
 from __future__ import annotations
@@ -33,14 +36,6 @@ from campaign.physics.friction.stribeck import (
     mean_viscous,
 )
 from campaign.physics.friction.stribeck import steady_state as stribeck_steady_state
-from campaign.physics.friction.unknowns import (
-    SLIDE_SLOWER,
-    FrictionUnknown,
-    Lasting,
-    Sizes,
-    Unknowns,
-    curve,
-)
 from campaign.physics.step_function import Motion
 from campaign.units import AngularRate
 
@@ -91,16 +86,6 @@ def steady_state(options: KarnoppOptions, velocity: Array) -> Array:
     return torque
 
 
-def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
-    passing = Lasting("passing the band", lambda options, turning: options["zero_band"] / turning)
-    band = FrictionUnknown(
-        "zero_band", "zero_band", "rad/s", "Rate below which it is brought to rest and held.",
-        1e-4 * sizes.rate, sizes.rate, 0.05 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
-        lasts=passing,
-    )  # fmt: skip
-    return (*curve(sizes, by_direction=by_direction), band)
-
-
 FRICTION = FrictionModel(
     name="karnopp",
     summary="static: Stribeck friction with a band of rates in which it stops and holds",
@@ -121,5 +106,4 @@ FRICTION = FrictionModel(
         "within its band it is the torque that acts on the load, which a controller does not know; "
         "outside it is 'stribeck'"
     ),
-    unknowns=_unknowns,
 )
