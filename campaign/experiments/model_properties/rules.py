@@ -1,0 +1,109 @@
+"""The rules by which a friction model has a property, with a control each way (Table 3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+MET, PARTLY, BLANK = 1.0, 0.5, 0.0
+"""The marks +, o and blank of the thesis' table."""
+MARKS = {MET: "+", PARTLY: "o", BLANK: "–"}
+LOSS = 0.05
+"""Loss factor from which a presliding loop is one: 0 for a spring, 4/pi for dry sliding."""
+CLOSES = 0.01
+"""Of the torque of the outer loop, by which an inner loop may miss the point where it began."""
+REVERSIBLE = 0.5
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A property, and how a measured number decides on it.
+
+    Attributes:
+        name: of the property, as the table's row.
+        shows: name of the number that decides.
+        threshold: from which the property is met; from half of it, it is met partly.
+        sign: name of a further number that must be above zero, or the property is met partly.
+        text: the rule, for a reader.
+        positive, negative: the controls: a model that has the property, and one that lacks it.
+    """
+
+    name: str
+    shows: str
+    threshold: float
+    text: str
+    positive: str
+    negative: str
+    sign: str = ""
+
+    def mark(self, numbers: Mapping[str, float]) -> float:
+        """The mark by what was measured of a model, name to number."""
+        value = numbers[self.shows]
+        if value < 0.5 * self.threshold:
+            return BLANK
+        whole = value >= self.threshold and not (self.sign and numbers[self.sign] <= 0.0)
+        return MET if whole else PARTLY
+
+
+RULES = (
+    Rule(
+        "coulomb friction", "coulomb_share", 0.5,
+        "torque of sliding extrapolated to zero rate, over Tc: at least 0.5",
+        positive="coulomb", negative="viscous friction alone",
+    ),
+    Rule(
+        "viscous friction", "viscous_share", 0.5,
+        "slope of the torque of fast sliding over the rate, over σ2: at least 0.5",
+        positive="coulomb", negative="dahl",
+    ),
+    Rule(
+        "static friction", "stiction_share", 0.5,
+        "breakaway torque of the slowest ramp less that of sliding, over Ts − Tc: at least 0.5",
+        positive="stribeck", negative="coulomb",
+    ),
+    Rule(
+        "stribeck effect", "dip_share", 0.5,
+        "fall of the torque of sliding with the rate, over Ts − Tc: at least 0.5, and a rise above",
+        positive="stribeck", negative="coulomb", sign="rise_share",
+    ),
+    Rule(
+        "friction lag", "lag_share", 0.05,
+        "width of the loop around a positive rate, over Ts − Tc: at least 0.05, and at a tenth of "
+        "the frequency at most half of it",
+        positive="lugre", negative="stribeck", sign="lag_vanishes",
+    ),
+    Rule(
+        "varying breakaway", "breakaway_fall", 0.1,
+        "fall of the breakaway torque over three decades of ramp rate, over Ts − Tc: at least 0.1",
+        positive="lugre", negative="stribeck",
+    ),
+    Rule(
+        "stick-slip", "rests", 10.0,
+        "the load, pulled through a soft spring, comes to rest in ten successive periods, and "
+        "through a stiff one in none",
+        positive="stribeck", negative="coulomb", sign="smooth_when_stiff",
+    ),
+    Rule(
+        "presliding", "reversible_share", REVERSIBLE,
+        "share of a displacement of Tc / 2 σ0 that comes back as the torque goes to zero: at least "
+        "0.5, with a loop that loses energy and an inner loop that closes to 1 %",
+        positive="gms", negative="stribeck", sign="hysteresis_with_memory",
+    ),
+    Rule(
+        "nonlocal memory", "closure", 1.0,
+        "1 % over the share by which an inner loop misses the point where it began: at least 1, "
+        "and a loop that loses energy",
+        positive="gms", negative="lugre", sign="hysteresis",
+    ),
+    Rule(
+        "no drift", "drift_margin", 1.0,
+        "0.1 % of Tc / σ0 over the drift in a cycle, cycles 10 to 100, under a torque of 0.4 Tc "
+        "with a vibration of 0.2 Tc: at least 1",
+        positive="stribeck", negative="lugre",
+    ),
+    Rule(
+        "dwell time", "dwell_rise", 0.1,
+        "rise of the breakaway torque from 0.01 s to 100 s at rest, over Ts − Tc: at least 0.1",
+        positive="armstrong", negative="lugre",
+    ),
+)  # fmt: skip
