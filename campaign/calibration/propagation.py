@@ -25,6 +25,7 @@ from campaign.estimation.linear_uncertainty import Uncertainty
 from campaign.estimation.multi_start import Display, Progress
 from campaign.experiments.interface import Experiment
 from campaign.protocol.schema import Test
+from campaign.published.values import NO_SIZE
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-12
@@ -118,7 +119,7 @@ def _of(problem: CalibrationProblem, test: Test) -> CalibrationProblem:
         for name, table in problem.published.items()
         if name in test.entry.reproduces
         for cell in table.cells
-        if cell.relation != "rank"
+        if cell.relation not in NO_SIZE
     )
     unit = (make_target(c, DEFAULT_WEIGHT if c.value else f"1 {c.unit}".strip()) for c in cells)
     return replace(problem, tests=(test,), targets=tuple(unit))

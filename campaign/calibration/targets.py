@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.published import patterns
-from campaign.published.values import Cell, Published
+from campaign.published.values import NO_SIZE, Cell, Published
 from campaign.published.verdicts import CLAIMS
 from campaign.units import convert, split_quantity
 
@@ -60,7 +60,7 @@ class Target:
         That is so of what was not found, a printed zero, a place in an order, a claim that is met.
         """
         claim = self.cell.relation in CLAIMS and self.residual(found) == 0.0
-        if found is None or not self.cell.value or claim or self.cell.relation == "rank":
+        if found is None or not self.cell.value or claim or self.cell.relation in NO_SIZE:
             return math.nan
         return 100 * (found / self.cell.value - 1)
 

@@ -25,7 +25,9 @@ from campaign.units import to_si
 T = TypeVar("T")
 THESIS = "thesis"
 """What a protocol or a bench calls the packaged document."""
-Relation = Literal["equal", "near", "at most", "at least", "rank"]
+Relation = Literal["equal", "near", "at most", "at least", "rank", "mark"]
+NO_SIZE = ("rank", "mark")
+"""Relations of printed numbers of which no percent can be told."""
 Mark = Literal["inconsistent", "not reproducible"]
 
 
@@ -40,7 +42,7 @@ class Part(Options):
     """The unit of the printed number; absent for a number without one."""
     relation: Relation | None = None
     """What the document claims: this value (the default), near it, at most or at least it; or that
-    it is a place in an order, of which no percent can be told."""
+    it is a place in an order, or a mark on a scale."""
     decimals: int | None = Field(default=None, ge=0, le=12)
     """Printed digits after the point."""
     conditions: dict[str, str | int | float | bool] = {}

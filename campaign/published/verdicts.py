@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from campaign.estimate import OF_ONE_TRIAL, Kind, Origin
-from campaign.published.values import Cell
+from campaign.published.values import NO_SIZE, Cell
 from campaign.reason import NONE, Cause, Reason
 from campaign.result import Finding
 from campaign.units import convert
@@ -170,11 +170,11 @@ def half_digit(cell: Cell) -> float:
 def deviation(cell: Cell, found: Reproduced, verdict: Verdict) -> float | None:
     """Percent of the published value by which the reproduced one is off.
 
-    None where percent mean nothing: of a rank, of a claim that is not missed, of a bound, of what
-    is not determined, of a printed 0.
+    None where percent mean nothing: of a rank or a mark, of a claim that is not missed, of a bound,
+    of what is not determined, of a printed 0.
     """
     claim = cell.relation in CLAIMS and verdict is not Verdict.MISSED
     number = found.is_determined and not found.is_bound
-    if cell.relation == "rank" or claim or not number or not cell.value:
+    if cell.relation in NO_SIZE or claim or not number or not cell.value:
         return None
     return 100 * (found.value - cell.value) / cell.value

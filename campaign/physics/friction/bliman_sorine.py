@@ -191,6 +191,7 @@ FRICTION = FrictionModel(
     viscous=mean_viscous,
     steady_state=coulomb_steady_state,
     changeable=(*CURVE, "bristle_stiffness", "slow_stiffness"),
+    added=("viscous_friction",),
     small_signal=_small_signal,
     stored_energy=_stored_energy,
     unknowns=_unknowns,

@@ -133,6 +133,7 @@ FRICTION = FrictionModel(
     viscous=mean_viscous,
     steady_state=coulomb_steady_state,
     changeable=(*CURVE, "bristle_stiffness"),
+    added=("viscous_friction",),
     small_signal=_small_signal,
     # The power lost is T v (1 - y^i), never negative: y < 1 where T has the sign of v, else > 1.
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),

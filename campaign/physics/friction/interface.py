@@ -163,6 +163,7 @@ class FrictionModel:
         no_compensation: why it cannot compensate, for a reader; "" where it can.
         unknowns: the parameters that motions identify, from the friction's sizes, for each
             direction (True) or both alike. None: it is not identified.
+        added: names of options that the equations of its source do not have.
     """
 
     name: str
@@ -181,6 +182,7 @@ class FrictionModel:
     fastest: Callable[[Any], float] | None = None
     no_compensation: str = ""
     unknowns: Callable[[Sizes, bool], Unknowns] | None = None
+    added: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""

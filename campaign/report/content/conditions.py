@@ -35,7 +35,13 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
     told |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
     for path, value in test.options.items():
         if path not in told and value is not None and value != []:
-            yield path_words(path), units.value(path, value)
+            yield path_words(path), _names(value) or units.value(path, value)
+
+
+def _names(value: Any) -> str:
+    """Of tables that have names only these; what is in them stands in a table of its own."""
+    named = isinstance(value, dict) and value and all(isinstance(v, dict) for v in value.values())
+    return ", ".join(value) if named else ""
 
 
 def _points(test: AnalysedTest) -> dict[str, list[Any]]:

@@ -1,0 +1,169 @@
+"""Which properties of friction each model has: Table 3.1 of the thesis, measured.
+
+Each model is described by each parameter set, without what its source's equations do not have, and
+goes through the virtual experiments; rules that were stated before decide (`rules`). A mark holds
+for all sets, or the model's property depends on its parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from statistics import median
+from typing import Any
+
+from pydantic import Field, JsonValue
+
+from campaign.channels import FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.estimate import Estimate
+from campaign.estimation.sampled_curve import bracketed
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.model_properties.parameter_set import Scale, options_of, with_friction
+from campaign.experiments.model_properties.rules import MARKS, MET, RULES, Judged
+from campaign.experiments.model_properties.tables_and_figures import figures, tables
+from campaign.experiments.model_properties.virtual_experiments import (
+    estimates,
+    numbers_of,
+    requests,
+)
+from campaign.experiments.shared.common import COUNTED, failures_note
+from campaign.options import Options
+from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
+from campaign.reason import Cause
+from campaign.result import Conclusion, Finding, Result
+from campaign.trial import TrialRequest
+
+STEP = 1e-4
+"""s, for the states of models that keep some of their past."""
+RULED = Cause("by a rule", "a mark by a rule")
+
+
+class ModelPropertiesOptions(Options):
+    """Options of a test of model properties."""
+
+    models: tuple[str, ...] = Field(min_length=1, max_length=100)
+    """Friction models."""
+    sets: dict[str, dict[str, JsonValue]] = Field(min_length=1, max_length=10)
+    """Parameter sets by name, as in `[friction.NAME]`; a model takes the parameters that it has.
+    `model` of a set is the one whose Ts, Tc, vs and σ0 scale the experiments."""
+
+
+def _trials(options: ModelPropertiesOptions, bench: Bench) -> Iterator[TrialRequest]:
+    known, inertia = friction_models(), bench.axis.inertia
+    if inertia is None:
+        raise ValueError("the bench does not say axis.inertia: a pushed load needs one")
+    for name, given in options.sets.items():
+        used = {"model"}
+        for model in options.models:
+            tree = with_friction(bench, options_of(model, given, own=True))
+            scale = Scale.of(given, inertia, model)
+            used |= known[model].options.model_fields.keys()
+            for request in requests(scale, bench):
+                point = {"set": name, "model": model, **request.point}
+                yield replace(request, bench=tree, point=point)
+        if wrong := given.keys() - used:
+            raise ValueError(f"sets.{name}: no model has the parameter '{min(wrong)}'")
+
+
+def _scale(data: TrialData) -> Scale:
+    given: Any = data.trial.options["sets"]
+    inertia: Any = bench_of(data.trial).axis.inertia
+    point = data.trial.point
+    return Scale.of(given[str(point["set"])], inertia, str(point["model"]))
+
+
+def _measure(data: TrialData) -> tuple[Estimate, ...]:
+    return tuple(estimates(data, _scale(data)))
+
+
+def _sizes(model: str, given: Any) -> dict[str, int]:
+    """How many of a set's parameters a model takes, and how many numbers of state it has."""
+    options = options_of(model, given, own=True)
+    own = options.model_fields_set - {"model"}
+    return {"parameters": len(own), "state": friction_models()[model].state_size(options, STEP)}
+
+
+def _judged(data: TestData, notes: list[str]) -> Iterator[Judged]:
+    """Each model whose trials are all there."""
+    options = ModelPropertiesOptions.model_validate(data.options, context={"si": True})
+    done = list(data.completed())
+    for model in options.models:
+        numbers = {}
+        for name in options.sets:
+            own = [
+                item
+                for item in done
+                if item.trial.point["model"] == model and item.trial.point["set"] == name
+            ]
+            try:
+                found = [
+                    (each.trial.point, {k: v.value for k, v in metrics(each, _measure).items()})
+                    for each in own
+                ]
+                numbers[name] = numbers_of(found, _scale(own[0]))
+            except (ValueError, LookupError, StopIteration):
+                notes.append(f"{model}, {name}: trials are missing; the model is left out.")
+                break
+        else:
+            yield Judged(model, numbers, _sizes(model, next(iter(options.sets.values()))))
+
+
+def _findings(judged: Judged) -> Iterator[Finding]:
+    conditions = {"model": judged.model}
+    for rule in RULES:
+        marks = judged.marks(rule)
+        ends = marks[0], marks[-1]
+        if ends[0] == ends[1]:
+            mark = Estimate.without_interval("model_property", ends[0], "", RULED())
+        else:
+            mark = bracketed("model_property", median(marks), "", ends, "over parameter sets")
+        yield Finding.of(mark, {**conditions, "property": rule.name})
+    count = Estimate(
+        "model_parameters", judged.sizes["parameters"], "", kind="count", reason=COUNTED()
+    )
+    yield Finding.of(count, conditions)
+
+
+def _analyse(data: TestData) -> Result:
+    notes = list(failures_note(data))
+    found = list(_judged(data, notes))
+    if not found:
+        return Result(notes=tuple(notes))
+    sets: Any = data.options["sets"]
+    return Result(
+        tables(found, sets),
+        figures(found, data),
+        tuple(finding for each in found for finding in _findings(each)),
+        tuple(notes),
+        (_conclusion(found),),
+    )
+
+
+def _conclusion(found: Sequence[Judged]) -> Conclusion:
+    """Which models meet most rules, and which they do not meet, all sets counted."""
+    lacks = {
+        each.model: [rule.name for rule in RULES if each.sign(rule) != MARKS[MET]] for each in found
+    }
+    fewest = min(map(len, lacks.values()))
+    best = [model for model, lacking in lacks.items() if len(lacking) == fewest]
+    lacking = " and ".join(dict.fromkeys(", ".join(lacks[model]) or "none" for model in best))
+    most = f"{len(RULES) - fewest} of {len(RULES)}"
+    text = f"{', '.join(best)}: most properties, {most} with all parameter sets; not {lacking}."
+    return Conclusion((text,))
+
+
+EXPERIMENT = Experiment(
+    name="model_properties",
+    summary="which properties of friction each model has, by rules (Table 3.1)",
+    options=ModelPropertiesOptions,
+    trials=_trials,
+    analyse=_analyse,
+    perturbs_bench=True,
+    requires={
+        FRICTION_TORQUE: "all properties",
+        LOAD_RATE: "breakaway, sliding, stick-slip",
+        RELATIVE_ANGLE: "presliding, drift",
+    },
+    measure=_measure,
+)

@@ -1,0 +1,345 @@
+"""The virtual experiments on a friction model: trials on the scale of its parameter set, numbers.
+
+Four are those of other experiments (Figures 2.8 to 2.10 and 2.12), with options that follow from
+the scale. Presliding, drift and dwell time have motions of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from campaign.channels import FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.estimate import Estimate, Window
+from campaign.estimation.sampled_curve import upward_crossings
+from campaign.experiments import force_rate, friction_lag, stick_slip, stribeck_curve
+from campaign.experiments.interface import Experiment, TrialData
+from campaign.experiments.model_properties.parameter_set import Scale
+from campaign.experiments.model_properties.rules import CLOSES, LOSS, REVERSIBLE
+from campaign.experiments.presliding_hysteresis import Loop
+from campaign.physics.bench import Bench
+from campaign.reason import Cause
+from campaign.result import Array
+from campaign.signals import Polyline
+from campaign.trial import Task, TrialRequest
+
+COMPUTED = Cause(
+    "computed without noise", "computed without noise; its error is that of the time step"
+)
+SLOWEST_RAMP = 1e-3
+"""of sigma0 vs, the ramp on which a bristle takes Ts/sigma0/vs to bend: three decades above it."""
+FREQUENCIES = (0.04, 0.4)
+"""of vs / (2 pi Ts/sigma0), around a rate of 1.3 vs."""
+PULL, SOFT, STIFF = 20.0, 0.3, 5.0
+"""of vs; and of the stiffnesses up to which a pulled load slips and sticks: see `_pull`."""
+PERIODS, PARTS_OF_PERIOD = 14, 200
+RESTS, AT_REST = 0.2, 0.005
+"""Share of a period in which a load at rest moves by less than a share of what the pull moves in a
+period: 0.2 of one that swings about the pull without damping, and just comes to a halt, are 0.013.
+"""
+PATH = (0.0, 1.0, -1.0, 1.0, -1.0, 0.2, -0.3, 0.2, 1.0)
+"""Turning points in presliding, of an amplitude of s / 2 sigma0: a loop twice, an inner loop."""
+SEGMENT, PIECES = 4.0, 50
+"""s between turning points, and straight pieces of rate in it."""
+HELD, SHAKEN, CYCLES = 0.4, 0.2, 100
+"""of Tc: constant torque and amplitude of vibration; cycles, of which the first ten settle."""
+RISE = 0.01
+"""of Ts - Tc, by which fast sliding must lie above the dip to count as a rise."""
+DWELLS = (0.01, 1.0, 100.0)
+"""s at rest."""
+
+
+def _forced(disturbance: Polyline, duration: float, rate: float) -> Task:
+    """A free load, pushed by a torque alone."""
+    return Task(
+        mode="spring",
+        disturbance=disturbance,
+        duration=duration,
+        window=(0.0, duration),
+        sample_rate=rate,
+    )
+
+
+def _moved(command: Polyline, windows: tuple[Window, ...], rate: float) -> TrialRequest:
+    stop = windows[-1].stop
+    task = Task(
+        mode="prescribed", command=command, duration=stop, window=(0.0, stop), sample_rate=rate
+    )
+    return TrialRequest(task, windows=windows)
+
+
+def _ramps(scale: Scale) -> Mapping[str, Any]:
+    rates = SLOWEST_RAMP * scale.stiffness * scale.velocity * 10.0 ** np.arange(4.0)
+    # Far beyond where bristles end to bend, on the fastest ramp, too.
+    slides = PULL * scale.velocity
+    past = math.sqrt(2.0 * slides * scale.inertia * rates[-1]) + scale.viscous * slides
+    return {
+        "torque_rates": rates.tolist(),
+        "peak_torque": 1.5 * (scale.static + past),
+        "sliding_rate": slides,
+    }
+
+
+def _steady(scale: Scale) -> Mapping[str, Any]:
+    return {
+        "speeds": [scale.velocity * times for times in (0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 200.0)],
+        "settle_angle": 50.0 * scale.deflection,
+    }
+
+
+def _lag(scale: Scale) -> Mapping[str, Any]:
+    corner = scale.velocity / (2.0 * math.pi * scale.deflection)
+    return {
+        "mean_rate": 1.3 * scale.velocity,
+        "amplitude": 1.1 * scale.velocity,
+        "frequencies": [share * corner for share in FREQUENCIES],
+    }
+
+
+def _pull(scale: Scale, *, stiff: bool) -> Mapping[str, Any]:
+    """Through a spring well below and well above the stiffness up to which a load slips and sticks.
+
+    A load that is let go at Ts overtakes the pull below `overtakes`. Above, its rate just touches
+    zero after each period, until viscous friction has taken (Ts - Tc)^2 / (2 K J v^2) of it: beyond
+    a stiffness of (overtakes J / 4.7 sigma2)^2 / J in the first period.
+    """
+    rate = PULL * scale.velocity
+    overtakes = (scale.excess / rate) ** 2 / scale.inertia
+    touches = (overtakes * scale.inertia / (4.7 * scale.viscous)) ** 2 / scale.inertia
+    stiffness = STIFF * touches if stiff else SOFT * overtakes
+    turned = math.sqrt(stiffness / scale.inertia)
+    period = 2.0 * scale.excess / (stiffness * rate) + 2.0 * math.pi / turned
+    return {
+        "stiffness": stiffness,
+        "pull_rate": rate,
+        "duration": scale.static / (stiffness * rate) + PERIODS * period,
+        "slip_rate": rate,
+        "sample_rate": max(200.0, 20.0 * turned),
+    }
+
+
+def _presliding(scale: Scale) -> TrialRequest:
+    """Along `PATH`, each way at a rate of half a sine."""
+    way = scale.amplitude * np.diff(PATH)
+    phase = np.arange(1, PIECES + 1) / PIECES
+    shape = 0.5 * math.pi * np.sin(math.pi * phase) / SEGMENT
+    # Straight pieces of a sine enclose a little less than the sine does.
+    shape /= float(np.trapezoid(np.append(0.0, shape), dx=SEGMENT / PIECES))
+    times = SEGMENT * (np.arange(len(way))[:, None] + phase).ravel()
+    rates = np.outer(way, shape).ravel()
+    windows = tuple(
+        Window(f"to {end:g}, {k + 1}", k * SEGMENT, (k + 1) * SEGMENT)
+        for k, end in enumerate(PATH[1:])
+    )
+    command = Polyline(times=(0.0, *map(float, times)), values=(0.0, *map(float, rates)))
+    return _moved(command, windows, 100.0)
+
+
+def _drift(scale: Scale) -> TrialRequest:
+    frequency = 0.1 * scale.natural_rate / (2.0 * math.pi)
+    phase = np.arange(CYCLES * 40 + 1) / 40.0
+    shaken = HELD + SHAKEN * np.sin(2.0 * math.pi * phase)
+    times = (0.0, *((1.0 + phase) / frequency))
+    torque = Polyline(
+        times=tuple(map(float, times)), values=(0.0, *map(float, scale.coulomb * shaken))
+    )
+    stop = (1.0 + CYCLES) / frequency
+    windows = (
+        Window("cycle 10", 10.0 / frequency, 11.0 / frequency),
+        Window("cycle 100", stop - 1.0 / frequency, stop),
+    )
+    return TrialRequest(_forced(torque, stop, 20.0 * frequency), windows=windows)
+
+
+def _dwell(scale: Scale, rest: float) -> TrialRequest:
+    """Slides, rests, and slides on: from the same rate and the same bristles, whatever the rest."""
+    time = 30.0 * scale.deflection / scale.velocity
+    short = 0.1 * scale.deflection / scale.velocity
+    again = short + time + short + rest
+    command = Polyline(
+        times=(0.0, short, short + time, 2.0 * short + time, again, again + short),
+        values=(0.0, scale.velocity, scale.velocity, 0.0, 0.0, scale.velocity),
+    )
+    windows = (Window("slides again", again, again + time),)
+    return _moved(command, windows, 20.0 * scale.velocity / scale.deflection)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A virtual experiment.
+
+    Attributes:
+        requests: its trials, from the scale and a bench of no importance.
+        measure: numbers by name, from a recording and the scale.
+    """
+
+    requests: Callable[[Scale, Bench], Iterable[TrialRequest]]
+    measure: Callable[[TrialData, Scale], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class _AsIf:
+    """A trial as another experiment of other options sees it."""
+
+    data: TrialData
+    options: Any
+
+    @property
+    def trial(self) -> Any:
+        return self.data.trial.model_copy(update={"options": self.options.model_dump(mode="json")})
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.data, name)
+
+
+def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]]) -> Part:
+    """The trials and the metrics of another experiment."""
+    own: Any = experiment.measure
+
+    def chosen(scale: Scale) -> Any:
+        return experiment.options.model_validate(options(scale), context={"si": True})
+
+    def measure(data: TrialData, scale: Scale) -> Mapping[str, float]:
+        seen: Any = _AsIf(data, chosen(scale))
+        return {each.name: each.value for each in own(seen)}
+
+    return Part(lambda scale, bench: experiment.trials(chosen(scale), bench), measure)
+
+
+def _pulled(*, stiff: bool) -> Part:
+    whole = _like(stick_slip.EXPERIMENT, lambda scale: _pull(scale, stiff=stiff))
+    return Part(whole.requests, lambda data, scale: {"rests": rests(data, scale)})
+
+
+def rests(data: TrialData, scale: Scale) -> float:
+    """How often in a row the load rests between two slips, at the end of a pull."""
+    recording, pull = data.recording(), PULL * scale.velocity
+    starts, _ = upward_crossings(recording.time, recording[LOAD_RATE], pull)
+    count = 0
+    for start, end in reversed(list(pairwise(starts))):
+        time, period = np.linspace(start, end, 1 + PARTS_OF_PERIOD), end - start
+        x = np.interp(time, recording.time, recording[RELATIVE_ANGLE])
+        length = round(RESTS * PARTS_OF_PERIOD)
+        if np.min(np.abs(x[length:] - x[:-length])) > AT_REST * pull * period:
+            break
+        count += 1
+    return float(count)
+
+
+def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
+    """Share that comes back, loss factor, and closure of the inner loop."""
+    recording, amplitude = data.recording(), scale.amplitude
+    x, torque = recording[RELATIVE_ANGLE], recording[FRICTION_TORQUE]
+    ends = np.searchsorted(recording.time, SEGMENT * np.arange(len(PATH)) - 1e-9)
+    outer = abs(float(torque[ends[1]]))
+    back = slice(ends[1], ends[2] + 1)
+    below = np.flatnonzero(torque[back] <= 0.0)
+    zero = float(x[back][below[0]]) if len(below) and outer else amplitude
+    loop = slice(ends[1], ends[3] + 1)
+    loss = Loop(x[loop], torque[loop]).sizes(amplitude)["loss_factor"]
+    missed = abs(float(torque[ends[7]] - torque[ends[5]])) / max(outer, 1e-12)
+    return {
+        "reversible_share": max(1.0 - zero / amplitude, 0.0),
+        "loss_factor": loss,
+        "closure": CLOSES / max(missed, 1e-6),
+    }
+
+
+def _drift_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
+    """By the means of two cycles: a load on a spring without damping rings within each."""
+    recording = data.recording()
+    first, last = (
+        float(np.mean(recording.window(each.start, each.stop)[RELATIVE_ANGLE]))
+        for each in data.trial.windows
+    )
+    drift = abs(last - first) / (CYCLES - 10)
+    return {"drift_margin": 1e-3 * scale.coulomb / scale.stiffness / max(drift, 1e-18)}
+
+
+def _dwell_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
+    window = data.trial.windows[0]
+    torque = data.recording().window(window.start, window.stop)[FRICTION_TORQUE]
+    return {"breakaway_after_rest": float(np.max(torque))}
+
+
+PARTS: Mapping[str, Part] = {
+    "ramp": _like(force_rate.EXPERIMENT, _ramps),
+    "steady sliding": _like(stribeck_curve.EXPERIMENT, _steady),
+    "swing": _like(friction_lag.EXPERIMENT, _lag),
+    "soft spring": _pulled(stiff=False),
+    "stiff spring": _pulled(stiff=True),
+    "presliding": Part(lambda scale, bench: [_presliding(scale)], presliding_numbers),
+    "vibration": Part(lambda scale, bench: [_drift(scale)], _drift_numbers),
+    "rest": Part(
+        lambda scale, bench: [
+            replace(_dwell(scale, rest), point={"rest": rest}) for rest in DWELLS
+        ],
+        _dwell_numbers,
+    ),
+}
+
+
+def requests(scale: Scale, bench: Bench) -> Iterator[TrialRequest]:
+    """All trials of a model, each with its part in its point."""
+    for name, part in PARTS.items():
+        for request in part.requests(scale, bench):
+            yield replace(request, point={"part": name, **request.point})
+
+
+def estimates(data: TrialData, scale: Scale) -> Sequence[Estimate]:
+    """What a recording shows, SI."""
+    found = PARTS[str(data.trial.point["part"])].measure(data, scale)
+    return [Estimate.without_interval(name, value, "", COMPUTED()) for name, value in found.items()]
+
+
+Measured = Sequence[tuple[Mapping[str, Any], Mapping[str, float]]]
+"""Of each trial of a model its point, and what was measured."""
+
+
+def numbers_of(found: Measured, scale: Scale) -> dict[str, float]:
+    """What the rules decide on, by name. KeyError, IndexError: a trial is missing."""
+
+    def of(part: str, along: str, name: str) -> Array:
+        own = {float(p[along]): m[name] for p, m in found if p["part"] == part}
+        return np.array([own[at] for at in sorted(own)])
+
+    def single(part: str, name: str) -> float:
+        return next(m[name] for p, m in found if p["part"] == part)
+
+    ramps = of("ramp", "torque_rate", "breakaway_torque")
+    speeds, sliding = (of("steady sliding", "speed", name) for name in ("rate", "friction_torque"))
+    sliding, speeds = sliding[speeds > 0.0], speeds[speeds > 0.0]
+    slope = (sliding[-1] - sliding[-2]) / (speeds[-1] - speeds[-2])
+    coulomb = sliding[-1] - slope * speeds[-1]
+    slow, fast = of("swing", "frequency", "friction_lag_width")
+    rested = of("rest", "rest", "breakaway_after_rest")
+    excess = scale.excess
+    presliding = {
+        name: single("presliding", name) for name in ("reversible_share", "loss_factor", "closure")
+    }
+    loses = presliding["loss_factor"] >= LOSS
+    reversible = presliding["reversible_share"] >= REVERSIBLE
+    # A spring has no loop to close, and dry sliding no presliding.
+    closure = presliding["closure"] if loses and reversible else 0.0
+    return {
+        "reversible_share": presliding["reversible_share"],
+        "closure": closure,
+        "hysteresis_with_memory": float(closure >= 1.0),
+        "coulomb_share": coulomb / scale.coulomb,
+        "viscous_share": slope / scale.viscous,
+        "stiction_share": (ramps[0] - coulomb) / excess,
+        "dip_share": (sliding[0] - sliding.min()) / excess,
+        "rise_share": (sliding[-1] - sliding.min()) / excess - RISE,
+        "lag_share": fast / excess,
+        "lag_vanishes": float(slow <= 0.5 * fast),
+        "breakaway_fall": (ramps[0] - ramps[-1]) / excess,
+        "rests": single("soft spring", "rests"),
+        "smooth_when_stiff": float(single("stiff spring", "rests") == 0.0),
+        "drift_margin": single("vibration", "drift_margin"),
+        "dwell_rise": (rested[-1] - rested[0]) / excess,
+    }
