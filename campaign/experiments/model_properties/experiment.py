@@ -32,7 +32,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.reason import Cause
 from campaign.result import Conclusion, Finding, Result
-from campaign.trial import TrialRequest
+from campaign.trial import TrialRequest, canonical_json
 
 STEP = 1e-4
 """s, for the states of models that keep some of their past."""
@@ -50,20 +50,19 @@ class ModelPropertiesOptions(Options):
 
 
 def _trials(options: ModelPropertiesOptions, bench: Bench) -> Iterator[TrialRequest]:
-    known, inertia = friction_models(), bench.axis.inertia
+    inertia = bench.axis.inertia
     if inertia is None:
         raise ValueError("the bench does not say axis.inertia: a pushed load needs one")
+    known = {key for model in friction_models().values() for key in model.options.model_fields}
     for name, given in options.sets.items():
-        used = {"model"}
+        if wrong := given.keys() - known:
+            raise ValueError(f"sets.{name}: no friction model has the parameter '{min(wrong)}'")
         for model in options.models:
             tree = with_friction(bench, options_of(model, given, own=True))
             scale = Scale.of(given, inertia, model)
-            used |= known[model].options.model_fields.keys()
             for request in requests(scale, bench):
                 point = {"set": name, "model": model, **request.point}
                 yield replace(request, bench=tree, point=point)
-        if wrong := given.keys() - used:
-            raise ValueError(f"sets.{name}: no model has the parameter '{min(wrong)}'")
 
 
 def _scale(data: TrialData) -> Scale:
@@ -71,6 +70,10 @@ def _scale(data: TrialData) -> Scale:
     inertia: Any = bench_of(data.trial).axis.inertia
     point = data.trial.point
     return Scale.of(given[str(point["set"])], inertia, str(point["model"]))
+
+
+def _number_of_trials(data: TrialData) -> int:
+    return sum(1 for _ in requests(_scale(data), bench_of(data.trial)))
 
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
@@ -84,9 +87,13 @@ def _sizes(model: str, given: Any) -> dict[str, int]:
     return {"parameters": len(own), "state": friction_models()[model].state_size(options, STEP)}
 
 
+def _options(data: TestData) -> ModelPropertiesOptions:
+    return ModelPropertiesOptions.model_validate(data.trials[0].trial.options, context={"si": True})
+
+
 def _judged(data: TestData, notes: list[str]) -> Iterator[Judged]:
     """Each model whose trials are all there."""
-    options = ModelPropertiesOptions.model_validate(data.options, context={"si": True})
+    options = _options(data)
     done = list(data.completed())
     for model in options.models:
         numbers = {}
@@ -96,15 +103,15 @@ def _judged(data: TestData, notes: list[str]) -> Iterator[Judged]:
                 for item in done
                 if item.trial.point["model"] == model and item.trial.point["set"] == name
             ]
-            try:
-                found = [
-                    (each.trial.point, {k: v.value for k, v in metrics(each, _measure).items()})
-                    for each in own
-                ]
-                numbers[name] = numbers_of(found, _scale(own[0]))
-            except (ValueError, LookupError, StopIteration):
+            points = {canonical_json(item.trial.point) for item in own}
+            if not own or len(points) < _number_of_trials(own[0]):
                 notes.append(f"{model}, {name}: trials are missing; the model is left out.")
                 break
+            found = [
+                (each.trial.point, {k: v.value for k, v in metrics(each, _measure).items()})
+                for each in own
+            ]
+            numbers[name] = numbers_of(found, _scale(own[0]))
         else:
             yield Judged(model, numbers, _sizes(model, next(iter(options.sets.values()))))
 
@@ -130,9 +137,8 @@ def _analyse(data: TestData) -> Result:
     found = list(_judged(data, notes))
     if not found:
         return Result(notes=tuple(notes))
-    sets: Any = data.options["sets"]
     return Result(
-        tables(found, sets),
+        tables(found, _options(data).sets),
         figures(found, data),
         tuple(finding for each in found for finding in _findings(each)),
         tuple(notes),

@@ -239,7 +239,10 @@ def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:
     outer = abs(float(torque[ends[1]]))
     back = slice(ends[1], ends[2] + 1)
     below = np.flatnonzero(torque[back] <= 0.0)
-    zero = float(x[back][below[0]]) if len(below) and outer else amplitude
+    zero = amplitude
+    if len(below) and outer:
+        around = slice(ends[1] + max(int(below[0]) - 1, 0), ends[1] + int(below[0]) + 1)
+        zero = float(np.interp(0.0, torque[around][::-1], x[around][::-1]))
     loop = slice(ends[1], ends[3] + 1)
     loss = Loop(x[loop], torque[loop]).sizes(amplitude)["loss_factor"]
     missed = abs(float(torque[ends[7]] - torque[ends[5]])) / max(outer, 1e-12)
@@ -302,7 +305,7 @@ Measured = Sequence[tuple[Mapping[str, Any], Mapping[str, float]]]
 
 
 def numbers_of(found: Measured, scale: Scale) -> dict[str, float]:
-    """What the rules decide on, by name. KeyError, IndexError: a trial is missing."""
+    """What the rules decide on, by name; of all trials of a model."""
 
     def of(part: str, along: str, name: str) -> Array:
         own = {float(p[along]): m[name] for p, m in found if p["part"] == part}
