@@ -193,6 +193,7 @@ def test_tables_show_marks_numbers_rules_and_sizes() -> None:
     marks = {row["property"]: row for row in table(controls(), "model-properties").rows}
     assert marks["presliding"]["gms"] == "+"
     assert marks["presliding"]["lugre"] == "o"
+    assert marks["nonlocal memory"]["armstrong"] == "–"  # a spring has no loop to close
     assert marks["dwell time"]["lugre"] == "–"
     sizes = {row["model"]: row for row in table(controls(), "model-sizes").rows}
     assert sizes["lugre"] == {"model": "lugre", "parameters": 6, "state": 1}
