@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -169,14 +170,18 @@ def test_breakaway_grows_with_the_time_of_rest() -> None:
 
 
 def test_samples_do_not_count_on_a_straight_way_and_seeds_do() -> None:
-    given = options(asperities=50)
-    corners = np.array([0.0, 0.3, 0.1, 0.1, 0.17])
-    times = np.array([0.0, 4.0, 5.0, 9.0, 9.5])
+    """Steps of three spots and a little lead some asperities from the end of a spot straight onto
+    the next but one.
+    """
+    given = options(asperities=300)
+    step = 3.08 * length_of(given)
+    corners = np.array([0.0, step, 2.0 * step, 0.1, 0.1, 0.1 - step])
+    times = np.array([0.0, 3.0, 4.0, 5.0, 9.0, 9.5])
     coarse = SPECIMEN.torque(given, times, corners)
     fine = np.unique(np.concatenate((times, np.linspace(0.0, 9.5, 3001))))
     found = SPECIMEN.torque(given, fine, np.interp(fine, times, corners))
     np.testing.assert_allclose(found[np.isin(fine, times)], coarse, atol=1e-9)
-    other = SPECIMEN.torque(options(asperities=50, seed=2), times, corners)
+    other = SPECIMEN.torque(options(asperities=300, seed=2), times, corners)
     assert not np.allclose(other[1:], coarse[1:])
 
 
@@ -193,10 +198,7 @@ def test_no_closed_motion_yields_work(
     given = options(asperities=asperities, seed=seed)
     step = 0.05 * PER_STRETCH
     ends = [0.0, *corners, 0.0]
-    parts = [
-        np.linspace(a, b, 2 + int(abs(b - a) / step))[1:]
-        for a, b in zip(ends[:-1], ends[1:], strict=True)
-    ]
+    parts = [np.linspace(a, b, 2 + int(abs(b - a) / step))[1:] for a, b in pairwise(ends)]
     angle = np.concatenate(([0.0], *parts))
     moved = np.diff(angle)
     time = np.concatenate(([0.0], np.cumsum(np.abs(moved) / rate)))
