@@ -30,7 +30,7 @@ from campaign.physics.specimens.interface import Array, Specimen
 from campaign.units import RotationalStiffness, Torque
 
 DRAWS = 64
-"""Draws of each bristle that are made at once."""
+"""Draws of each bristle at first; as many again when they are used up."""
 
 
 class RandomBristleOptions(Options):
@@ -44,7 +44,7 @@ class RandomBristleOptions(Options):
     """N sigma0: stiffness of all bristles together."""
     bristles: int = Field(default=25, ge=1, le=10_000)
     """N: number of bristles."""
-    spacing: float = Field(default=1.0, gt=0, le=2)
+    spacing: float = Field(default=1.0, ge=0.1, le=2)
     """Delta / delta_s: a new bond is up to this far from the old one, in deflections of a snap."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Of the new bonds."""
@@ -64,7 +64,7 @@ def _torque(options: RandomBristleOptions, time: Array, angle: Array) -> Array:
     for index, x in enumerate(angle):
         while (broken := np.flatnonzero(np.abs(x - bonds) > most)).size:
             if snaps[broken].max() >= len(draws):
-                draws = np.vstack((draws, random.random((DRAWS, count))))
+                draws = np.vstack((draws, random.random(draws.shape)))
             further = options.spacing * most * draws[snaps[broken], broken]
             bonds[broken] += np.sign(x - bonds[broken]) * further
             snaps[broken] += 1
