@@ -187,6 +187,7 @@ class Kinds(Mapping[str, K]):
 GROUPS = {
     "experiment": "campaign.experiments",
     "friction model": "campaign.friction",
+    "friction specimen": "campaign.specimens",
     "compensation method": "campaign.compensation",
     "backend": "campaign.backends",
     "export format": "campaign.exports",

@@ -21,6 +21,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.compensation import compensation_methods
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
+from campaign.physics.specimens import specimens
 from campaign.plugins import Kinds, stray_entries
 from campaign.protocol.stages import FIRST
 from campaign.report.formats import formats
@@ -132,7 +133,7 @@ def _show_channels() -> None:
 
 def rooms() -> Iterator[Kinds[Any]]:
     """Everything that packages may bring kinds of."""
-    yield from (experiments(), friction_models(), compensation_methods(), backends())
+    yield from (experiments(), friction_models(), specimens(), compensation_methods(), backends())
     yield from (exports(), formats())
 
 

@@ -1,4 +1,4 @@
-"""`campaign model`: friction models at a sinusoidal rate, as picture and numbers."""
+"""`campaign model`: friction models and specimens at a sinusoidal rate, as picture and numbers."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ from campaign.options import Options
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
 from campaign.physics.friction_response import Along
+from campaign.physics.specimens import specimens
+from campaign.physics.specimens.interface import Specimen
+from campaign.plugins import Kinds
 from campaign.protocol.bench_file import bench_source
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
@@ -29,6 +32,7 @@ from campaign.text import nearest, number
 from campaign.units import AngularRate, Frequency
 
 Array = NDArray[np.float64]
+AnyModel = FrictionModel | Specimen
 
 CYCLES = 4
 """The last one is shown: a state has settled by then."""
@@ -56,7 +60,7 @@ class Met:
         change: by which half the step changed the friction, as a share of the largest.
     """
 
-    model: FrictionModel
+    model: AnyModel
     options: Any
     friction: Array
     change: float
@@ -72,7 +76,7 @@ def show_models(
     """Draw friction over rate, angle and time; the picture's path, its numbers are beside it.
 
     Args:
-        names: of friction models.
+        names: of friction models and specimens.
         motion: `MotionOptions` as written.
         changes: `PARAMETER=VALUE`, for every model that has the parameter.
         bench: whose first friction interface gives the other parameters.
@@ -101,11 +105,13 @@ def show_models(
 
 def _chosen(
     names: Sequence[str], changes: Sequence[str], bench: str
-) -> Iterator[tuple[FrictionModel, Any]]:
+) -> Iterator[tuple[AnyModel, Any]]:
     """Each model with its validated options."""
-    known = friction_models()
-    if wrong := [name for name in names if name not in known]:
-        raise UsageError(f"there is no friction model {wrong[0]!r}{nearest(wrong[0], known)}")
+    rooms: Sequence[Kinds[Any]] = (friction_models(), specimens())
+    every = [name for room in rooms for name in room]
+    if wrong := [name for name in names if name not in every]:
+        raise UsageError(f"there is no friction model {wrong[0]!r}{nearest(wrong[0], every)}")
+    known: dict[str, AnyModel] = {n: room[n] for room in rooms for n in names if n in room}
     overrides, problems = parse_overrides([f"model.{change}" for change in changes])
     if problems:
         raise UsageError("\n".join(str(problem) for problem in problems))
@@ -136,28 +142,34 @@ def _chosen(
             raise UsageError(f"--set {key}: none of these models has it: {', '.join(names)}")
 
 
-def _met(model: FrictionModel, options: Any, motion: MotionOptions) -> Met:
+def _met(model: AnyModel, options: Any, motion: MotionOptions) -> Met:
     """With a step that is halved until that changes little."""
-    tree = options.model_dump(mode="json")
-    per_cycle, coarse = PER_CYCLE, _cycle(tree, motion, PER_CYCLE)
+    per_cycle, coarse = PER_CYCLE, _cycle(model, options, motion, PER_CYCLE)
     while True:
         per_cycle *= 2
-        fine = _cycle(tree, motion, per_cycle)
+        fine = _cycle(model, options, motion, per_cycle)
         change = float(np.max(np.abs(fine - coarse)) / max(np.max(np.abs(fine)), 1e-300))
         if change <= ACCURACY or per_cycle >= FINEST:
             return Met(model, options, fine, change)
         coarse = fine
 
 
-def _cycle(tree: Mapping[str, Any], motion: MotionOptions, per_cycle: int) -> Array:
+def _cycle(model: AnyModel, options: Any, motion: MotionOptions, per_cycle: int) -> Array:
     """Friction in the last cycle, at `PER_CYCLE` samples of it."""
-    along = Along.sine(motion.rate, motion.frequency, CYCLES, per_cycle)
-    return along.friction(tree)[-per_cycle :: per_cycle // PER_CYCLE]
+    if isinstance(model, Specimen):
+        time, _, angle = _motion(motion, CYCLES, per_cycle)
+        friction = model.torque(options, time, angle)
+    else:
+        along = Along.sine(motion.rate, motion.frequency, CYCLES, per_cycle)
+        friction = along.friction(options.model_dump(mode="json"))
+    return friction[-per_cycle :: per_cycle // PER_CYCLE]
 
 
-def _motion(motion: MotionOptions) -> tuple[Array, Array, Array]:
-    """Time (s), rate (rad/s) and angle (rad) of a cycle, shape (PER_CYCLE,)."""
-    time = np.arange(PER_CYCLE) / (PER_CYCLE * motion.frequency)
+def _motion(
+    motion: MotionOptions, cycles: int = 1, per_cycle: int = PER_CYCLE
+) -> tuple[Array, Array, Array]:
+    """Time (s), rate (rad/s) and angle (rad), shape (cycles * per_cycle,)."""
+    time = np.arange(cycles * per_cycle) / (per_cycle * motion.frequency)
     turned = 2.0 * np.pi * motion.frequency
     angle = -motion.rate / turned * np.cos(turned * time)
     return time, motion.rate * np.sin(turned * time), angle

@@ -40,7 +40,7 @@ def kinds(
 def model(
     names: Annotated[
         list[str],
-        typer.Argument(metavar="NAME...", help="Friction models, of `campaign kinds`."),
+        typer.Argument(metavar="NAME...", help="Friction models or specimens of `campaign kinds`."),
     ],
     rate: Annotated[
         str, typer.Option("--rate", metavar="RATE", help="Amplitude of the rate.")

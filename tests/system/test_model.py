@@ -58,6 +58,26 @@ def test_a_slow_lugre_slides_as_its_steady_curve(tmp_path: Path) -> None:
     assert found["stribeck_N_m"].max() == pytest.approx(40.0, rel=2e-3)
 
 
+def test_specimens_are_drawn_beside_a_model_with_its_parameters(tmp_path: Path) -> None:
+    """The bench of the thesis states all that they need; its viscous friction is not theirs."""
+    motion = ("--rate", "5 deg/s", "--frequency", "0.1 Hz")
+    found = shown(
+        tmp_path, "asperity", "random-bristle", "dahl", *motion, "--set", "bristles=10000"
+    )
+    rate, asperity, bristle, dahl = found.iloc[:, [1, 3, 4, 5]].to_numpy().T
+    assert [*found.columns[3:]] == ["asperity_N_m", "random-bristle_N_m", "dahl_N_m"]
+    slides = np.abs(rate) > 0.06
+    np.testing.assert_allclose(bristle[slides], (dahl - 4.0 * rate)[slides], rtol=0.02)
+    np.testing.assert_allclose(np.abs(asperity[slides]), 26.0, rtol=0.15)  # 2000 asperities
+    assert np.array_equal(np.sign(asperity[slides]), np.sign(rate[slides]))
+    assert "no friction model 'asperitie'; did you mean 'asperity'?" in " ".join(
+        campaign(tmp_path, "model", "asperitie", code=2).err.split()
+    )
+    (tmp_path / "alone.toml").write_text(BENCH.replace("dahl", "asperity"), encoding="utf-8")
+    done = campaign(tmp_path, "model", "asperity", "--bench", "alone.toml", code=2)
+    assert "'static_torque' is missing" in done.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [

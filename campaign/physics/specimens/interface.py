@@ -1,0 +1,35 @@
+"""The interface of a friction specimen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.options import Options
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """Many contacts, each computed by itself, along a prescribed motion.
+
+    Attributes:
+        name: what its `model` option says.
+        summary: one line for `campaign kinds`.
+        options: its parameters, with `model: Literal[name]`, in SI.
+        torque: friction torque (N m), shape (n,), from validated options, times (s) and angles
+            (rad), shape (n,) each. The angle is a straight line between two times. It begins
+            rested and undeflected.
+        steady_state: expected torque (N m) at constant rates (rad/s), shape (m,).
+    """
+
+    name: str
+    summary: str
+    options: type[Options]
+    torque: Callable[[Any, Array, Array], Array]
+    steady_state: Callable[[Any, Array], Array]
