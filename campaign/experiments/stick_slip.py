@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from pydantic import Field
@@ -26,11 +27,13 @@ from campaign.experiments.shared.friction_models import (
     ConditionGroup,
     combined,
     in_models,
+    model_label,
     model_series,
     places,
     simulated,
 )
 from campaign.experiments.shared.model_clauses import Rows, amount_of, each_model
+from campaign.experiments.shared.swept_words import axis_of, name_of, words
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -94,6 +97,17 @@ spring began unstretched), largest torque of the spring, and largest rate of the
 OF_SLIPS = ("first_slip", "period")
 TOO_FEW_SLIPS = Cause("too few slips", "there were too few slips")
 PREFIX = "stick_slip_"
+PARTS = 200
+"""Of a period, in which a rest is looked for."""
+RESTS, AT_REST = 0.2, 0.005
+"""Share of a period in which a load at rest moves by less than a share of what the pull moves in a
+period: 0.2 of one that swings about the pull without damping, and just comes to a halt, are 0.013.
+"""
+SHORT = 0.1
+"""Of a pull, within which the load must first slip: a load that sticks again does so within twice
+that time, and a swing."""
+HISTORIES = 8
+"""So many pulls are drawn over time; of more with two swept numbers a map is drawn."""
 
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
@@ -106,8 +120,13 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
         return simulated(replace(each, name=PREFIX + each.name) for each in peaks)
     times, before = upward_crossings(recording.time, rate, options.slip_rate)
     step = 1.0 / data.trial.task.sample_rate
-    slips = Estimate("slips", float(len(times)), "", kind="count", reason=COUNTED())
-    found = [slips, *peaks]
+    counts = {"slips": float(len(times))}
+    if RELATIVE_ANGLE in recording.channels and np.all(np.isfinite(recording[RELATIVE_ANGLE])):
+        counts["rests"] = _rests(recording, times, options.pull_rate)
+    found = [
+        *(Estimate(name, n, "", kind="count", reason=COUNTED()) for name, n in counts.items()),
+        *peaks,
+    ]
     if len(times):
         ends = float(before[0]), float(before[0]) + step
         method = "where the rate rises, between two samples"
@@ -115,6 +134,19 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     if len(times) > 2:
         found.append(_period(np.diff(times[1:]), step))
     return simulated(replace(each, name=PREFIX + each.name) for each in found)
+
+
+def _rests(recording: Recording, slips: Array, pull: float) -> float:
+    """How often in a row, up to the last slip, the load rests between slips; `slips` (s), (n,)."""
+    count = 0
+    for start, end in reversed(list(pairwise(slips))):
+        time = np.linspace(start, end, 1 + PARTS)
+        x = np.interp(time, recording.time, recording[RELATIVE_ANGLE])
+        length = round(RESTS * PARTS)
+        if np.min(np.abs(x[length:] - x[:-length])) > AT_REST * pull * (end - start):
+            break
+        count += 1
+    return float(count)
 
 
 def _period(between: Array, step: float) -> Estimate:
@@ -137,6 +169,7 @@ def _analyse(data: TestData) -> Result:
         {
             **place.point,
             "slips": _count(m["slips"].value),
+            "rests": _count(m["rests"].value),
             **{name: m[name] for name in UNITS},
         }
         for place, m in measured
@@ -147,39 +180,52 @@ def _analyse(data: TestData) -> Result:
         columns=(
             *found[0].columns,
             Column("slips", "Slips", exact=True),
+            Column("rests", "Rests", exact=True),
             Column("first_slip", "First slip", "s", "s"),
             Column("period", "Period", "s", "s"),
             Column("peak_torque", "Largest torque of the spring", "N m", "N m"),
             Column("top_rate", "Largest rate of the load", "rad/s", "rad/s"),
         ),
         rows=tuple(rows),
-        note="The period is the mean time between slips after the first one, which started from "
-        "an unstretched spring. " + OF_ONE,
+        note="Rests: periods in a row, up to the last slip, in which the load rests. The period is "
+        "the mean time between slips after the first one, which started from an unstretched "
+        "spring. " + OF_ONE,
     )
     findings = tuple(
         Finding.of(replace(m[name], name=PREFIX + name), place.point)
         for place, m in measured
         for name in UNITS
     )
-    notes = tuple(
-        f"{place.label or 'The load'}: fewer than three slips, so there is no period; pull longer, "
-        "slower, or through a softer spring."
+    few = [
+        place.label or "The load"
         for place, m in measured
         if math.isnan(m["period"].value) and not math.isnan(m["slips"].value)
+    ]
+    whose = few if len(few) <= HISTORIES else [f"{len(few)} of {len(measured)} pulls"]
+    notes = (
+        *failures_note(data),
+        *(
+            f"{who}: fewer than three slips, so there is no period; pull longer, slower, or "
+            "through a softer spring."
+            for who in whose
+        ),
     )
-    notes = (*failures_note(data), *notes)
     options = StickSlipOptions.model_validate(
         found[0].trials[0].trial.options, context={"si": True}
     )
+    drawn = _map(measured)
+    if drawn is not None:
+        return Result((table,), (drawn,), findings, notes, (_counts(measured),))
     settings = parts.Settings.of(data, StickSlipOptions)
     conclusions = stick_slip_conclusions(
         rows, found, settings, options.stiffness, options.pull_rate
     )
-    return Result((table,), (_figure(measured),), findings, notes, conclusions)
+    figures = tuple(filter(None, (_figure(measured),)))
+    return Result((table,), figures, findings, notes, conclusions)
 
 
 def _count(slips: float) -> int | float:
-    """A mean of repeats may be no whole number."""
+    """A mean of repeats may be no whole number, and a recording may not tell."""
     return int(slips) if slips.is_integer() else slips
 
 
@@ -189,14 +235,93 @@ def _shown(place: ConditionGroup) -> dict[str, Estimate]:
         name.removeprefix(PREFIX): each for name, each in combined(place.trials, _measure).items()
     }
     counted = "slips" in found
-    for name, unit in {"slips": "", **UNITS}.items():
+    for name, unit in {"slips": "", "rests": "", **UNITS}.items():
         if name not in found:
             cause = TOO_FEW_SLIPS if counted and name in OF_SLIPS else LOST
             found[name] = Estimate.without_interval(name, math.nan, unit, cause())
     return found
 
 
-def _figure(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure:
+def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
+    if found["rests"].value > 1.0:
+        return "stick-slip"
+    early = found["first_slip"].value < SHORT * place.trials[0].trial.task.duration
+    return "smooth" if early else "pull too short"
+
+
+def _counts(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Conclusion:
+    """In how many pulls each model sticks and slips."""
+    kinds: dict[str, list[str]] = {}
+    for place, found in measured:
+        model = str(place.point.get("model", ""))
+        kinds.setdefault(model and f" ({model_label(model)})", []).append(_kind(found, place))
+    told = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
+    return parts.conclusion(f"Stick-slip in {', '.join(told)}")
+
+
+def _map(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure | None:
+    """Stick-slip over the two swept numbers with most values; None where there are few pulls.
+
+    Rests in several periods tell stick-slip from a swing that dies out.
+    """
+    swept: dict[str, set[float]] = {}
+    for place, _ in measured:
+        for path, value in place.point.items():
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                swept.setdefault(path, set()).add(value)
+    across = sorted((p for p in swept if len(swept[p]) > 1), key=lambda p: -len(swept[p]))[:2]
+    if len(measured) <= HISTORIES or len(across) < 2:
+        return None
+    trial = measured[0][0].trials[0].trial
+    x_axis, y_axis = (
+        replace(
+            axis_of(path, trial, StickSlipOptions), scale="log", label=name_of(path.split(".")[-1])
+        )
+        for path in across
+    )
+    panels: dict[str, list[tuple[str, float, float]]] = {}
+    for place, found in measured:
+        others = {path: value for path, value in place.point.items() if path not in across}
+        told = words(others, trial, StickSlipOptions, frozenset(others))
+        title = ", ".join(reversed(list(told)))
+        x, y = (float(str(place.point[path])) for path in across)
+        panels.setdefault(title, []).append((_kind(found, place), x, y))
+    looks = {"stick-slip": "measured", "smooth": "alternative", "pull too short": "reference"}
+    return Figure(
+        key="stick-slip",
+        title="Where a pulled load sticks and slips",
+        caption="A mark for each pull: stick-slip where the load rests in two or more periods in a "
+        f"row, up to the last; too short where it first slips after {SHORT:.0%} of the pull.",
+        alt="Marks of stick-slip and of smooth sliding over two swept numbers.",
+        panels=tuple(
+            Panel(
+                x_axis,
+                y_axis,
+                [
+                    Curve(
+                        np.array([x for own, x, _ in points if own == kind]),
+                        np.array([y for own, _, y in points if own == kind]),
+                        kind,
+                        look,
+                        "points",
+                    )
+                    for kind, look in looks.items()
+                    if any(own == kind for own, _, _ in points)
+                ],
+                title,
+            )
+            for title, points in panels.items()
+        ),
+        across=min(3, len(panels)),
+        thesis=("2.12",),
+    )
+
+
+def _figure(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure | None:
+    """The first pull of each place over time; None without samples."""
+    measured = [each for each in measured if not each[0].trials[0].not_kept]
+    if not measured:
+        return None
     time = Axis("Time", "s", "s")
     torque, rate, angle = [], [], []
     marks: list[Mark] = []
@@ -307,4 +432,5 @@ EXPERIMENT = Experiment(
         COMMAND: "far end of the spring in the figure",
     },
     measure=_measure,
+    needs_samples=False,
 )

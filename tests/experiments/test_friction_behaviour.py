@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tomllib
 from dataclasses import replace
@@ -400,3 +401,58 @@ def test_samples_that_were_lost_cost_their_numbers_and_no_analysis(
     assert all(reasons[name] in LOST or reasons[name] in NO_REVERSAL for name in gone)
     few = any("fewer than three slips" in note for note in result.notes)
     assert not (few and channel == LOAD_RATE), "nobody knows how many there were"
+
+
+@pytest.mark.parametrize("viscous", [0.1, 0.4])
+@pytest.mark.parametrize(("overtakes", "rests"), [(1.6, True), (0.1, False)])
+def test_a_rest_is_a_fifth_of_a_period(viscous: float, overtakes: float, rests: bool) -> None:
+    """Let go at Fs, a load on a spring K overtakes the pull v by (Fs - Fc) / sqrt(K J), `overtakes`
+    times v. Without damping, its rate is zero again after a phase of 2 pi - 2 atan(overtakes), and
+    it rests for one of 2 overtakes.
+    """
+    pull = 20.0 * VS
+    stiffness = ((FS - FC) / pull / overtakes) ** 2
+    tree = tomllib.loads(SPECIMEN)
+    tree["friction"]["load"]["viscous_friction"] = f"{viscous} N m s/rad"
+    period = 2.0 * math.pi / math.sqrt(stiffness)
+    options = {
+        "models": ["stribeck"],
+        "stiffness": f"{stiffness} N m/rad",
+        "pull_rate": f"{pull} rad/s",
+        "slip_rate": f"{pull} rad/s",
+        "duration": f"{FS / (stiffness * pull) + 20.0 * period} s",
+    }
+    bench = Bench.model_validate(tree)
+    found = analyse("stick_slip", execute(trials("stick_slip", bench, options)))
+    (row,) = table(found, "stick-slip").rows
+    assert (row["rests"] > 9) is rests
+    if rests:
+        phase = 2.0 * (math.pi - math.atan(overtakes) + overtakes)
+        assert row["period"] == pytest.approx(phase / math.sqrt(stiffness), rel=0.05)
+
+
+def test_many_pulls_over_two_numbers_are_a_map() -> None:
+    tree = tomllib.loads(SPECIMEN)
+    tree["limits"]["torque"] = "1e6 N m"
+    bench, done = Bench.model_validate(tree), []
+    for stiffness, rate in itertools.product((2.0, 20.0, 1e4), (0.02, 0.1, 0.2)):
+        sizes = {"stiffness": f"{stiffness} N m/rad", "pull_rate": f"{rate} rad/s"}
+        options = {"models": ["stribeck"], "duration": "20 s", **sizes}
+        (trial,) = trials("stick_slip", bench, options)
+        point = {**trial.point, "stiffness": stiffness, "pull_rate": rate}
+        done += execute([trial.model_copy(update={"number": 1 + len(done), "point": point})])
+    (figure,) = analyse("stick_slip", done).figures
+    (panel,) = figure.panels
+    assert panel.title == "stribeck"
+    assert [len(curve.x) for curve in panel.curves] == [3, 3, 3]
+    assert [panel.x.label, panel.y.label] == ["stiffness", "pull rate"]
+
+
+def test_a_model_keeps_what_another_has_within_tables_too() -> None:
+    tree = tomllib.loads(SPECIMEN)
+    tree["friction"]["load"]["negative"] = {"coulomb_torque": "1.1 N m", "static_torque": "1.6 N m"}
+    described: Any = with_model(Bench.model_validate(tree), "dahl")
+    assert described["friction"]["load"]["negative"] == {
+        "coulomb_torque": 1.1,
+        "viscous_friction": None,
+    }

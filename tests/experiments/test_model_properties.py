@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.channels import FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.experiments.model_properties import virtual_experiments
 from campaign.experiments.model_properties.experiment import ModelPropertiesOptions
 from campaign.experiments.model_properties.parameter_set import Scale, options_of, with_friction
 from campaign.experiments.model_properties.rules import BLANK, DEPENDS, MET, PARTLY, RULES, Judged
-from campaign.experiments.model_properties.virtual_experiments import PULL, rests
+from campaign.experiments.model_properties.virtual_experiments import PULL
 from campaign.physics.bench import Bench
 from campaign.published.values import thesis
 from campaign.recording import Recording
 from campaign.result import Result
-from tests.experiments.laboratory import Done, analyse, execute, finding, table, trials
+from tests.experiments.laboratory import analyse, execute, finding, table, trials
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 (TEST,) = tomllib.loads((PROTOCOLS / "friction_models.toml").read_text(encoding="utf-8"))["test"]
@@ -106,28 +106,28 @@ def test_a_model_goes_without_what_its_source_does_not_have() -> None:
     assert tree["friction"]["load"]["viscous_friction"] == 0.4
 
 
-def pulled(rate: Any, period: float) -> tuple[Done, Scale]:
+def rests(rate: Any, period: float) -> float:
     """A made-up pull of ten periods; rate over phase, in units of the pull's rate."""
     scale = Scale.of(GIVEN, 1.0, "lugre")
     time = np.linspace(0.0, 10.0 * period, 20_001)
     v = PULL * scale.velocity * rate((time / period) % 1.0)
     x = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(time))])
     trial = next(t for t in planned(["lugre"]) if t.point["part"] == "soft spring")
-    done, made = execute([trial])[0], {LOAD_RATE: v, RELATIVE_ANGLE: x}
+    done = execute([trial])[0]
+    made = {LOAD_RATE: v, RELATIVE_ANGLE: x, DRIVE_TORQUE: np.zeros_like(x)}
     own = done.samples.channels
     channels = {name: replace(own[name], samples=values) for name, values in made.items()}
-    return replace(done, samples=Recording(time=time, channels=channels)), scale
+    item = replace(done, samples=Recording(time=time, channels=channels))
+    return virtual_experiments.PARTS["soft spring"].measure(item, scale)["rests"]
 
 
 def test_a_swing_that_just_comes_to_a_halt_does_not_rest() -> None:
-    assert rests(*pulled(lambda phase: 1.0 - np.cos(2.0 * np.pi * phase), 2.0)) == 0.0
+    assert rests(lambda phase: 1.0 - np.cos(2.0 * np.pi * phase), 2.0) == 0.0
 
 
 def test_rests_between_slips_are_counted() -> None:
-    slips = pulled(
-        lambda phase: np.where(phase > 0.6, 6.0 * np.sin((phase - 0.6) * 7.854), 0.0), 2.0
-    )
-    assert rests(*slips) == 9.0
+    slips = lambda phase: np.where(phase > 0.6, 6.0 * np.sin((phase - 0.6) * 7.854), 0.0)  # noqa: E731
+    assert rests(slips, 2.0) == 9.0
 
 
 def presliding(torque: Any) -> dict[str, float]:

@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from campaign.channels import FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
-from campaign.estimation.sampled_curve import upward_crossings
 from campaign.experiments import force_rate, friction_lag, stick_slip, stribeck_curve
 from campaign.experiments.interface import Experiment, TrialData
 from campaign.experiments.model_properties.parameter_set import Scale
@@ -37,11 +35,8 @@ FREQUENCIES = (0.04, 0.4)
 """of vs / (2 pi Ts/sigma0), around a rate of 1.3 vs."""
 PULL, SOFT, STIFF = 20.0, 0.3, 5.0
 """of vs; and of the stiffnesses up to which a pulled load slips and sticks: see `_pull`."""
-PERIODS, PARTS_OF_PERIOD = 14, 200
-RESTS, AT_REST = 0.2, 0.005
-"""Share of a period in which a load at rest moves by less than a share of what the pull moves in a
-period: 0.2 of one that swings about the pull without damping, and just comes to a halt, are 0.013.
-"""
+PERIODS = 14
+"""Of a pull."""
 PATH = (0.0, 1.0, -1.0, 1.0, -1.0, 0.2, -0.3, 0.2, 1.0)
 """Turning points in presliding, of an amplitude of s / 2 sigma0: a loop twice, an inner loop."""
 SEGMENT, PIECES = 4.0, 50
@@ -213,22 +208,10 @@ def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]])
 
 def _pulled(*, stiff: bool) -> Part:
     whole = _like(stick_slip.EXPERIMENT, lambda scale: _pull(scale, stiff=stiff))
-    return Part(whole.requests, lambda data, scale: {"rests": rests(data, scale)})
-
-
-def rests(data: TrialData, scale: Scale) -> float:
-    """How often in a row the load rests between two slips, at the end of a pull."""
-    recording, pull = data.recording(), PULL * scale.velocity
-    starts, _ = upward_crossings(recording.time, recording[LOAD_RATE], pull)
-    count = 0
-    for start, end in reversed(list(pairwise(starts))):
-        time, period = np.linspace(start, end, 1 + PARTS_OF_PERIOD), end - start
-        x = np.interp(time, recording.time, recording[RELATIVE_ANGLE])
-        length = round(RESTS * PARTS_OF_PERIOD)
-        if np.min(np.abs(x[length:] - x[:-length])) > AT_REST * pull * period:
-            break
-        count += 1
-    return float(count)
+    return Part(
+        whole.requests,
+        lambda data, scale: {"rests": whole.measure(data, scale)["stick_slip_rests"]},
+    )
 
 
 def presliding_numbers(data: TrialData, scale: Scale) -> Mapping[str, float]:

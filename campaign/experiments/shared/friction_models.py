@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from campaign.estimation.intervals import shifted_by
 from campaign.estimation.sampled_curve import together
 from campaign.experiments.interface import Metrics, TrialData, metrics
 from campaign.experiments.shared.common import grouped
+from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.result import Column, Value
@@ -62,7 +63,7 @@ def with_model(bench: Bench, name: str) -> Tree:
     tree: Any = bench.model_dump(mode="json", include={"friction"})
     friction: dict[str, Any] = {}
     for interface, fields in tree["friction"].items():
-        kept = {k: v for k, v in fields.items() if k in options.model_fields} | {"model": name}
+        kept = _shared(fields, options) | {"model": name}
         try:
             friction[interface] = options.model_validate(kept, context={"si": True})
         except ValidationError as error:
@@ -73,6 +74,18 @@ def with_model(bench: Bench, name: str) -> Tree:
             ) from None
     described: Tree = bench.with_friction(friction).model_dump(mode="json")
     return described
+
+
+def _shared(given: Mapping[str, Any], options: type[Options]) -> dict[str, Any]:
+    """Those entries that the options have, in tables within them, too."""
+    found = {}
+    for name, field in options.model_fields.items():
+        if name in given:
+            value, inner = given[name], field.annotation
+            if isinstance(inner, type) and issubclass(inner, Options):
+                value = _shared(value, inner)
+            found[name] = value
+    return found
 
 
 @dataclass(frozen=True)
