@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -10,9 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.cli.export_compensation import vectors
-from campaign.controller_code.c_code import c_code, vectors_code
-from campaign.controller_code.compensation import Sampled
+from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.targets.c import c_code, syntax, vectors_code
 from campaign.controller_code.transpile import INTEGER, MOTION, ROWS, Program
 from campaign.errors import UsageError
 from campaign.physics.bench import Bench
@@ -74,7 +74,7 @@ def test_shipped_compensations_have_the_bits_of_the_engine(
     tmp_path: Path, bench: str, name: str, compiler: str
 ) -> None:
     made = Sampled.of(simulable(bench), name)
-    said = ended(tmp_path, made, vectors(made), *SANITIZED[compiler], compiler=compiler)
+    said = ended(tmp_path, made, trial_inputs(made), *SANITIZED[compiler], compiler=compiler)
     assert said == "0 of 2000 samples differ\n"
 
 
@@ -123,7 +123,7 @@ def test_every_model_has_the_bits_of_the_engine(tmp_path: Path, name: str) -> No
     motor |= {"static_torque": 0.04} if "static_torque" in tree else {}
     motor |= {"viscous_friction": 1e-4}  # or all is at the limit
     made = Sampled.of(with_friction(plain, plain, rippled, motor), "tried")
-    for inputs in (vectors(made), hurting(made)):
+    for inputs in (trial_inputs(made), hurting(made)):
         ended(tmp_path, made, inputs, compiler=COMPILERS[0])
 
 
@@ -166,7 +166,7 @@ def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_p
     assert subprocess.run(["./test"], cwd=folder, check=False).returncode == 0
     code = folder / "compensation_lugre.c"
     text = code.read_text(encoding="utf-8")
-    wrong = text.replace("friction = friction + ", "friction = friction - ", 1)
+    wrong = re.sub(r"(friction_(\d+) = \(friction_\2) \+ ", r"\1 - ", text, count=1)
     assert wrong != text
     code.write_text(wrong, encoding="utf-8")
     subprocess.run(compile_, cwd=folder, check=True)
@@ -192,7 +192,7 @@ def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     made = Sampled.of(simulable("platform"), "observer")
     name = "compensation_observer"
     (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
-    (tmp_path / f"{name}_test.c").write_text(vectors_code(made, vectors(made)), encoding="utf-8")
+    (tmp_path / f"{name}_test.c").write_text(vectors_code(made, trial_inputs(made)), encoding="utf-8")
     flags = ("-std=c99", "-O2", "-ffp-contract=fast", "-mfma")
     command = [COMPILERS[0], *flags, f"{name}_test.c", "-o", "test", "-lm"]
     if subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode:
@@ -212,7 +212,7 @@ def test_what_has_no_counterpart_is_refused_by_name() -> None:
     with pytest.raises(
         UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"
     ):
-        Program().function(sorts, [ROWS, ROWS, MOTION], [1, 1])
+        Program(syntax()).function(sorts, [ROWS, ROWS, MOTION], [1, 1])
 
 
 def by_twos(state: Any) -> float:
@@ -259,15 +259,15 @@ def from_the_end(state: Any) -> float:
 )
 def test_what_c_would_do_otherwise_is_refused(step: Any) -> None:
     with pytest.raises(UsageError, match=rf"test_c_code\.{step.__name__}: .* in C"):
-        Program().function(step, [ROWS], [4])
+        Program(syntax()).function(step, [ROWS], [4])
 
 
 def test_a_power_of_whole_numbers_stays_whole() -> None:
     def shifted(bits: int) -> int:
         return bits + 2**52
 
-    program = Program()
-    assert program.function(shifted, [INTEGER]) == ("shifted_0", INTEGER)
+    program = Program(syntax())
+    assert program.function(shifted, [INTEGER])[:2] == ("shifted_0", INTEGER)
     assert f"INT64_C({2**52})" in program.texts[0]
 
 
