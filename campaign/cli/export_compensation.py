@@ -21,7 +21,6 @@ from campaign.protocol.loop_check import margins_in_words
 from campaign.text import number
 
 
-
 def export_compensation(bench: str, name: str, target: str, output: Path) -> list[Path]:
     """Write code, and a test of it with inputs and torques of this program, into `output`.
 

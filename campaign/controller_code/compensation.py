@@ -51,7 +51,8 @@ class Sampled:
     @property
     def identifier(self) -> str:
         """The name in code and of files: a bench may call its compensations anything."""
-        return "_".join(["compensation", *re.findall("[A-Za-z0-9]+", self.name)])
+        words = "_".join(["compensation", *re.findall("[A-Za-z0-9]+", self.name)])
+        return words[:50].rstrip("_")  # MATLAB has names of 63
 
     @classmethod
     def of(cls, bench: CompleteBench, name: str) -> Sampled:

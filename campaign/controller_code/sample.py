@@ -21,7 +21,7 @@ class Rows(NamedTuple):
     """Numbers that the main function gets before its inputs: it changes states, not values."""
 
     name: str
-    count: int
+    size: int
     values: tuple[float, ...] = ()
 
 
@@ -44,7 +44,7 @@ def sample(program: Program, made: Sampled) -> Made:
     head = f"def sample({', '.join([*(each.name for each in rows), *INPUTS])}):"
     source = "\n    ".join([head, *_lines(made)])
     types = [*[ROWS] * len(rows), *[NUMBER] * len(INPUTS)]
-    return program.text_function(source, scope, types, [each.count for each in rows])
+    return program.text_function(source, scope, types, [each.size for each in rows])
 
 
 def _lines(made: Sampled) -> Iterator[str]:

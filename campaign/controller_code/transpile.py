@@ -65,11 +65,26 @@ ASKED = {
 BY_NAME = {"abs": abs, "finite": finite}
 
 
+SIGNS: dict[type, str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=",
+    ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
+}  # fmt: skip
+"""As most languages have them."""
+
+
+def signs(no: str = "!", **others: str) -> dict[type, str]:
+    """Forms of operators; others: signs that the language has of its own."""
+    told = SIGNS | {getattr(ast, name): sign for name, sign in others.items()}
+    forms = {op: f"({{}} {sign} {{}})" for op, sign in told.items()}
+    return {**forms, ast.USub: "(-{})", ast.Not: f"({no}{{}})"}
+
+
 class Argument(NamedTuple):
-    """Of a function in the target: its name and type there."""
+    """Of a function in the target: name and type there, whether it is rows, and written to."""
 
     name: str
     kind: str
+    rows: bool
     written: bool
 
 
@@ -193,11 +208,14 @@ class Program:
 
     def polynomial(self, coefficients: Sequence[float]) -> Made:
         """Estrin's scheme, as `elementary.polynomial` has it."""
-        lines, terms, power = [], [repr(float(c)) for c in coefficients], "x"
+        terms, power = [repr(float(c)) for c in coefficients], "x"
+        lines: list[str] = []
         while len(terms) > 1:
             count, level = len(terms) // 2, len(lines)
-            for k in range(count):
-                lines.append(f"t{level}_{k} = fma({terms[2 * k + 1]}, {power}, {terms[2 * k]})")
+            lines += [
+                f"t{level}_{k} = fma({terms[2 * k + 1]}, {power}, {terms[2 * k]})"
+                for k in range(count)
+            ]
             terms = [f"t{level}_{k}" for k in range(count)] + terms[2 * count :]
             if len(terms) > 1:
                 lines.append(f"p{level} = {power} * {power}")
@@ -235,10 +253,11 @@ class _Function:
     def written(self) -> Made:
         """What its text gives; the text itself goes to the program."""
         self._block(self.tree.body)
-        arguments = [
-            Argument(of, self.program.kind(self.types[n], self.rows.get(n, 0)), n in self.writes)
-            for of, n in zip(self.arguments, [e.arg for e in self.tree.args.args], strict=True)
-        ]
+        arguments = []
+        for each in [each.arg for each in self.tree.args.args]:
+            kind = self.program.kind(self.types[each], self.rows.get(each, 0))
+            own = self._named(each), kind, each in self.rows, each in self.writes
+            arguments.append(Argument(*own))
         if self.result is None:
             raise self._refusal(self.tree, "returns nothing")
         told = self.program.kind(self.result)
@@ -307,7 +326,8 @@ class _Function:
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple):
-            return self._unpack(target.elts, value)
+            self._unpack(target.elts, value)
+            return
         said = self._said(value)
         self._line(self.syntax.assign, self._target(target, said.type), said.text)
 

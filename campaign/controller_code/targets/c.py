@@ -12,7 +12,15 @@ import numpy as np
 from campaign.controller_code.compensation import INPUTS, Sampled
 from campaign.controller_code.sample import MEMORY, rows_of, sample
 from campaign.controller_code.targets import Array, Target, about, vectors
-from campaign.controller_code.transpile import INTEGER, NUMBER, TRUTH, Argument, Program, Syntax
+from campaign.controller_code.transpile import (
+    INTEGER,
+    NUMBER,
+    TRUTH,
+    Argument,
+    Program,
+    Syntax,
+    signs,
+)
 from campaign.physics import elementary
 
 SINGLE = 1e-3
@@ -22,11 +30,7 @@ typedef double real;
 static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
 static inline double double_of(int64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
 """
-SIGNS = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=",
-    ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
-}  # fmt: skip
-WHOLE = {
+WHOLE: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.FloorDiv: "/", ast.BitAnd: "&",
     ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<",
 }  # fmt: skip
@@ -50,8 +54,7 @@ def syntax(*, single: bool = False) -> Syntax:
         literal=partial(_literal, suffix=f),
         integer=_integer,
         truths=("0", "1"),
-        signs={op: f"({{}} {sign} {{}})" for op, sign in SIGNS.items()}
-        | {ast.USub: "(-{})", ast.Not: "(!{})"},
+        signs=signs(),
         whole={**whole, ast.RShift: "({} >> {})"},
         known=known if single else known | {n: f"{n}({{}})" for n in ("bits_of", "double_of")},
         functions={**library, elementary.power: "powf"} if single else {},
@@ -112,7 +115,7 @@ def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
         for each in rows
         if each.values
     ]
-    states = [f"    real {e.name}[{max(1, e.count)}];" for e in rows if not e.values]
+    states = [f"    real {e.name}[{max(1, e.size)}];" for e in rows if not e.values]
     given = [each.name if each.values else f"state->{each.name}" for each in rows]
     shown = ", ".join(f"real {each}" for each in INPUTS)
     return "\n".join([
