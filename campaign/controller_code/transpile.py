@@ -154,8 +154,8 @@ class Program:
     known: dict[Any, Any] = field(default_factory=dict)
 
     def named(self, name: str) -> str:
-        """A name that nothing else in the program has."""
-        return f"{self.syntax.prefix}{plain(name)}_{len(self.known)}"
+        """A name that nothing else in the program has; variables end with a number alone."""
+        return f"{self.syntax.prefix}{plain(name)}_p{len(self.known)}"
 
     def function(
         self, function: Callable[..., Any], types: Sequence[Any], rows: Sequence[int] = ()
@@ -241,8 +241,7 @@ class _Function:
         self.lines: list[str] = []
         self.depth = 1
         self.writes: set[str] = set()
-        self.reads: set[str] = set()  # rows of which the statement at hand has read already
-        self.changes = 0  # calls that write to their arguments
+        self.whole: ast.expr | None = None  # a value that is no part of another
         self.result: Any = None
         arguments = [each.arg for each in tree.args.args]
         self.types: dict[str, Any] = dict(zip(arguments, types, strict=True))
@@ -283,7 +282,6 @@ class _Function:
 
     def _block(self, statements: Sequence[ast.stmt]) -> None:
         for each in statements:
-            self.reads.clear()
             self._statement(each)
 
     def _statement(self, node: ast.stmt) -> None:
@@ -293,7 +291,7 @@ class _Function:
             case ast.Pass():
                 pass
             case ast.Expr(value=ast.Call() as value):
-                self._said(value)
+                self._value(value)
             case ast.Assign(targets=[target], value=value):
                 self._assign(target, value)
             case ast.AnnAssign(target=target, value=value) if value is not None:
@@ -302,7 +300,7 @@ class _Function:
                 self._assign(target, ast.BinOp(left=_read(target), op=op, right=value))
             case ast.Return(value=value) if value is not None:
                 one = self._several(value.elts) if isinstance(value, ast.Tuple) else None
-                one = one or self._said(value)
+                one = one or self._value(value)
                 if self.result not in (None, one.type):
                     raise self._refusal(self.tree, "returns different things")
                 self.result = one.type
@@ -328,7 +326,7 @@ class _Function:
         if isinstance(target, ast.Tuple):
             self._unpack(target.elts, value)
             return
-        said = self._said(value)
+        said = self._value(value)
         self._line(self.syntax.assign, self._target(target, said.type), said.text)
 
     def _unpack(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
@@ -339,17 +337,15 @@ class _Function:
         ):
             for target, each in zip(targets, value.elts, strict=True):
                 self._assign(target, each)
-                self.reads.clear()
             return
         if isinstance(value, ast.Tuple):
             said = []
             for each in value.elts:
-                one = self._said(each)
+                one = self._value(each)
                 said.append(Said(self._temporary(one.type), one.type))
                 self._line(self.syntax.assign, said[-1].text, one.text)
-                self.reads.clear()
         else:
-            whole = self._said(value)
+            whole = self._value(value)
             if not isinstance(whole.type, Several):
                 raise self._refusal(value, "is no several numbers")
             fields = zip(whole.type.fields, whole.type.kinds, strict=True)
@@ -401,6 +397,10 @@ class _Function:
 
     # Expressions
 
+    def _value(self, node: ast.expr) -> Said:
+        self.whole = node
+        return self._said(node)
+
     def _said(self, node: ast.expr) -> Said:
         match node:
             case ast.Constant(value=bool() | int() | float()):
@@ -422,7 +422,7 @@ class _Function:
 
     def _worked_out(self, node: ast.expr) -> Said:
         """An expression of others."""
-        signs, before = self.syntax.signs, self.changes
+        signs = self.syntax.signs
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 said = self._said(operand)
@@ -442,7 +442,6 @@ class _Function:
                 parts = [self._said(each) for each in values]
                 if {each.type for each in parts} != {TRUTH}:  # one of them is the result in Python
                     raise self._refusal(node, "is a number")
-                self._unless_written(node, before)
                 told = reduce(signs[type(op)].format, (each.text for each in parts))
                 return Said(told, TRUTH)
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in signs:
@@ -451,14 +450,8 @@ class _Function:
             case ast.IfExp(test=test, body=yes, orelse=no):
                 told = self._as(TRUTH, test, self._said(test))
                 one, other = self._alike(node, self._said(yes), self._said(no))
-                self._unless_written(node, before)
                 return Said(self.syntax.known["where"].format(told, one.text, other.text), one.type)
         raise self._refusal(node, "has no counterpart")
-
-    def _unless_written(self, node: ast.expr, before: int) -> None:
-        """In Python a part of these is not always worked out; in a target, its calls are."""
-        if self.changes > before:
-            raise self._refusal(node, "changes something in part, which has no counterpart")
 
     def _operation(self, node: ast.expr, left: Said, op: Any, right: Said) -> Said:
         if left.type == right.type == TRUTH and op in OF_TRUTHS:
@@ -502,7 +495,6 @@ class _Function:
         if isinstance(place, ast.Slice | ast.UnaryOp):  # an index from the end
             raise self._refusal(node, "has no counterpart")
         if isinstance(value, ast.Name) and self.types.get(value.id) == ROWS:
-            self.reads.add(value.id)
             index = self._as(INTEGER, place, self._said(place))
             return Said(self.syntax.element.format(self._named(value.id), index), NUMBER)
         if isinstance(value, ast.Attribute) and value.attr == "shape":
@@ -515,7 +507,6 @@ class _Function:
         if name == "len" and isinstance(arguments[0], ast.Name):
             return self._constant(node, self.rows[arguments[0].id])
         function = self._looked_up(node, name)
-        before = set(self.reads)
         if function is elementary.polynomial:
             made = self.program.polynomial(self._looked_up(node, getattr(arguments[1], "id", "")))
             return self._called(node, made, arguments[:1], [self._said(arguments[0])])
@@ -533,7 +524,6 @@ class _Function:
             raise self._refusal(node, f"calls {name}, which is not of this program's")
         rows = [self.rows[getattr(a, "id", "")] for a in self._of_rows(arguments)]
         made = self.program.function(function, [each.type for each in said], rows)
-        self.reads = before
         return self._called(node, made, arguments, said)
 
     def _of_rows(self, arguments: Sequence[ast.expr]) -> list[ast.expr]:
@@ -547,10 +537,9 @@ class _Function:
             raise self._refusal(node, "calls itself, which has no counterpart")
         pairs = list(zip(made.arguments, arguments, said, strict=True))
         written = {getattr(own, "id", "") for argument, own, _ in pairs if argument.written}
-        if written & self.reads:
-            raise self._refusal(node, "changes what was read before, which has no counterpart")
+        if written and node is not self.whole:  # what else is in it may be read before or after
+            raise self._refusal(node, "changes an argument within an expression: no counterpart")
         self.writes |= written
-        self.changes += len(written)
         result = self._temporary(made.kind)
         told = {argument.name: each.text for argument, _, each in pairs}
         names = [told[argument.name] for argument, _, _ in pairs if argument.written]

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from campaign.controller_code.compensation import Sampled
 from campaign.physics.bench import Bench
+from campaign.physics.compilation import called
 from campaign.physics.complete import CompleteBench, complete
+from campaign.physics.elementary import log, power, tanh
 from campaign.physics.friction import friction_models
+from campaign.physics.lanes import together
+from campaign.physics.step_function import Motion
 from campaign.protocol.bench_file import simulable
 from tests.physics.friction.cases import CURVE, MODELS
 
@@ -51,6 +56,50 @@ def of_model(name: str, **options: Any) -> Sampled:
     motor |= {"static_torque": 0.04} if "static_torque" in tree else {}
     motor |= {"viscous_friction": 1e-4}  # or all is at the limit
     return Sampled.of(with_friction(plain, plain, rippled, motor), "tried")
+
+
+@called
+def _moved(parameters: Any, state: Any, by: float) -> tuple[float, bool]:
+    """Shift a line of numbers; what falls out, and whether that is above 0."""
+    out = state[0]
+    for i in range(1, len(state)):
+        state[i - 1] = state[i]
+    state[len(state) - 1] = by
+    return out * parameters[0], out > 0.0
+
+
+def branching(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
+    """A step function of a plug-in: branches, loops, whole numbers, names of one letter."""
+    if motion.step < 1e-9:
+        return state[0] + state[2], 0.0
+    T, t, end_if = parameters[0], parameters[1], 3  # noqa: N806 - also names that differ in case
+    late, above = _moved(parameters, state, motion.rate_end)
+    for i in range(0):
+        late = late + state[i]  # never
+    for i in range(end_if - 2):
+        late = late + 0.5 * i + state[i] * (end_if // 2 - i)  # once
+    size = -T if (above and not late > 5.0) or state[1] == 0.0 else t * end_if
+    count = 0
+    for i in range(len(state)):
+        if state[i] < 0.0:
+            count = count + 1
+            late = late + 0.1
+        else:
+            count = count - 1 if i > 1 else count
+    size, late = late, size
+    state[2] += size + tanh(late) + 0.1 * count + log(1.0 + power(abs(late), 0.3))
+    state[2] *= 0.2
+    return state[2], 0.0
+
+
+def of_a_plug_in() -> Sampled:
+    """A compensation with the step function `branching`."""
+    made = of_model("coulomb")
+    lane = made.lanes.trials[0]
+    own = replace(
+        lane.compensation[0], step=branching, parameters=np.array([0.7, 1.3]), state_size=4
+    )
+    return replace(made, lanes=together([replace(lane, compensation=(own,))], 1))
 
 
 def of_an_evil_name() -> Sampled:

@@ -6,18 +6,22 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from campaign.controller_code.compensation import Sampled, trial_inputs
-from campaign.controller_code.targets.c import c_code, syntax, vectors_code
-from campaign.controller_code.transpile import INTEGER, MOTION, ROWS, Program
-from campaign.errors import UsageError
-from campaign.physics.elementary import exp, where
+from campaign.controller_code.targets.c import c_code, vectors_code
 from campaign.protocol.bench_file import simulable
-from tests.controller_code.cases import EVIL, SHIPPED, TRIES, hurting, of_an_evil_name, of_model
+from tests.controller_code.cases import (
+    EVIL,
+    SHIPPED,
+    TRIES,
+    hurting,
+    of_a_plug_in,
+    of_an_evil_name,
+    of_model,
+)
 from tests.system.user import campaign
 
 UNUSED = ("-Wno-unused", "-Wno-unused-parameter")
@@ -66,6 +70,12 @@ def test_in_single_precision_it_is_near_and_nothing_is_a_double(tmp_path: Path, 
     subprocess.run(command, cwd=tmp_path, check=True)
     said = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert said.stdout == "0 of 2000 samples differ\n"
+
+
+def test_a_step_function_of_a_plug_in_has_the_bits_of_the_engine(tmp_path: Path) -> None:
+    made = of_a_plug_in()
+    for inputs in (trial_inputs(made), hurting(made)):
+        ended(tmp_path, made, inputs, compiler=COMPILERS[0])
 
 
 @pytest.mark.parametrize("name", TRIES)
@@ -146,74 +156,6 @@ def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
         pytest.skip("this processor has no fma to contract to")
     assert subprocess.run(["./test"], cwd=tmp_path, check=False).returncode == 2
-
-
-def sorts(parameters: Any, state: Any, motion: Any) -> tuple[float, float]:
-    """A step function that C does not have."""
-    return sorted(state)[0], where(motion.rate_end > 0.0, exp(motion.rate_end), 0.0)
-
-
-def test_what_has_no_counterpart_is_refused_by_name() -> None:
-    with pytest.raises(
-        UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"
-    ):
-        Program(syntax()).function(sorts, [ROWS, ROWS, MOTION], [1, 1])
-
-
-def by_twos(state: Any) -> float:
-    total = 0.0
-    for i in range(0, 4, 2):
-        total += state[i]
-    return total
-
-
-def ends_otherwise(state: Any) -> float:
-    total = 0.0
-    for i in range(4):
-        total += state[i]
-    else:
-        total = 0.0
-    return total
-
-
-def range_changes(state: Any) -> float:
-    count = 4
-    for i in range(count):
-        state[i] = 0.0
-        count = 2
-    return state[0]
-
-
-def read_after(state: Any) -> float:
-    for i in range(4):
-        state[i] = 0.0
-    return state[i]
-
-
-def first_that_is_not_zero(state: Any) -> float:
-    return state[0] or state[1]
-
-
-def from_the_end(state: Any) -> float:
-    return state[-1]
-
-
-@pytest.mark.parametrize(
-    "step",
-    [by_twos, ends_otherwise, range_changes, read_after, first_that_is_not_zero, from_the_end],
-)
-def test_what_c_would_do_otherwise_is_refused(step: Any) -> None:
-    with pytest.raises(UsageError, match=rf"test_c_code\.{step.__name__}: .* in C"):
-        Program(syntax()).function(step, [ROWS], [4])
-
-
-def test_a_power_of_whole_numbers_stays_whole() -> None:
-    def shifted(bits: int) -> int:
-        return bits + 2**52
-
-    program = Program(syntax())
-    assert program.function(shifted, [INTEGER])[:2] == ("shifted_0", INTEGER)
-    assert f"INT64_C({2**52})" in program.texts[0]
 
 
 @pytest.mark.parametrize(

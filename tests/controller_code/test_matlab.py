@@ -17,7 +17,15 @@ import pytest
 from campaign.controller_code.compensation import Sampled, trial_inputs
 from campaign.controller_code.targets.matlab import m_code, script
 from campaign.protocol.bench_file import simulable
-from tests.controller_code.cases import EVIL, SHIPPED, TRIES, hurting, of_an_evil_name, of_model
+from tests.controller_code.cases import (
+    EVIL,
+    SHIPPED,
+    TRIES,
+    hurting,
+    of_a_plug_in,
+    of_an_evil_name,
+    of_model,
+)
 from tests.system.user import campaign
 
 OCTAVE = shutil.which("octave-cli")
@@ -63,18 +71,25 @@ def case_of(name: str, made: Sampled, inputs: np.ndarray) -> Case:
 
 def test_shipped_compensations_are_within_the_bound(tmp_path: Path) -> None:
     shipped = [(f"{bench}-{name}", Sampled.of(simulable(bench), name)) for bench, name in SHIPPED]
-    cases = [case_of(case, made, trial_inputs(made)[:1000]) for case, made in shipped]
+    cases = [case_of(case, made, trial_inputs(made)[:500]) for case, made in shipped]
     assert not_within_the_bound(tmp_path, cases) == []
 
 
-@pytest.mark.slow  # 20 s
+def test_a_step_function_of_a_plug_in_is_within_the_bound(tmp_path: Path) -> None:
+    made, cases = of_a_plug_in(), []
+    for name, inputs in {"trial": trial_inputs(made), "hurting": hurting(made)[150:]}.items():
+        cases.append(case_of(f"plug-in-{name}", made, inputs[:200]))
+    assert not_within_the_bound(tmp_path, cases) == []
+
+
+@pytest.mark.slow  # 10 s
 def test_every_model_is_within_the_bound(tmp_path: Path) -> None:
     made = {name: of_model(name, **FEW.get(name, {})) for name in TRIES}
     cases = [
-        case_of(f"{name}-trial", each, trial_inputs(each)[:150]) for name, each in made.items()
+        case_of(f"{name}-trial", each, trial_inputs(each)[:100]) for name, each in made.items()
     ]
     cases += [
-        case_of(f"{name}-hurting", each, hurting(each)[150:450]) for name, each in made.items()
+        case_of(f"{name}-hurting", each, hurting(each)[150:400]) for name, each in made.items()
     ]
     assert not_within_the_bound(tmp_path, cases) == []
 

@@ -14,7 +14,15 @@ import pytest
 from campaign.controller_code.compensation import Sampled, trial_inputs
 from campaign.controller_code.targets.structured_text import BOUND, st_code
 from campaign.protocol.bench_file import simulable
-from tests.controller_code.cases import EVIL, SHIPPED, TRIES, hurting, of_an_evil_name, of_model
+from tests.controller_code.cases import (
+    EVIL,
+    SHIPPED,
+    TRIES,
+    hurting,
+    of_a_plug_in,
+    of_an_evil_name,
+    of_model,
+)
 from tests.system.user import campaign
 
 HOME = Path(os.environ.get("MATIEC", Path(shutil.which("iec2c") or "").parent))
@@ -89,6 +97,13 @@ def test_shipped_compensations_are_within_the_bound(tmp_path: Path, bench: str, 
 @pytest.mark.parametrize("name", TRIES)
 def test_every_model_is_within_the_bound(tmp_path: Path, name: str) -> None:
     made = of_model(name)
+    built(tmp_path, made.identifier, st_code(made, ["a test"]))
+    for inputs in (trial_inputs(made), hurting(made)):
+        assert off_by(tmp_path, made, inputs) <= BOUND
+
+
+def test_a_step_function_of_a_plug_in_is_within_the_bound(tmp_path: Path) -> None:
+    made = of_a_plug_in()
     built(tmp_path, made.identifier, st_code(made, ["a test"]))
     for inputs in (trial_inputs(made), hurting(made)):
         assert off_by(tmp_path, made, inputs) <= BOUND

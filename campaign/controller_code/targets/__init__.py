@@ -14,9 +14,9 @@ from campaign.controller_code.compensation import INPUTS, Sampled
 
 Array = NDArray[np.float64]
 BOUND = 1e-8
-"""Share of the largest torque of the vectors by which code with the exponential function of another
-library may be off. Most models keep 1e-14. `leuven` divides 1 - r^n by 1 - r, of 1e-6 and more, so
-that a last digit of the power is 1e-10 of the quotient, in each step: 1e-9 was found.
+"""Share of the largest torque of the vectors by which code may be off that has the exponential
+function of its platform. Most models keep 1e-12; `leuven` has 1e-9 on its vectors, and its own
+torques can change by 1e-2 where an input changes in the last digit.
 """
 
 

@@ -96,7 +96,9 @@ def _function(
     name: str, kind: str, arguments: Sequence[Argument], declared: Mapping[str, str],
     lines: Sequence[str],
 ) -> str:  # fmt: skip
-    shown = ", ".join(f"{'' if e.written else 'const '}{e.kind} {e.name}" for e in arguments)
+    shown = ", ".join(
+        f"{'const ' * (e.rows and not e.written)}{e.kind} {e.name}" for e in arguments
+    )
     own = [f"    {told} {each};" for each, told in declared.items()]
     return "\n".join([f"static {kind} {name}({shown})", "{", *own, *lines, "}", ""])
 

@@ -56,13 +56,8 @@ END_FUNCTION
 FUNCTION {p}tangens : LREAL
 VAR_INPUT x : LREAL; END_VAR
 VAR grown : LREAL; END_VAR
-    grown := {p}expm1(2.0 * ABS(x));
-    IF ABS(x) > 20.0 THEN
-        grown := 1.0;
-    ELSE
-        grown := grown / (grown + 2.0);
-    END_IF;
-    {p}tangens := SEL(x < 0.0, grown, -grown);
+    grown := {p}expm1(2.0 * MIN(ABS(x), 20.0));
+    {p}tangens := SEL(x < 0.0, grown, -grown) / (grown + 2.0);
 END_FUNCTION
 """
 """TANH by EXP."""
