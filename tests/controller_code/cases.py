@@ -74,6 +74,8 @@ def branching(parameters: Any, state: Any, motion: Motion) -> tuple[float, float
         return state[0] + state[2], 0.0
     T, t, end_if = parameters[0], parameters[1], 3  # noqa: N806 - also names that differ in case
     late, above = _moved(parameters, state, motion.rate_end)
+    if late != 0.0:
+        late = late + 0.2
     for i in range(0):
         late = late + state[i]  # never
     for i in range(end_if - 2):
