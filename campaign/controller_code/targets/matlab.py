@@ -113,8 +113,8 @@ def m_code(made: Sampled, head: Sequence[str]) -> str:
     main, rows = sample(program, made), rows_of(made)
     states = [each for each in rows if not each.values]
     told = [
-        f"Tested with {TESTED} by the project, to {BOUND:g} of the largest torque of",
-        f"{name}_test.m; not run by MATLAB or Simulink.",
+        f"This file was not run; its test: {name}_test.m. Code like it is tested with {TESTED},",
+        f"to {BOUND:g} of the largest torque; not with MATLAB or Simulink.",
         "reset: true for the state as at power-up, before this sample. The state is persistent:",
         "so a MATLAB Function block needs no bus of states, and each block has its own.",
         f"memory: {', '.join(MEMORY)}",

@@ -152,9 +152,11 @@ def st_code(made: Sampled, head: Sequence[str]) -> str:
     main, rows = sample(program, made), rows_of(made)
     kinds = {e.name: a.kind for e, a in zip(rows, main.arguments, strict=False)}
     given = {a.name: n for a, n in zip(main.arguments, [*kinds, *INPUTS], strict=True)}
+    zeroed = [f"{e.name}[{k}]" for e in rows if not e.values for k in range(max(1, e.size))]
     told = [
-        f"Tested with {COMPILER} by the project, to {BOUND:g} of the largest torque of",
-        f"{name}.csv; not run on a controller, or by TwinCAT or CODESYS.",
+        f"This file was not run; its vectors: {name}.csv. Code like it is tested with",
+        f"{COMPILER}, to {BOUND:g} of the largest torque;",
+        "not with TwinCAT or CODESYS, and not on a controller.",
         "reset: state as at power-up, before this sample.",
         f"memory: {', '.join(MEMORY)}",
     ]
@@ -164,9 +166,8 @@ def st_code(made: Sampled, head: Sequence[str]) -> str:
         f"FUNCTION_BLOCK {name}",
         _variables("VAR_INPUT", {"reset": "BOOL", **dict.fromkeys(INPUTS, "LREAL")}),
         _variables("VAR_OUTPUT", {"torque": "LREAL"}),
-        _variables("VAR", {"place": "DINT"} | {e.name: kinds[e.name] + _start(e) for e in rows}),
-        "    IF reset THEN", *(f"        {e}" for each in rows for e in _zeroed(each)),
-        "    END_IF;",
+        _variables("VAR", {e.name: kinds[e.name] + _start(e) for e in rows}),
+        "    IF reset THEN", *(f"        {each} := 0.0;" for each in zeroed), "    END_IF;",
         "    " + _call(main.name, "torque", given, ()),
         "END_FUNCTION_BLOCK", "",
     ])  # fmt: skip
@@ -174,15 +175,6 @@ def st_code(made: Sampled, head: Sequence[str]) -> str:
 
 def _start(rows: Rows) -> str:
     return f" := [{', '.join(map(_literal, rows.values))}]" if rows.values else ""
-
-
-def _zeroed(rows: Rows) -> list[str]:
-    if rows.values:
-        return []
-    last = max(1, rows.size)
-    head, foot = syntax("").loop
-    body = [head.format("place", 0, last), f"    {rows.name}[place] := 0.0;", foot.format("place")]
-    return "\n".join(body).splitlines()
 
 
 def csv(made: Sampled, inputs: Array) -> str:
