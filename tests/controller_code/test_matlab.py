@@ -75,6 +75,7 @@ def test_shipped_compensations_are_within_the_bound(tmp_path: Path) -> None:
     assert not_within_the_bound(tmp_path, cases) == []
 
 
+@pytest.mark.slow  # 5 s
 def test_a_step_function_of_a_plug_in_is_within_the_bound(tmp_path: Path) -> None:
     made, cases = of_a_plug_in(), []
     for name, inputs in {"trial": trial_inputs(made), "hurting": hurting(made)[150:]}.items():
