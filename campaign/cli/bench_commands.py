@@ -166,7 +166,7 @@ def export_compensation_command(
     bench: BenchArgument,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the bench's [compensation].")],
     target: Annotated[
-        str, typer.Option("--to", metavar="c|c-single|json", help="In which form.")
+        str, typer.Option("--to", metavar="c|c-single|st|matlab|json", help="In which form.")
     ] = "c",
     output: Annotated[
         Path, typer.Option("--output", metavar="DIR", help="Where to write it.")

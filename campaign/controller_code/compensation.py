@@ -29,6 +29,10 @@ from campaign.trial import Task
 Array = NDArray[np.float64]
 INPUTS = ("gyro_rate", "load_angle", "motor_angle", "motor_current")
 """rad/s, rad, rad at the load, A."""
+SAMPLES = 2_000
+"""of the test vectors."""
+FREQUENCIES = 0.3, 1.7, 6.1
+"""Hz, of the sines that they move along."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,9 @@ class Sampled:
 
     @property
     def identifier(self) -> str:
-        """The name in C and of files: a bench may call its compensations anything."""
-        return "compensation_" + re.sub(r"[^A-Za-z0-9]", "_", self.name)
+        """The name in code and of files: a bench may call its compensations anything."""
+        words = "_".join(["compensation", *re.findall("[A-Za-z0-9]+", self.name)])
+        return words[:50].rstrip("_")  # MATLAB has names of 63
 
     @classmethod
     def of(cls, bench: CompleteBench, name: str) -> Sampled:
@@ -105,3 +110,19 @@ def _run(
         gyro = _rates(controller, memory.kept, k == 0, gyro, encoder, resolver)
         motor_torque = controller.torque_per_current * inputs[k, 3]
         out[k] = _compensate(1, controller, compensation, memory, gyro, motor_torque)
+
+
+def trial_inputs(made: Sampled) -> Array:
+    """`INPUTS` along three sines with noise of the sensors' size, shape (n, 4): always the same."""
+    draw, limits = np.random.default_rng(1), made.bench.limits
+    time = np.arange(SAMPLES) * float(made.controller.period[0])
+    angle, rate = np.zeros(SAMPLES), np.zeros(SAMPLES)
+    for frequency in FREQUENCIES:
+        turned = 2.0 * np.pi * frequency
+        size = 0.05 * limits.rate / turned
+        angle += size * np.sin(turned * time)
+        rate += size * turned * np.cos(turned * time)
+    twist = 1e-4 * limits.angle * draw.standard_normal(SAMPLES)
+    current = 0.2 * limits.current * np.sin(2.0 * np.pi * 0.9 * time)
+    noise = 1e-4 * limits.rate * draw.standard_normal(SAMPLES)
+    return np.column_stack([rate + noise, angle, angle + twist, current])

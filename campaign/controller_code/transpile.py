@@ -1,72 +1,132 @@
-"""Translation of compiled step functions from Python to C.
+"""Translation of compiled step functions from Python to the language of a controller.
 
 A step function is plain Python of numbers (`campaign.physics.step_function`), and so is all that it
-calls, down to the exponential. Each function becomes a C function for each set of argument types;
-operations keep their order, so that the results have the same bits. What has no counterpart is
-refused by name.
+calls. Each function becomes one of the target's language for each set of argument types; operations
+keep their order. What differs between languages is a `Syntax`. What has no counterpart is refused
+by name.
+
+Calls of the program's functions, and named tuples, become statements of their own: a language need
+not have them within expressions, and C does not say in which order it evaluates those.
 """
 
 from __future__ import annotations
 
 import ast
 import inspect
-import math
+import re
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import reduce
+from typing import Any, NamedTuple
 
 from campaign.errors import UsageError
 from campaign.physics import elementary
 from campaign.physics.step_function import Motion
 
-NUMBER, INTEGER, TRUTH, MOTION, ROWS = "real", "int64_t", "int", "motion", "real *"
-LETTERS = {NUMBER: "r", INTEGER: "i", TRUTH: "t"}
-OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-SHARED = {**OPERATORS, ast.FloorDiv: "/"}  # of whole numbers, none below 0
-WHOLE = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
-COMPARED = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
-RESERVED = frozenset({
-    "auto", "break", "case", "char", "const", "default", "do", "double", "enum", "extern", "float",
-    "goto", "inline", "int", "long", "register", "restrict", "short", "signed", "sizeof", "static",
-    "struct", "switch", "typedef", "union", "unsigned", "void", "volatile",
-})  # fmt: skip
-"""Words of C that Python has as names."""
-PRELUDE = """\
-typedef double real;
-static inline real pick(int yes, real one, real other) { return yes ? one : other; }
-static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
-static inline double double_of(int64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
-"""
-SINGLE_PRELUDE = """\
-typedef float real;
-static inline real pick(int yes, real one, real other) { return yes ? one : other; }
-"""
-OF_SINGLES = {
-    elementary.exp: "expf", elementary.expm1: "expm1f", elementary.log: "logf",
-    elementary.power: "powf", elementary.sin: "sinf", elementary.cos: "cosf",
-    elementary.tanh: "tanhf",
-}  # fmt: skip
-"""Of the C library: in single precision no bits are promised."""
-KNOWN = {
-    "fma": (NUMBER, "fma{f}({}, {}, {})"),
-    "divide": (NUMBER, "({} / {})"),
-    "nearest": (NUMBER, "rint{f}({})"),
-    "where": (NUMBER, "pick({}, {}, {})"),
-    "bits_of": (INTEGER, "bits_of({})"),
-    "double_of": (NUMBER, "double_of({})"),
-    "any_of": (TRUTH, "({})"),
-}
+NUMBER, INTEGER, TRUTH, ROWS = "number", "integer", "truth", "rows"
+WHOLE = (
+    ast.Add, ast.Sub, ast.Mult, ast.FloorDiv, ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift,
+    ast.RShift,
+)  # fmt: skip
+OF_TRUTHS = {ast.BitAnd: ast.And, ast.BitOr: ast.Or}
 
 
 @dataclass(frozen=True)
 class Several:
     """The type of several numbers: that of each, and their names where it is a named tuple."""
 
-    kinds: tuple[str, ...]
+    kinds: tuple[Any, ...]
     names: tuple[str, ...] = ()
+    title: str = "several"
+
+    @property
+    def fields(self) -> list[str]:
+        """Their names in the target: no word of any language ends with a number like that."""
+        names = self.names or ("value",) * len(self.kinds)
+        return [f"{plain(name)}_{place}" for place, name in enumerate(names)]
+
+
+MOTION = Several((NUMBER,) * len(Motion._fields), Motion._fields, "motion")
+
+
+def finite(x: float) -> bool:
+    """Whether it is neither infinite nor NaN; each language has its own way to ask."""
+    return bool(abs(x) < float("inf"))
+
+
+ASKED = {
+    "fma": ((NUMBER,) * 3, NUMBER), "divide": ((NUMBER,) * 2, NUMBER), "any_of": ((TRUTH,), TRUTH),
+    "nearest": ((NUMBER,), NUMBER), "where": ((TRUTH, NUMBER, NUMBER), NUMBER),
+    "bits_of": ((NUMBER,), INTEGER), "double_of": ((INTEGER,), NUMBER),
+    "abs": ((NUMBER,), NUMBER), "finite": ((NUMBER,), TRUTH),
+}  # fmt: skip
+"""Types of arguments and result of what each language has a form for."""
+BY_NAME = {"abs": abs, "finite": finite}
+
+
+SIGNS: dict[type, str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=",
+    ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
+}  # fmt: skip
+"""As most languages have them."""
+
+
+def signs(no: str = "!", **others: str) -> dict[type, str]:
+    """Forms of operators; others: signs that the language has of its own."""
+    told = SIGNS | {getattr(ast, name): sign for name, sign in others.items()}
+    forms = {op: f"({{}} {sign} {{}})" for op, sign in told.items()}
+    return {**forms, ast.USub: "(-{})", ast.Not: f"({no}{{}})"}
+
+
+class Argument(NamedTuple):
+    """Of a function in the target: name and type there, whether it is rows, and written to."""
+
+    name: str
+    kind: str
+    rows: bool
+    written: bool
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """A language. Texts with braces are forms for `str.format`.
+
+    Attributes:
+        kinds: types of `NUMBER`, `INTEGER` and `TRUTH`.
+        numbers: `INTEGER` and `TRUTH` as a number.
+        truths: false and true.
+        signs: by operator of the syntax tree, of numbers and truths.
+        whole: of integers.
+        known: by name in `ASKED`.
+        functions: by function of `elementary`: the language's own, which promise no bits.
+        branch: lines of if, else and end.   loop: of its head and its end.
+        call: from name, result, arguments by name of the callee, and those that are written.
+        function: from name, type of the result, arguments, declared names and types, and lines.
+        struct: a type of these fields; or "", as `rows`: a type of so many numbers.
+    """
+
+    language: str
+    kinds: Mapping[str, str]
+    literal: Callable[[float], str]
+    integer: Callable[[int], str]
+    truths: tuple[str, str]
+    signs: Mapping[type, str]
+    whole: Mapping[type, str]
+    known: Mapping[str, str]
+    comment: Callable[[str], str]
+    element: str
+    assign: str
+    branch: tuple[str, str, str]
+    loop: tuple[str, str]
+    result: str
+    call: Callable[[str, str, Mapping[str, str], Sequence[str]], str]
+    function: Callable[[str, str, Sequence[Argument], Mapping[str, str], Sequence[str]], str]
+    struct: Callable[[str, Mapping[str, str]], str] = lambda name, fields: ""
+    rows: Callable[[str, int], str] = lambda name, count: ""
+    numbers: Mapping[str, str] = field(default_factory=lambda: {INTEGER: "{}", TRUTH: "{}"})
+    functions: Mapping[Any, str] = field(default_factory=dict)
+    prefix: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,196 +137,244 @@ class Said:
     type: Any
 
 
+class Made(NamedTuple):
+    """A function of the target: the type of its result, its arguments, and which it writes to."""
+
+    name: str
+    kind: Any
+    arguments: Sequence[Argument] = ()
+
+
 @dataclass
 class Program:
-    """C functions, in the order in which they can be compiled."""
+    """Types and functions of a language, in the order in which they can be compiled."""
 
+    syntax: Syntax
     texts: list[str] = field(default_factory=list)
-    known: dict[tuple[Any, ...], tuple[str, Any]] = field(default_factory=dict)
-    single: bool = False
+    known: dict[Any, Any] = field(default_factory=dict)
 
-    @property
-    def suffix(self) -> str:
-        """Of literals and of functions of the C library."""
-        return "f" if self.single else ""
-
-    def literal(self, value: float) -> str:
-        """A number to its last bit."""
-        if math.isnan(value):
-            return "NAN"
-        if math.isinf(value):
-            return "INFINITY" if value > 0 else "(-INFINITY)"
-        text = float(value).hex() + self.suffix
-        return f"({text})" if value < 0 else text
+    def named(self, name: str) -> str:
+        """A name that nothing else in the program has; variables end with a number alone."""
+        return f"{self.syntax.prefix}{plain(name)}_p{len(self.known)}"
 
     def function(
         self, function: Callable[..., Any], types: Sequence[Any], rows: Sequence[int] = ()
-    ) -> tuple[str, Any]:
-        """Name and type of a Python function for arguments of these types; written once.
+    ) -> Made:
+        """A Python function for arguments of these types; written once.
 
         rows: how many numbers each argument of type `ROWS` has, in their order.
         """
-        plain = getattr(function, "py_func", function)
-        key = (plain, tuple(types), tuple(rows))
+        function = getattr(function, "py_func", function)
+        key = (function, tuple(types), tuple(rows))
         if key not in self.known:
-            name = f"{plain.__name__.strip('_')}_{len(self.known)}"
-            self.known[key] = name, None  # a function that calls itself ends there
-            made = _Function(self, plain, types, rows)
-            text, kind = made.written(name)
-            self.texts.append(text)
-            self.known[key] = name, kind
-        return self.known[key]
+            scope = inspect.getclosurevars(function)
+            names = {**scope.builtins, **function.__globals__, **scope.globals, **scope.nonlocals}
+            where = f"{function.__module__}.{function.__qualname__}"
+            source = textwrap.dedent(inspect.getsource(function))
+            self.text_function(source, names, types, rows, where=where, key=key)
+        made: Made = self.known[key]
+        return made
 
-    def struct(self, several: Several) -> str:
-        """The C type of several numbers."""
-        name = "several_" + "".join(LETTERS[kind] for kind in several.kinds)
-        parts = " ".join(f"{kind} v{place};" for place, kind in enumerate(several.kinds))
-        text = f"typedef struct {{ {parts} }} {name};\n"
-        if text not in self.texts:
-            self.texts.append(text)
-        return name
+    def text_function(
+        self, source: str, scope: Mapping[str, Any], types: Sequence[Any], rows: Sequence[int] = (),
+        *, where: str = "", key: Any = None,
+    ) -> Made:  # fmt: skip
+        """The same of Python text, whose names mean what `scope` says."""
+        tree = ast.parse(source).body[0]
+        if not isinstance(tree, ast.FunctionDef):
+            raise UsageError(f"{where}: {source.splitlines()[0]!r} is no function")
+        key = key or source
+        name = self.named(tree.name)
+        self.known[key] = Made(name, None)  # a function that calls itself ends there
+        made = _Function(self, name, tree, scope, types, rows, where or tree.name)
+        self.known[key] = made.written()
+        return self.known[key]  # type: ignore[no-any-return]
 
-    def polynomial(self, coefficients: Sequence[float]) -> str:
+    def kind(self, kind: Any, rows: int = 0) -> str:
+        """A type in the target, declared where it needs that."""
+        if kind in self.syntax.kinds:
+            return self.syntax.kinds[kind]
+        if (kind, rows) not in self.known:
+            if isinstance(kind, Several):
+                told = [self.kind(each) for each in kind.kinds]
+                name = self.named(kind.title)
+                text = self.syntax.struct(name, dict(zip(kind.fields, told, strict=True)))
+            else:
+                name = self.named(f"rows_of_{rows}")
+                text = self.syntax.rows(name, max(1, rows))
+            self.known[kind, rows] = name
+            self.texts += [text] if text else []
+        return str(self.known[kind, rows])
+
+    def polynomial(self, coefficients: Sequence[float]) -> Made:
         """Estrin's scheme, as `elementary.polynomial` has it."""
-        key = ("polynomial", tuple(coefficients))
-        if key not in self.known:
-            name = f"polynomial_{len(self.known)}"
-            lines, terms, power, level = [], [self.literal(c) for c in coefficients], "x", 0
-            while len(terms) > 1:
-                unpaired = terms[len(terms) // 2 * 2 :]
-                joined = []
-                for place, (even, odd) in enumerate(zip(terms[::2], terms[1::2], strict=False)):
-                    made = f"t{level}_{place}"
-                    lines.append(f"    const real {made} = fma({odd}, {power}, {even});")
-                    joined.append(made)
-                terms = joined + unpaired
-                lines.append(f"    const real p{level} = {power} * {power};")
-                power, level = f"p{level}", level + 1
-            if lines:
-                lines.pop()  # the last power serves nothing
-            body = "\n".join([*lines, f"    return {terms[0]};"])
-            self.texts.append(f"static real {name}(real x)\n{{\n{body}\n}}\n")
-            self.known[key] = name, NUMBER
-        return self.known[key][0]
+        terms, power = [repr(float(c)) for c in coefficients], "x"
+        lines: list[str] = []
+        while len(terms) > 1:
+            count, level = len(terms) // 2, len(lines)
+            lines += [
+                f"t{level}_{k} = fma({terms[2 * k + 1]}, {power}, {terms[2 * k]})"
+                for k in range(count)
+            ]
+            terms = [f"t{level}_{k}" for k in range(count)] + terms[2 * count :]
+            if len(terms) > 1:
+                lines.append(f"p{level} = {power} * {power}")
+                power = f"p{level}"
+        source = "\n    ".join(["def polynomial(x):", *lines, f"return {terms[0]}"])
+        if source not in self.known:
+            self.text_function(source, vars(elementary), [NUMBER])
+        made: Made = self.known[source]
+        return made
 
 
 class _Function:
     """One Python function, for one set of argument types."""
 
     def __init__(
-        self, program: Program, function: Callable[..., Any], types: Sequence[Any],
-        rows: Sequence[int],
+        self, program: Program, name: str, tree: ast.FunctionDef, scope: Mapping[str, Any],
+        types: Sequence[Any], rows: Sequence[int], where: str,
     ) -> None:  # fmt: skip
-        self.program, self.function = program, function
-        source = textwrap.dedent(inspect.getsource(function))
-        tree = _Renamed().visit(ast.parse(source)).body[0]
-        if not isinstance(tree, ast.FunctionDef):
-            raise self._refusal(tree, "is no function")
-        self.tree = tree
-        names = [each.arg for each in tree.args.args]
-        self.types: dict[str, Any] = dict(zip(names, types, strict=True))
-        self.arguments = names
-        self.rows = dict(zip([n for n in names if self.types[n] == ROWS], rows, strict=True))
+        self.program, self.syntax, self.name = program, program.syntax, name
+        self.tree, self.scope, self.where = tree, scope, where
+        self.names: dict[str, str] = {}
+        self.declared: dict[str, str] = {}
+        self.lines: list[str] = []
+        self.depth = 1
+        self.writes: set[str] = set()
+        self.whole: ast.expr | None = None  # a value that is no part of another
         self.result: Any = None
-        self.temporaries = 0
+        arguments = [each.arg for each in tree.args.args]
+        self.types: dict[str, Any] = dict(zip(arguments, types, strict=True))
+        self.arguments = [self._named(each) for each in arguments]
+        sized = [each for each in arguments if self.types[each] == ROWS]
+        self.rows = dict(zip(sized, rows, strict=True))
 
-    def written(self, name: str) -> tuple[str, Any]:
-        """Its C text, and the type of its result."""
-        lines = self._block(self.tree.body)
-        own = [(n, kind) for n, kind in self.types.items() if n not in self.arguments]
-        declared = [f"    {self._c(kind)} {n};" for n, kind in own]
-        kind = self.result
-        told = self._c(kind)
-        shown = ", ".join(f"{_argument(self.types[n])}{n}" for n in self.arguments)
-        body = "\n".join([*declared, *lines])
-        return f"static {told} {name}({shown})\n{{\n{body}\n}}\n", kind
+    def written(self) -> Made:
+        """What its text gives; the text itself goes to the program."""
+        self._block(self.tree.body)
+        arguments = []
+        for each in [each.arg for each in self.tree.args.args]:
+            kind = self.program.kind(self.types[each], self.rows.get(each, 0))
+            own = self._named(each), kind, each in self.rows, each in self.writes
+            arguments.append(Argument(*own))
+        if self.result is None:
+            raise self._refusal(self.tree, "returns nothing")
+        told = self.program.kind(self.result)
+        self.program.texts.append(
+            self.syntax.function(self.name, told, arguments, self.declared, self.lines)
+        )
+        return Made(self.name, self.result, arguments)
+
+    def _named(self, name: str) -> str:
+        """The name in the target, which tells no letters apart by their case."""
+        return self.names.setdefault(name, f"{plain(name)}_{len(self.names) + 1}")
+
+    def _temporary(self, kind: Any) -> str:
+        name = self._named(f"{len(self.names)}")
+        self.declared[name] = self.program.kind(kind)
+        return name
+
+    def _line(self, form: str, *parts: str) -> None:
+        for line in form.format(*parts).splitlines():
+            self.lines.append("    " * self.depth + line)
 
     # Statements
 
-    def _block(self, statements: Sequence[ast.stmt]) -> list[str]:
-        lines: list[str] = []
+    def _block(self, statements: Sequence[ast.stmt]) -> None:
         for each in statements:
-            lines += self._statement(each)
-        return lines
+            self._statement(each)
 
-    def _statement(self, node: ast.stmt) -> list[str]:
+    def _statement(self, node: ast.stmt) -> None:
         match node:
-            case ast.Expr(value=ast.Constant()) | ast.Pass():
-                return []
+            case ast.Expr(value=ast.Constant(value=str(text))):
+                self._line("{}", self.syntax.comment(text.strip().splitlines()[0]))
+            case ast.Pass():
+                pass
+            case ast.Expr(value=ast.Call() as value):
+                self._value(value)
             case ast.Assign(targets=[target], value=value):
-                return self._assign(target, value)
+                self._assign(target, value)
             case ast.AnnAssign(target=target, value=value) if value is not None:
-                return self._assign(target, value)
+                self._assign(target, value)
             case ast.AugAssign(target=target, op=op, value=value):
-                return self._assign(target, ast.BinOp(left=_read(target), op=op, right=value))
+                self._assign(target, ast.BinOp(left=_read(target), op=op, right=value))
             case ast.Return(value=value) if value is not None:
-                return self._return(value)
+                one = self._several(value.elts) if isinstance(value, ast.Tuple) else None
+                one = one or self._value(value)
+                if self.result not in (None, one.type):
+                    raise self._refusal(self.tree, "returns different things")
+                self.result = one.type
+                self._line(self.syntax.result, self.name, one.text)
             case ast.If(test=test, body=body, orelse=others):
-                lines = [f"    if ({self._said(test).text}) {{", *self._block(body)]
-                return [
-                    *lines,
-                    *(["    } else {", *self._block(others)] if others else []),
-                    "    }",
-                ]
+                self._line(self.syntax.branch[0], self._as(TRUTH, test, self._said(test)))
+                self._inside(body)
+                if others:
+                    self._line(self.syntax.branch[1])
+                    self._inside(others)
+                self._line(self.syntax.branch[2])
             case ast.For(target=ast.Name(id=name), iter=each, body=body, orelse=[]):
-                return self._for(name, each, body)
-        raise self._refusal(node, "has no counterpart")
+                self._for(name, each, body)
+            case _:
+                raise self._refusal(node, "has no counterpart")
 
-    def _assign(self, target: ast.expr, value: ast.expr) -> list[str]:
+    def _inside(self, statements: Sequence[ast.stmt]) -> None:
+        self.depth += 1
+        self._block(statements)
+        self.depth -= 1
+
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple):
-            return self._unpack(target.elts, value)
-        said = self._said(value)
-        return [f"    {self._target(target, said.type)} = {said.text};"]
+            self._unpack(target.elts, value)
+            return
+        said = self._value(value)
+        self._line(self.syntax.assign, self._target(target, said.type), said.text)
 
-    def _unpack(self, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
+    def _unpack(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
         """All values are there before the first target has its own."""
+        read = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
+        if isinstance(value, ast.Tuple) and all(
+            isinstance(each, ast.Name) and each.id not in read for each in targets
+        ):
+            for target, each in zip(targets, value.elts, strict=True):
+                self._assign(target, each)
+            return
         if isinstance(value, ast.Tuple):
-            said = [self._said(each) for each in value.elts]
-            names = [self._temporary() for _ in said]
-            lines = [
-                f"    const {self._c(s.type)} {n} = {s.text};"
-                for s, n in zip(said, names, strict=True)
-            ]
-            pairs = zip(targets, said, names, strict=True)
-            return [*lines, *(f"    {self._target(t, s.type)} = {n};" for t, s, n in pairs)]
-        several, name = self._said(value), self._temporary()
-        if not isinstance(several.type, Several):
-            raise self._refusal(value, "is no several numbers")
-        lines = [f"    const {self._c(several.type)} {name} = {several.text};"]
-        for place, (target, each) in enumerate(zip(targets, several.type.kinds, strict=True)):
-            lines.append(f"    {self._target(target, each)} = {name}.v{place};")
-        return lines
+            said = []
+            for each in value.elts:
+                one = self._value(each)
+                said.append(Said(self._temporary(one.type), one.type))
+                self._line(self.syntax.assign, said[-1].text, one.text)
+        else:
+            whole = self._value(value)
+            if not isinstance(whole.type, Several):
+                raise self._refusal(value, "is no several numbers")
+            fields = zip(whole.type.fields, whole.type.kinds, strict=True)
+            said = [Said(f"{whole.text}.{name}", kind) for name, kind in fields]
+        for target, one in zip(targets, said, strict=True):
+            self._line(self.syntax.assign, self._target(target, one.type), one.text)
 
     def _target(self, target: ast.expr, kind: Any) -> str:
         if isinstance(target, ast.Name):
             before = self.types.setdefault(target.id, kind)
             if before != kind:
                 raise self._refusal(target, f"is a {before} and a {kind}")
-            return target.id
-        if isinstance(target, ast.Subscript):
+            if (name := self._named(target.id)) not in self.arguments:
+                self.declared[name] = self.program.kind(kind)
+            return name
+        if isinstance(target, ast.Subscript) and isinstance(target.value, ast.Name):
+            self.writes.add(target.value.id)
             return self._said(_read(target)).text
         raise self._refusal(target, "is nothing to assign to")
 
-    def _return(self, value: ast.expr) -> list[str]:
-        one = self._several(value.elts) if isinstance(value, ast.Tuple) else self._said(value)
-        self._results(one.type)
-        return [f"    return {one.text};"]
-
-    def _several(self, values: Sequence[ast.expr], names: tuple[str, ...] = ()) -> Said:
+    def _several(self, values: Sequence[ast.expr], names: Any = (), title: str = "several") -> Said:
         said = [self._said(each) for each in values]
-        kind = Several(tuple(each.type for each in said), names)
-        text = ", ".join(each.text for each in said)
-        return Said(f"({self.program.struct(kind)}){{ {text} }}", kind)
+        kind = Several(tuple(each.type for each in said), tuple(names), title)
+        made = self._temporary(kind)
+        for name, each in zip(kind.fields, said, strict=True):
+            self._line(self.syntax.assign, f"{made}.{name}", each.text)
+        return Said(made, kind)
 
-    def _c(self, kind: Any) -> str:
-        return self.program.struct(kind) if isinstance(kind, Several) else str(kind)
-
-    def _results(self, kind: Any) -> None:
-        if self.result not in (None, kind):
-            raise self._refusal(self.tree, "returns different things")
-        self.result = kind
-
-    def _for(self, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
+    def _for(self, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> None:
         if not (isinstance(over, ast.Call) and getattr(over.func, "id", "") == "range"):
             raise self._refusal(over, "is no range")
         ends = [self._said(each).text for each in over.args]
@@ -281,175 +389,189 @@ class _Function:
                 over, "is changed inside, or its variable used outside, which has no counterpart"
             )
         self.types[name] = INTEGER
-        lines = self._block(body)
+        own = self._target(ast.Name(id=name), INTEGER)
+        self._line(self.syntax.loop[0], own, first, last)
+        self._inside(body)
+        self._line(self.syntax.loop[1], own)
         del self.types[name]
-        head = f"    for (int64_t {name} = {first}; {name} < {last}; {name}++) {{"
-        return [head, *lines, "    }"]
-
-    def _temporary(self) -> str:
-        self.temporaries += 1
-        return f"now_{self.temporaries}"
 
     # Expressions
+
+    def _value(self, node: ast.expr) -> Said:
+        self.whole = node
+        return self._said(node)
 
     def _said(self, node: ast.expr) -> Said:
         match node:
             case ast.Constant(value=bool() | int() | float()):
-                return self._constant(node.value)
+                return self._constant(node, node.value)
             case ast.Name(id=name) if name in self.types:
-                return Said(name, self.types[name])
+                return Said(self._named(name), self.types[name])
             case ast.Name(id=name):
-                return self._global(node, self._looked_up(node, name))
+                return self._constant(node, self._looked_up(node, name))
             case ast.Attribute(value=ast.Name(id=name), attr=attr) if name in self.types:
-                return self._of_argument(node, name, attr)
+                return self._of_variable(node, name, attr)
             case ast.Attribute(value=ast.Name(id=name), attr=attr):
-                return self._global(node, getattr(self._looked_up(node, name), attr))
+                return self._constant(node, getattr(self._looked_up(node, name), attr))
             case ast.Subscript(value=value, slice=place):
                 return self._element(node, value, place)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(node, name, arguments)
             case _:
                 return self._worked_out(node)
 
     def _worked_out(self, node: ast.expr) -> Said:
         """An expression of others."""
+        signs = self.syntax.signs
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 said = self._said(operand)
-                return Said(f"(-{said.text})", said.type)
+                return Said(signs[ast.USub].format(said.text), said.type)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return Said(f"(!{self._said(operand).text})", TRUTH)
+                told = self._as(TRUTH, operand, self._said(operand))
+                return Said(signs[ast.Not].format(told), TRUTH)
             case ast.BinOp(
                 left=ast.Constant(value=int() | float() as base),
                 op=ast.Pow(),
                 right=ast.Constant(value=int() as to),
             ):
-                return self._constant(base**to)
+                return self._constant(node, base**to)
             case ast.BinOp(left=left, op=op, right=right):
-                return self._operation(node, self._said(left), op, self._said(right))
+                return self._operation(node, self._said(left), type(op), self._said(right))
             case ast.BoolOp(op=op, values=values):
-                sign = " && " if isinstance(op, ast.And) else " || "
                 parts = [self._said(each) for each in values]
                 if {each.type for each in parts} != {TRUTH}:  # one of them is the result in Python
                     raise self._refusal(node, "is a number")
-                return Said(f"({sign.join(each.text for each in parts)})", TRUTH)
-            case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARED:
-                sides = self._said(left).text, self._said(right).text
-                return Said(f"({sides[0]} {COMPARED[type(op)]} {sides[1]})", TRUTH)
+                told = reduce(signs[type(op)].format, (each.text for each in parts))
+                return Said(told, TRUTH)
+            case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in signs:
+                one, other = self._alike(node, self._said(left), self._said(right))
+                return Said(signs[type(op)].format(one.text, other.text), TRUTH)
             case ast.IfExp(test=test, body=yes, orelse=no):
-                one, other = self._said(yes), self._said(no)
-                text = f"({self._said(test).text} ? {one.text} : {other.text})"
-                return Said(text, NUMBER if NUMBER in (one.type, other.type) else one.type)
-            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                return self._call(node, name, arguments)
+                told = self._as(TRUTH, test, self._said(test))
+                one, other = self._alike(node, self._said(yes), self._said(no))
+                return Said(self.syntax.known["where"].format(told, one.text, other.text), one.type)
         raise self._refusal(node, "has no counterpart")
 
-    def _operation(self, node: ast.expr, left: Said, op: ast.operator, right: Said) -> Said:
-        if type(op) in OPERATORS and NUMBER in (left.type, right.type):
-            return Said(f"({left.text} {OPERATORS[type(op)]} {right.text})", NUMBER)
-        if type(op) in SHARED and not isinstance(op, ast.Div):
-            # Unsigned, as a signed sum may not overflow in C.
-            text = f"(uint64_t){left.text} {SHARED[type(op)]} (uint64_t){right.text}"
-            return Said(f"((int64_t)({text}))", INTEGER)
-        if isinstance(op, ast.RShift):
-            return Said(f"({left.text} >> {right.text})", INTEGER)
-        if type(op) in WHOLE:
-            text = f"(uint64_t){left.text} {WHOLE[type(op)]} {right.text}"
-            return Said(f"((int64_t)({text}))", INTEGER)
+    def _operation(self, node: ast.expr, left: Said, op: Any, right: Said) -> Said:
+        if left.type == right.type == TRUTH and op in OF_TRUTHS:
+            return Said(self.syntax.signs[OF_TRUTHS[op]].format(left.text, right.text), TRUTH)
+        if left.type == right.type == INTEGER and op in WHOLE and op in self.syntax.whole:
+            return Said(self.syntax.whole[op].format(left.text, right.text), INTEGER)
+        if NUMBER in (left.type, right.type) and op in (ast.Add, ast.Sub, ast.Mult, ast.Div):
+            one, other = self._alike(node, left, right)
+            return Said(self.syntax.signs[op].format(one.text, other.text), NUMBER)
         raise self._refusal(node, "has no counterpart")
 
-    def _of_argument(self, node: ast.expr, name: str, attr: str) -> Said:
-        if self.types[name] == MOTION and attr in Motion._fields:
-            return Said(f"{name}->{attr}", NUMBER)
+    def _alike(self, node: ast.expr, one: Said, other: Said) -> tuple[Said, Said]:
+        if one.type == other.type:
+            return one, other
+        return (
+            Said(self._as(NUMBER, node, one), NUMBER),
+            Said(self._as(NUMBER, node, other), NUMBER),
+        )
+
+    def _as(self, kind: str, node: ast.expr, said: Said) -> str:
+        """The text of an expression as another type."""
+        if said.type == kind:
+            return said.text
+        if kind == NUMBER and said.type in self.syntax.numbers:
+            return self.syntax.numbers[said.type].format(said.text)
+        if kind == TRUTH and said.type in (NUMBER, INTEGER):
+            zero = self._constant(node, 0.0 if said.type == NUMBER else 0)
+            return self.syntax.signs[ast.NotEq].format(said.text, zero.text)
+        raise self._refusal(node, "has no counterpart")
+
+    def _of_variable(self, node: ast.expr, name: str, attr: str) -> Said:
         kind = self.types[name]
         if isinstance(kind, Several) and attr in kind.names:
             place = kind.names.index(attr)
-            return Said(f"{name}.v{place}", kind.kinds[place])
-        if self.types[name] == ROWS and attr == "shape":
-            return Said(str(self.rows[name]), "shape")
+            return Said(f"{self._named(name)}.{kind.fields[place]}", kind.kinds[place])
+        if kind == ROWS and attr == "shape":
+            return self._constant(node, self.rows[name])
         raise self._refusal(node, "has no counterpart")
 
     def _element(self, node: ast.expr, value: ast.expr, place: ast.expr) -> Said:
         if isinstance(place, ast.Slice | ast.UnaryOp):  # an index from the end
             raise self._refusal(node, "has no counterpart")
         if isinstance(value, ast.Name) and self.types.get(value.id) == ROWS:
-            return Said(f"{value.id}[{self._said(place).text}]", NUMBER)
+            index = self._as(INTEGER, place, self._said(place))
+            return Said(self.syntax.element.format(self._named(value.id), index), NUMBER)
         if isinstance(value, ast.Attribute) and value.attr == "shape":
-            return Said(self._said(value).text, INTEGER)
+            return self._said(value)
         if isinstance(value, ast.Name) and isinstance(place, ast.Constant):
-            return self._constant(self._looked_up(node, value.id)[place.value])
+            return self._constant(node, self._looked_up(node, value.id)[place.value])
         raise self._refusal(node, "has no counterpart")
 
-    def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> Said:
+    def _call(self, node: ast.Call, name: str, arguments: Sequence[ast.expr]) -> Said:
         if name == "len" and isinstance(arguments[0], ast.Name):
-            return Said(str(self.rows[arguments[0].id]), INTEGER)
-        if name == "abs":
-            return Said(f"fabs{self.program.suffix}({self._said(arguments[0]).text})", NUMBER)
+            return self._constant(node, self.rows[arguments[0].id])
         function = self._looked_up(node, name)
         if function is elementary.polynomial:
-            coefficients = self._looked_up(node, getattr(arguments[1], "id", ""))
-            made = self.program.polynomial(coefficients)
-            return Said(f"{made}({self._said(arguments[0]).text})", NUMBER)
-        said = [self._said(each) for each in arguments]
-        if name in KNOWN and function is getattr(elementary, name):
-            kind, form = KNOWN[name]
-            return Said(form.format(*(each.text for each in said), f=self.program.suffix), kind)
-        if self.program.single and function in OF_SINGLES:
-            return Said(f"{OF_SINGLES[function]}({', '.join(e.text for e in said)})", NUMBER)
+            made = self.program.polynomial(self._looked_up(node, getattr(arguments[1], "id", "")))
+            return self._called(node, made, arguments[:1], [self._said(arguments[0])])
         if isinstance(function, type) and hasattr(function, "_fields"):
-            return self._several(arguments, tuple(function._fields))
-        if not callable(function) or not hasattr(function, "py_func"):
+            return self._several(arguments, function._fields, function.__name__.lower())
+        said = [self._said(each) for each in arguments]
+        if name in self.syntax.known and function is BY_NAME.get(name, vars(elementary).get(name)):
+            asked, kind = ASKED[name]
+            pairs = zip(asked, arguments, said, strict=True)
+            return Said(self.syntax.known[name].format(*(self._as(*each) for each in pairs)), kind)
+        if function in self.syntax.functions:
+            told = ", ".join(map(self._as, [NUMBER] * len(said), arguments, said))
+            return Said(f"{self.syntax.functions[function]}({told})", NUMBER)
+        if not inspect.isfunction(getattr(function, "py_func", function)):
             raise self._refusal(node, f"calls {name}, which is not of this program's")
-        rows = [
-            self.rows[getattr(a, "id", "")]
-            for a, s in zip(arguments, said, strict=True)
-            if s.type == ROWS
-        ]
-        made, kind = self.program.function(function, [each.type for each in said], rows)
-        return Said(f"{made}({', '.join(each.text for each in said)})", kind)
+        rows = [self.rows[getattr(a, "id", "")] for a in self._of_rows(arguments)]
+        made = self.program.function(function, [each.type for each in said], rows)
+        return self._called(node, made, arguments, said)
+
+    def _of_rows(self, arguments: Sequence[ast.expr]) -> list[ast.expr]:
+        return [a for a in arguments if self.types.get(getattr(a, "id", "")) == ROWS]
+
+    def _called(
+        self, node: ast.Call, made: Made, arguments: Sequence[ast.expr], said: Sequence[Said]
+    ) -> Said:
+        """A call, as a statement."""
+        if made.kind is None:
+            raise self._refusal(node, "calls itself, which has no counterpart")
+        pairs = list(zip(made.arguments, arguments, said, strict=True))
+        written = {getattr(own, "id", "") for argument, own, _ in pairs if argument.written}
+        if written and node is not self.whole:  # what else is in it may be read before or after
+            raise self._refusal(node, "changes an argument within an expression: no counterpart")
+        self.writes |= written
+        result = self._temporary(made.kind)
+        told = {argument.name: each.text for argument, _, each in pairs}
+        names = [told[argument.name] for argument, _, _ in pairs if argument.written]
+        self._line("{}", self.syntax.call(made.name, result, told, names))
+        return Said(result, made.kind)
 
     def _looked_up(self, node: ast.AST, name: str) -> Any:
-        found = inspect.getclosurevars(self.function)
-        for place in (found.nonlocals, found.globals, found.builtins, self.function.__globals__):
-            if name in place:
-                return place[name]
-        raise self._refusal(node, f"names {name}, which is nowhere")
+        if name not in self.scope:
+            raise self._refusal(node, f"names {name}, which is nowhere")
+        return self.scope[name]
 
-    def _constant(self, value: Any) -> Said:
+    def _constant(self, node: ast.AST, value: Any) -> Said:
         if isinstance(value, bool):
-            return Said(str(int(value)), TRUTH)
+            return Said(self.syntax.truths[value], TRUTH)
         if isinstance(value, int):
-            text = f"INT64_C({value})" if value != -(2**63) else "INT64_MIN"
-            return Said(text, INTEGER)
-        return Said(self.program.literal(float(value)), NUMBER)
-
-    def _global(self, node: ast.AST, value: Any) -> Said:
-        if isinstance(value, bool | int | float):
-            return self._constant(value)
+            return Said(self.syntax.integer(value), INTEGER)
+        if isinstance(value, float):
+            return Said(self.syntax.literal(value), NUMBER)
         raise self._refusal(node, "has no counterpart")
 
     def _refusal(self, node: ast.AST, why: str) -> UsageError:
-        where = f"{self.function.__module__}.{self.function.__qualname__}"
         shown = ast.unparse(node) if isinstance(node, ast.expr | ast.stmt) else ""
-        return UsageError(f"{where}: {shown.splitlines()[0] if shown else 'it'!r} {why} in C")
+        first = shown.splitlines()[0] if shown else "it"
+        return UsageError(f"{self.where}: {first!r} {why} in {self.syntax.language}")
 
 
-class _Renamed(ast.NodeTransformer):
-    """No name is a word of C."""
-
-    def visit_Name(self, node: ast.Name) -> ast.Name:
-        node.id += "_" * (node.id in RESERVED)
-        return node
-
-    def visit_arg(self, node: ast.arg) -> ast.arg:
-        node.arg += "_" * (node.arg in RESERVED)
-        return node
+def plain(name: str) -> str:
+    """A name in letters that every language has, to which a number is added."""
+    told = "_".join(re.findall("[a-z0-9]+", name.lower()))
+    return told if told[:1].isalpha() else f"t{told}"
 
 
 def _read(target: ast.expr) -> ast.expr:
     """A target as an expression."""
     return ast.parse(ast.unparse(target), mode="eval").body
-
-
-def _argument(kind: Any) -> str:
-    if kind == MOTION:
-        return "const motion *"
-    return kind if kind.endswith("*") else f"{kind} "

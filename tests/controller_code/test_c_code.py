@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from campaign.cli.export_compensation import vectors
-from campaign.controller_code.c_code import c_code, vectors_code
-from campaign.controller_code.compensation import Sampled
-from campaign.controller_code.transpile import INTEGER, MOTION, ROWS, Program
-from campaign.errors import UsageError
-from campaign.physics.bench import Bench
-from campaign.physics.complete import CompleteBench, complete
-from campaign.physics.elementary import exp, where
-from campaign.physics.friction import friction_models
+from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.targets.c import c_code, vectors_code
 from campaign.protocol.bench_file import simulable
-from tests.physics.friction.cases import CURVE, MODELS
+from tests.controller_code.cases import (
+    EVIL,
+    SHIPPED,
+    TRIES,
+    hurting,
+    of_a_plug_in,
+    of_an_evil_name,
+    of_model,
+)
 from tests.system.user import campaign
 
 UNUSED = ("-Wno-unused", "-Wno-unused-parameter")
@@ -30,25 +31,7 @@ SANITIZED = {
     "clang": ("-fsanitize=undefined", "-fsanitize-trap=undefined"),  # needs no library of its own
 }
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-TRIES: dict[str, dict[str, Any]] = {
-    **{name: tree for name, tree in MODELS.items() if not friction_models()[name].no_compensation},
-    "coulomb": {"coulomb_torque": 26.0, "viscous_friction": 4.0, "sign_smoothing": 0.01}
-    if "sign_smoothing" in friction_models()["coulomb"].options.model_fields
-    else {"coulomb_torque": 26.0, "viscous_friction": 4.0},
-    "stribeck": {**CURVE, "sign_smoothing": 0.01},
-}
-
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler on the PATH")
-
-
-def with_friction(*friction: dict[str, Any], gain: float = 0.8) -> CompleteBench:
-    """The platform with one compensation, `tried`, of these interfaces (SI)."""
-    tree = simulable("platform").model_dump()
-    named = {f"interface-{n}": each for n, each in enumerate(friction)}
-    method = {"method": "friction-model", "friction": named, "gain": gain}
-    tree["compensation"], tree["known"] = {"tried": method}, {}
-    tree.pop("plant", None)
-    return complete(Bench.model_validate(tree, context={"si": True}))
 
 
 def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler: str) -> str:
@@ -66,15 +49,12 @@ def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize(
-    ("bench", "name"),
-    [(b, n) for b in ("platform", "linear") for n in simulable(b).compensation],
-)
+@pytest.mark.parametrize(("bench", "name"), SHIPPED)
 def test_shipped_compensations_have_the_bits_of_the_engine(
     tmp_path: Path, bench: str, name: str, compiler: str
 ) -> None:
     made = Sampled.of(simulable(bench), name)
-    said = ended(tmp_path, made, vectors(made), *SANITIZED[compiler], compiler=compiler)
+    said = ended(tmp_path, made, trial_inputs(made), *SANITIZED[compiler], compiler=compiler)
     assert said == "0 of 2000 samples differ\n"
 
 
@@ -92,38 +72,16 @@ def test_in_single_precision_it_is_near_and_nothing_is_a_double(tmp_path: Path, 
     assert said.stdout == "0 of 2000 samples differ\n"
 
 
-def hurting(made: Sampled) -> np.ndarray:
-    """Reversals in every sample, rest, zeros of both signs, denormals, jumps, and fast motion."""
-    draw = np.random.default_rng(3)
-    pieces = [
-        1e-4 * (-1.0) ** np.arange(200),
-        np.zeros(50),
-        np.full(50, -0.0),
-        5e-324 * np.arange(50),
-        1e-310 * draw.standard_normal(100),
-        np.repeat(draw.uniform(-1.0, 1.0, 20), 10),
-        np.cumsum(draw.normal(0.0, 0.02, 300)),
-    ]
-    angle = np.concatenate(pieces)
-    rate = np.gradient(angle) / float(made.controller.period[0])
-    return np.column_stack([rate, angle, -angle, 10.0 * draw.standard_normal(len(angle))])
+def test_a_step_function_of_a_plug_in_has_the_bits_of_the_engine(tmp_path: Path) -> None:
+    made = of_a_plug_in()
+    for inputs in (trial_inputs(made), hurting(made)):
+        ended(tmp_path, made, inputs, compiler=COMPILERS[0])
 
 
 @pytest.mark.parametrize("name", TRIES)
 def test_every_model_has_the_bits_of_the_engine(tmp_path: Path, name: str) -> None:
-    """With a ripple, with directions of their own, on either side of the gear."""
-    draw = np.random.default_rng(sum(name.encode()))
-    tree = {"model": name, **TRIES[name]}
-    for key, value in tree.items():
-        if key in ("coulomb_torque", "static_torque", "bristle_stiffness", "viscous_friction"):
-            tree[key] = float(value * draw.uniform(0.8, 1.0))
-    plain = {**tree, "negative": {"coulomb_torque": 0.7 * tree["coulomb_torque"]}}
-    rippled = {**tree, "ripple": {"amplitude": 0.1, "periods": 31.0, "phase": 0.4}}
-    motor = {**tree, "side": "motor", "velocity": "motor", "coulomb_torque": 0.03}
-    motor |= {"static_torque": 0.04} if "static_torque" in tree else {}
-    motor |= {"viscous_friction": 1e-4}  # or all is at the limit
-    made = Sampled.of(with_friction(plain, plain, rippled, motor), "tried")
-    for inputs in (vectors(made), hurting(made)):
+    made = of_model(name)
+    for inputs in (trial_inputs(made), hurting(made)):
         ended(tmp_path, made, inputs, compiler=COMPILERS[0])
 
 
@@ -166,7 +124,7 @@ def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_p
     assert subprocess.run(["./test"], cwd=folder, check=False).returncode == 0
     code = folder / "compensation_lugre.c"
     text = code.read_text(encoding="utf-8")
-    wrong = text.replace("friction = friction + ", "friction = friction - ", 1)
+    wrong = re.sub(r"(friction_(\d+) = \(friction_\2) \+ ", r"\1 - ", text, count=1)
     assert wrong != text
     code.write_text(wrong, encoding="utf-8")
     subprocess.run(compile_, cwd=folder, check=True)
@@ -175,14 +133,9 @@ def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_p
 
 def test_names_of_a_bench_stay_words_in_comments_and_identifiers(tmp_path: Path) -> None:
     """Whoever wrote the bench file writes no code for the controller."""
-    evil = "*/ #error gone\n#error /*"
-    tree = with_friction(TRIES["coulomb"] | {"model": "coulomb"}).model_dump()
-    tree["name"], tree["compensation"] = evil, {f"../{evil}": tree["compensation"]["tried"]}
-    tree.pop("plant", None)
-    bench = complete(Bench.model_validate(tree, context={"si": True}))
-    made = Sampled.of(bench, f"../{evil}")
+    made = of_an_evil_name()
     assert made.identifier.isidentifier()
-    code = c_code(made, [f"The bench {evil}", f"run {evil}"])
+    code = c_code(made, [f"The bench {EVIL}", f"run {EVIL}"])
     path = tmp_path / f"{made.identifier}.c"
     path.write_text(code, encoding="utf-8")
     subprocess.run([COMPILERS[0], *FLAGS, "-c", path.name], cwd=tmp_path, check=True)
@@ -192,7 +145,9 @@ def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     made = Sampled.of(simulable("platform"), "observer")
     name = "compensation_observer"
     (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
-    (tmp_path / f"{name}_test.c").write_text(vectors_code(made, vectors(made)), encoding="utf-8")
+    (tmp_path / f"{name}_test.c").write_text(
+        vectors_code(made, trial_inputs(made)), encoding="utf-8"
+    )
     flags = ("-std=c99", "-O2", "-ffp-contract=fast", "-mfma")
     command = [COMPILERS[0], *flags, f"{name}_test.c", "-o", "test", "-lm"]
     if subprocess.run(command, cwd=tmp_path, check=False, capture_output=True).returncode:
@@ -203,80 +158,12 @@ def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
     assert subprocess.run(["./test"], cwd=tmp_path, check=False).returncode == 2
 
 
-def sorts(parameters: Any, state: Any, motion: Any) -> tuple[float, float]:
-    """A step function that C does not have."""
-    return sorted(state)[0], where(motion.rate_end > 0.0, exp(motion.rate_end), 0.0)
-
-
-def test_what_has_no_counterpart_is_refused_by_name() -> None:
-    with pytest.raises(
-        UsageError, match=r"test_c_code\.sorts: 'sorted\(state\)\[0\]' has no counterpart in C"
-    ):
-        Program().function(sorts, [ROWS, ROWS, MOTION], [1, 1])
-
-
-def by_twos(state: Any) -> float:
-    total = 0.0
-    for i in range(0, 4, 2):
-        total += state[i]
-    return total
-
-
-def ends_otherwise(state: Any) -> float:
-    total = 0.0
-    for i in range(4):
-        total += state[i]
-    else:
-        total = 0.0
-    return total
-
-
-def range_changes(state: Any) -> float:
-    count = 4
-    for i in range(count):
-        state[i] = 0.0
-        count = 2
-    return state[0]
-
-
-def read_after(state: Any) -> float:
-    for i in range(4):
-        state[i] = 0.0
-    return state[i]
-
-
-def first_that_is_not_zero(state: Any) -> float:
-    return state[0] or state[1]
-
-
-def from_the_end(state: Any) -> float:
-    return state[-1]
-
-
-@pytest.mark.parametrize(
-    "step",
-    [by_twos, ends_otherwise, range_changes, read_after, first_that_is_not_zero, from_the_end],
-)
-def test_what_c_would_do_otherwise_is_refused(step: Any) -> None:
-    with pytest.raises(UsageError, match=rf"test_c_code\.{step.__name__}: .* in C"):
-        Program().function(step, [ROWS], [4])
-
-
-def test_a_power_of_whole_numbers_stays_whole() -> None:
-    def shifted(bits: int) -> int:
-        return bits + 2**52
-
-    program = Program()
-    assert program.function(shifted, [INTEGER]) == ("shifted_0", INTEGER)
-    assert f"INT64_C({2**52})" in program.texts[0]
-
-
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
         (("simulink", "lugre"), "does not say controller.sample_rate"),
         (("platform", "nobody"), "has no compensation 'nobody'; there are static, lugre, observer"),
-        (("platform", "lugre", "--to", "fortran"), "there are c, c-single, json"),
+        (("platform", "lugre", "--to", "fortran"), "there are c, c-single, matlab, json, st"),
     ],
 )
 def test_mistakes_are_said_in_a_line(tmp_path: Path, arguments: tuple[str, ...], why: str) -> None:

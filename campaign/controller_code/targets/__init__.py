@@ -1,0 +1,56 @@
+"""Targets of `campaign export-compensation`: each file here names its own in `TARGETS`."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from campaign.controller_code.compensation import INPUTS, Sampled
+
+Array = NDArray[np.float64]
+BOUND = 1e-8
+"""Share of the largest torque of the vectors by which code may be off that has the exponential
+function of its platform. Most models keep 1e-12; `leuven` has 1e-9 on its vectors, and its own
+torques can change by 1e-2 where an input changes in the last digit.
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What `--to NAME` writes.
+
+    write: texts by file name, from a compensation, lines for the head, and test inputs (n, 4).
+    """
+
+    name: str
+    write: Callable[[Sampled, Sequence[str], Array], dict[str, str]]
+
+
+def targets() -> dict[str, Target]:
+    """All of them, by name."""
+    names = sorted(each.name for each in pkgutil.iter_modules(__path__))
+    modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
+    return {target.name: target for module in modules for target in module.TARGETS}
+
+
+def vectors(made: Sampled, inputs: Array) -> Array:
+    """`INPUTS` and the torque of this program, shape (n, 5)."""
+    return np.column_stack([inputs, made.torques(inputs)])
+
+
+def about(made: Sampled, head: Sequence[str]) -> list[str]:
+    """Lines that stand above any code: where it comes from, and how to call it."""
+    period = float(made.controller.period[0])
+    return [
+        *head,
+        "",
+        f"Call it every {period!r} s ({1.0 / period:.9g} Hz). Inputs: {', '.join(INPUTS)}",
+        "  (rad/s; rad, relative; rad at the load: the motor's by the gear ratio; A).",
+        "It gives the torque to add (N m at the load). A reading that is infinite or NaN keeps",
+        f"torque and states of the sample before. Limit: {made.bench.limits.torque!r} N m.",
+    ]
