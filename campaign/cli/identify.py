@@ -12,6 +12,7 @@ from pathlib import Path
 from rich.text import Text
 
 from campaign.api.conclusion_sentences import of_unknown_size
+from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
@@ -34,7 +35,7 @@ WIDTH = 80
 
 @unwinding()
 def identify_run(
-    run: str,
+    run: str | None,
     results: Path,
     *,
     models: Sequence[str] = (),
@@ -52,6 +53,7 @@ def identify_run(
     Raises NoResultError where no method identified anything, before anything is written.
     """
     also = chosen_formats(formats)
+    run = run or find_run(results).stem
     chosen = choose(results, run)
     unseen = choose(results, validate) if validate else None
     compared = choose(results, compare) if compare else None

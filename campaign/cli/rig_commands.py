@@ -25,13 +25,13 @@ __all__ = ["app"]
 @app.command()
 def identify(
     run: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            metavar="RUN[:TEST]",
-            help="A run, or one test of it; paths, names, or their beginnings.",
+            metavar="[RUN[:TEST]]",
+            help="A run, or one test of it: path, name, or its beginning; the newest when absent.",
             show_default=False,
         ),
-    ],
+    ] = None,
     results: ResultsOption = RESULTS,
     model: Annotated[
         list[str] | None,

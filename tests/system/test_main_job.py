@@ -86,12 +86,14 @@ def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart
         assert same.read_bytes() == file.read_bytes(), file.name
 
 
-def test_report_takes_the_newest_run_when_none_is_named(tmp_path: Path):
+def test_report_and_identify_take_the_newest_run_when_none_is_named(tmp_path: Path):
     write(tmp_path, SEA)
     campaign(tmp_path, "run", "protocol.toml", "--only", "sea")
     newest = campaign(tmp_path, "run", "protocol.toml").last_line
     page = campaign(tmp_path, "report").last_line
     assert page == str(Path(newest).with_suffix("")) + "-report/report.html"
+    refused = campaign(tmp_path, "identify", "--model", "ramps", code=6).err
+    assert f"{Path(newest).stem}: nothing can be identified" in refused
 
 
 def test_own_templates_win_only_when_asked_for(tmp_path: Path):
