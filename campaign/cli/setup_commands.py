@@ -73,7 +73,8 @@ def model(
 @app.command()
 def schema(
     of: Annotated[
-        str, typer.Argument(metavar="protocol|bench|report", help="Which files it describes.")
+        str,
+        typer.Argument(metavar="protocol|bench|mapping|report", help="Which files it describes."),
     ],
 ) -> None:
     """Print a JSON Schema, by which editors complete and check TOML."""
