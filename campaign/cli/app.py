@@ -46,7 +46,7 @@ GROUPS = {
     "Controllers": ("export-compensation",),
     "Archives": ("verify", "sign"),
     "Hardware": ("device", "stop", "status"),
-    "Installation": ("doctor", "warmup"),
+    "Installation": ("doctor", "warmup", "new"),
 }
 """Commands as the help lists them, by heading."""
 

@@ -37,7 +37,7 @@ schema = { path = "./schemas/bench.json" }
 
 
 def print_schema(of: str) -> None:
-    """The JSON Schema of protocols, benches, mappings or reports. Raises UsageError for anything else."""
+    """The JSON Schema of what SCHEMAS names. Raises UsageError for anything else."""
     if of not in SCHEMAS:
         raise UsageError(f"there is no schema of {of!r}; there are {', '.join(SCHEMAS)}")
     print_json(SCHEMAS[of]())

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from pydantic import BaseModel
+
 from campaign.importing.mapping import TIME, ChannelColumn, RecordingEntry, TimeColumn
 from campaign.protocol.json_schema import Tree, protocol_schema, schema_of_model
 from campaign.protocol.schema import ExperimentKind
 
-TABLES = {"TimeColumn": TimeColumn, "ChannelColumn": ChannelColumn, "Recording": RecordingEntry}
+TABLES: dict[str, type[BaseModel]] = {
+    "TimeColumn": TimeColumn,
+    "ChannelColumn": ChannelColumn,
+    "Recording": RecordingEntry,
+}
 
 
 def mapping_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
