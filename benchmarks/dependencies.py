@@ -45,6 +45,7 @@ WHAT_FOR = {
     "nptdms": "import of TDMS",
     "openpyxl": "import of Excel",
     "asammdf": "import of MDF",
+    "plotext": "`run --watch`",
 }
 
 
