@@ -1,4 +1,4 @@
-"""Writing measurements into docs/developers/performance.md, between two marks."""
+"""Writing measurements into a page, docs/developers/performance.md for one, between two marks."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ PAGE = DOCS / "developers" / "performance.md"
 IMAGES = DOCS / "images"
 
 
-def write_section(name: str, text: str) -> None:
-    """Replace what stands between `<!-- NAME -->` and `<!-- /NAME -->`."""
+def write_section(name: str, text: str, at: Path = PAGE) -> None:
+    """In the page `at`, replace what stands between `<!-- NAME -->` and `<!-- /NAME -->`."""
     begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
-    page = PAGE.read_text(encoding="utf-8")
+    page = at.read_text(encoding="utf-8")
     before, _, rest = page.partition(begin)
     _, found, after = rest.partition(end)
     if not found:
-        raise ValueError(f"{PAGE} has no section {name}")
-    PAGE.write_text(f"{before}{begin}{text.strip()}\n{end}{after}", encoding="utf-8")
+        raise ValueError(f"{at} has no section {name}")
+    at.write_text(f"{before}{begin}{text.strip()}\n{end}{after}", encoding="utf-8")
 
 
 def table(headings: list[str], rows: list[list[str]]) -> str:

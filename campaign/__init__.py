@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from campaign.api import RunView
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["ArchiveWarning", "__version__", "open"]
 
 

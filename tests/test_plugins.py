@@ -259,23 +259,22 @@ def page(packages: Packages) -> Packages:
     """The package of docs/developers/plug-ins.md."""
     found = re.findall(r"^```\w+ ([\w./]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     files = dict(found)
-    assert set(files) == {"pyproject.toml", "grease_film/model.py", "tests/test_model.py"}
+    assert set(files) == {"pyproject.toml", "grease.py", "tests/test_grease.py", "sheet.py"}
     project = tomllib.loads(files["pyproject.toml"])["project"]
     points = {
         f"{group}/{name}": value
         for group, entries in project["entry-points"].items()
         for name, value in entries.items()
     }
-    files["grease_film/__init__.py"] = ""
     packages.install(project["name"], files, points, project["version"])
     return packages
 
 
 def test_the_page_s_own_test_passes(page: Packages) -> None:
-    shutil.rmtree(page.folder / "grease-film-1.0.dist-info")
+    shutil.rmtree(page.folder / "grease-1.0.dist-info")
     code = """
 import sys, pytest
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_model.py"]))
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_grease.py"]))
 """
     done = page.python(code)
     assert done.returncode == 0, done.stdout + done.stderr

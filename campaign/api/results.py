@@ -16,6 +16,7 @@ from campaign.api.analysis import AnalysedTest, analyse_run, published_of, sourc
 from campaign.api.conclusion_sentences import sentence
 from campaign.api.damage_warnings import tell, warn
 from campaign.api.estimates import findings_table
+from campaign.api.plots import plot
 from campaign.api.tables import result_table
 from campaign.archive import RunReader
 from campaign.archive.layout.results import ResultsOfTest, RunResults, results_path
@@ -30,6 +31,7 @@ from campaign.source_hash import digest, sources_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure as Drawing
 
 NO_FILE = "there is no file of results"
 
@@ -42,10 +44,12 @@ class Results:
         found: all of it, as objects.
         origin: where it is from, in words: the file that was read, or the program that analysed
             the run just now and why no file was read.
+        archive: the run.
     """
 
     found: RunResults = field(repr=False)
     origin: str
+    archive: RunReader = field(repr=False)
 
     @property
     def conclusions(self) -> dict[str, tuple[str, ...]]:
@@ -79,6 +83,16 @@ class Results:
         """The figures of all tests by `test/key`: panels, and curves as arrays (SI)."""
         tests = self.found.tests
         return {f"{each.name}/{f.key}": f for each in tests for f in each.result.figures}
+
+    def plot(self, figure: str = "") -> Drawing:
+        """A figure of the report as a matplotlib figure; a notebook shows it.
+
+        figure: `test/key` as in `figures`; a test's name for its most telling one; a key that one
+            figure alone has; absent: the one on top of the report.
+
+        Raises UsageError when no figure, or more than one, is meant.
+        """
+        return plot(self.archive, self.found, figure)
 
     @property
     def published(self) -> pd.DataFrame:
@@ -148,10 +162,10 @@ def results_view(run: RunReader, *, strict: bool = False, measure_anew: bool = F
     if path.exists():
         kept, why = _kept(run, strict=strict, measure_anew=measure_anew)
         if kept is not None:
-            return Results(kept, f"read from {path}")
+            return Results(kept, f"read from {path}", run)
         warn(f"{why}; the run is analysed")
     found = _analysed(run, strict=strict, measure_anew=measure_anew)
-    return Results(found, f"analysed by campaign {__version__}: {why}")
+    return Results(found, f"analysed by campaign {__version__}: {why}", run)
 
 
 def _kept(run: RunReader, *, strict: bool, measure_anew: bool) -> tuple[RunResults | None, str]:

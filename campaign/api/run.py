@@ -24,6 +24,7 @@ from campaign.trial import trial_number
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure as Drawing
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,6 +111,10 @@ class RunView:
         be left out of the analysis.
         """
         return results_view(self.archive, strict=self.strict, measure_anew=self.measure_anew)
+
+    def plot(self, figure: str = "") -> Drawing:
+        """A figure of the report as a matplotlib figure: see `Results.plot`."""
+        return self.results.plot(figure)
 
     def test(self, name: str) -> TestView:
         """The test of that name.

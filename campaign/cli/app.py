@@ -46,7 +46,7 @@ GROUPS = {
     "Controllers": ("export-compensation",),
     "Archives": ("verify", "sign"),
     "Hardware": ("device", "stop", "status"),
-    "Installation": ("doctor", "warmup"),
+    "Installation": ("doctor", "warmup", "new"),
 }
 """Commands as the help lists them, by heading."""
 
@@ -161,6 +161,9 @@ def run(
     profile: Annotated[
         bool, typer.Option("--profile", help="Say at the end where the time went.")
     ] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Draw channels of the running trial in the terminal.")
+    ] = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
     from campaign.stopwatch import UNTIMED, Stopwatch, Work
@@ -188,6 +191,7 @@ def run(
             remarks=remarks,
             sign=sign,
             stopwatch=stopwatch,
+            watch=watch,
         )
     )
 

@@ -17,6 +17,7 @@ from campaign.cli.profile import print_profile
 from campaign.cli.session import Session, conduct
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
+from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.execution.stop import under_guardian
@@ -51,12 +52,15 @@ def run_protocol(
     sign: Path | None = None,
     where: Where = HERE,
     stopwatch: Stopwatch | None = None,
+    watch: bool = False,
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output.
 
     With a key to `sign` the run with: that it can sign is known before anything moves. With a
     `stopwatch`, what took how long is told at the end.
     """
+    if watch:
+        require_watch(where.executor)
     guardian = under_guardian(find_backend(request.backend))
     timing = stopwatch or UNTIMED
     with compiling_meanwhile(request.backend) as compiling:
@@ -100,6 +104,7 @@ def run_protocol(
             stages=plan.stages,
             guardian=guardian,
             executor=executor,
+            watch=watch,
         )
         code = conduct(session, open_archive, report=report, sign=sign)
     if stopwatch is not None:

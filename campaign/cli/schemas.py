@@ -10,12 +10,14 @@ from typing import Any
 from campaign.cli.output import print_json
 from campaign.errors import UsageError
 from campaign.experiments import experiments
+from campaign.importing.json_schema import mapping_schema
 from campaign.protocol.json_schema import bench_schema, protocol_schema
 from campaign.report.formats.as_json import report_schema
 
 SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "protocol": lambda: protocol_schema(experiments()),
     "bench": bench_schema,
+    "mapping": lambda: mapping_schema(experiments()),
     "report": report_schema,
 }
 FOLDER = "schemas"
@@ -35,7 +37,7 @@ schema = { path = "./schemas/bench.json" }
 
 
 def print_schema(of: str) -> None:
-    """The JSON Schema of protocols, benches or reports. Raises UsageError for anything else."""
+    """The JSON Schema of what SCHEMAS names. Raises UsageError for anything else."""
     if of not in SCHEMAS:
         raise UsageError(f"there is no schema of {of!r}; there are {', '.join(SCHEMAS)}")
     print_json(SCHEMAS[of]())

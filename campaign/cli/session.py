@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
+from campaign.cli.watch import watching
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
 from campaign.execution.display import clock, progress_display
 from campaign.execution.executors import (
@@ -50,6 +51,7 @@ from campaign.execution.stages import Stages, refusal_of
 from campaign.execution.stop import NOTHING_BEGUN, GuardianPipes, StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.trial_metrics import Measuring
+from campaign.execution.watch_display import WatchDisplay
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.policy import Policy
@@ -77,6 +79,8 @@ class Session:
         asked: those of the stages that were asked before, as the journal tells.
         guardian: of a program that moves a bench.
         executor: what executes the trials; this machine's own threads or processes when None.
+        watch: whether channels of the running trial are drawn; trials are then executed in this
+            process.
     """
 
     kind: BackendKind
@@ -95,6 +99,7 @@ class Session:
     asked: tuple[TrialsFollowed, ...] = ()
     guardian: GuardianPipes | None = None
     executor: OpenExecutor | None = None
+    watch: bool = False
 
     @property
     def source(self) -> RunReader | None:
@@ -213,9 +218,14 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
     measuring = Measuring(experiments(), session.timing)
     executor, left = session.executor, sum(1 for _ in session.left)
-    if executor is None and in_processes(session.kind, session.workers, left):
+    here = executor is None and not session.watch
+    if here and in_processes(session.kind, session.workers, left):
         executor = partial(process_executor, count=session.workers)
-    with progress_display(error_console()) as display:
+    supervision = Supervision(session.kind.source, session.kind.live, timing=session.timing)
+    showing = watching if session.watch else progress_display
+    with showing(error_console()) as display:
+        if isinstance(display, WatchDisplay):
+            supervision = replace(supervision, subscribers=(display.seen,))
         return run_plan(
             session.trials,
             backend,
@@ -225,7 +235,7 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
             stop=stop,
             policy=session.policy,
             attendance=attendance_of(session.kind, display, yes=session.yes),
-            supervision=Supervision(session.kind.source, session.kind.live, timing=session.timing),
+            supervision=supervision,
             measure=measuring,
             finished=session.finished,
             executor=executor,

@@ -1,4 +1,4 @@
-"""Setup commands: kinds, warmup, init, doctor."""
+"""Setup commands: kinds, model, schema, new, warmup, doctor, init."""
 
 from __future__ import annotations
 
@@ -73,13 +73,30 @@ def model(
 @app.command()
 def schema(
     of: Annotated[
-        str, typer.Argument(metavar="protocol|bench|report", help="Which files it describes.")
+        str,
+        typer.Argument(metavar="protocol|bench|mapping|report", help="Which files it describes."),
     ],
 ) -> None:
     """Print a JSON Schema, by which editors complete and check TOML."""
     from campaign.cli.schemas import print_schema
 
     print_schema(of)
+
+
+@app.command()
+def new(
+    kind: Annotated[
+        str, typer.Argument(metavar="experiment|model|backend|format", help="What it provides.")
+    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the package and its kind.")],
+    output: Annotated[
+        Path, typer.Option("--output", metavar="DIR", help="Where its folder is made.")
+    ] = Path(),
+) -> None:
+    """Write a package of your own: a kind that works, with a test."""
+    from campaign.cli.new_package import new_package
+
+    new_package(kind, name, output)
 
 
 @app.command()

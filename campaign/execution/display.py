@@ -96,7 +96,7 @@ class LiveDisplay:
         """Show the state of the run."""
         if self._task is None:
             self._task = self._live.add_task("", total=progress.total, counts="", time_left="")
-        for line in _news(progress):
+        for line in news(progress):
             self._live.console.print(line)
         self._live.update(
             self._task,
@@ -128,7 +128,7 @@ class PlainDisplay:
 
     def __call__(self, progress: Progress) -> None:
         """Print what there is to say, if anything."""
-        for line in _news(progress):
+        for line in news(progress):
             self._print(line)
         if progress.closing:
             self._patience = threading.Timer(PATIENCE, self._print, [Text(f"{CLOSING} ...")])
@@ -157,7 +157,8 @@ class PlainDisplay:
         self._printed = time.monotonic()
 
 
-def _news(progress: Progress) -> Iterator[Text]:
+def news(progress: Progress) -> Iterator[Text]:
+    """Lines that stay: a trial that failed, and what the run has decided."""
     if (failure := _failure(progress.ended)) is not None:
         yield failure
     if progress.remark:

@@ -16,6 +16,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from campaign.choice import Choice
 from campaign.options import TextFile, meaning_of
 from campaign.physics.bench import Bench
+from campaign.protocol.files import SCHEMA
 from campaign.protocol.schema import ExperimentKind, ProtocolFile, TestEntry
 from campaign.units import Quantity
 
@@ -117,7 +118,8 @@ def _cleaned(tree: Any) -> Any:
     }
 
 
-def _of_model(model: type[BaseModel]) -> Tree:
+def schema_of_model(model: type[BaseModel]) -> Tree:
+    """Of a table by itself; what it refers to is under `definitions`."""
     tree: Tree = model.model_json_schema(
         schema_generator=_Generator, ref_template="#/definitions/{model}"
     )
@@ -128,12 +130,13 @@ def _of_model(model: type[BaseModel]) -> Tree:
 
 def bench_schema() -> Tree:
     """Of a bench file."""
-    tree = _of_model(Bench)
+    tree = schema_of_model(Bench)
     definitions = tree["definitions"]
     definitions["Scatter"] = {"anyOf": [{"type": "number"}, definitions["Scatter"]]}
     gear = definitions["GearOptions"]
     gear["required"], gear["oneOf"] = [], [{"required": ["ratio"]}, {"required": ["lead"]}]
     _named_by_key(tree["properties"]["compensation"], definitions)
+    tree["properties"]["schema"] = {"const": SCHEMA["bench"]}
     return {"$schema": DIALECT, "title": "A bench of campaign", **tree}
 
 
@@ -151,11 +154,11 @@ def _named_by_key(table: Tree, definitions: Mapping[str, Tree]) -> None:
 
 def protocol_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
     """Of a protocol with these experiments; a test's keys follow from its kind."""
-    top, entry = _of_model(ProtocolFile), _of_model(TestEntry)
+    top, entry = schema_of_model(ProtocolFile), schema_of_model(TestEntry)
     definitions = {**top.pop("definitions"), **entry.pop("definitions")}
     cases = []
     for name, kind in experiments.items():
-        own = _of_model(kind.options)
+        own = schema_of_model(kind.options)
         definitions |= own.pop("definitions")
         properties = {**own.get("properties", {}), **entry["properties"]}
         required = [*entry.get("required", ()), *own.get("required", ())]
@@ -164,6 +167,7 @@ def protocol_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
         cases.append({"if": given, "then": then})
     test = {**entry, "additionalProperties": True, "allOf": cases}
     test["properties"] = {**entry["properties"], "kind": {"enum": list(experiments)}}
+    top["properties"]["schema"] = {"const": SCHEMA["protocol"]}
     top["properties"]["test"] = {"type": "array", "items": test}
     return {
         "$schema": DIALECT,

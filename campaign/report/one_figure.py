@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from campaign.api.analysis import AnalysedTest
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
 from campaign.plain_text import on_a_page
 from campaign.protocol.problems import allowed
+from campaign.published.values import Published
 from campaign.report.content.document import document_of
+from campaign.report.content.first_screen import leading_figure, most_telling
 from campaign.report.drawing.figures import Column, in_column
 from campaign.report.drawing.pdf import also_as_pdf
 from campaign.report.page.damage_notice import told_on_page
+from campaign.report.page.drawings import drawings_of
 from campaign.report.page.layout import lay_out
 from campaign.text import nearest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
 
 WRITTEN = ".campaign-figures"
 """Of a folder of figures: SHA-256 and name of each file that was written there, a line each."""
@@ -78,6 +86,30 @@ def write_figures(
         drawings.append(output / f"{name}.svg")
     _write(output, files)
     return tuple(drawings), document.damaged
+
+
+def sheet_of(tests: Sequence[AnalysedTest], compared: Published, wanted: str) -> Canvas:
+    """A figure of a run as matplotlib draws it, with what is published beside it.
+
+    wanted: `TEST/KEY`; a test's name for its most telling figure; a key that one figure alone has;
+        "" for the figure on top of the report.
+
+    Raises UsageError when no figure, or more than one, is meant.
+    """
+    drawings = {f"{name}/{key}": each for (name, key), each in drawings_of(tests, compared).items()}
+    meant = [name for name in drawings if name.partition("/")[2] == wanted]
+    if not wanted and (leading := leading_figure(tests)):
+        meant = ["/".join(leading)]
+    for test in tests:
+        if test.name == wanted and (figure := most_telling(test.result)):
+            meant = [f"{wanted}/{figure.key}"]
+    if wanted in drawings:
+        meant = [wanted]
+    if len(meant) != 1 or meant[0] not in drawings:
+        what = "is no figure" if len(meant) != 1 or not wanted else "cannot be drawn"
+        slip = nearest(wanted, drawings)
+        raise UsageError(f"{wanted!r} {what} of this run; {allowed(drawings)}{slip}")
+    return drawings[meant[0]].sheet()
 
 
 def _write(output: Path, files: Mapping[str, bytes]) -> None:

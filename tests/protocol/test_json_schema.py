@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +13,10 @@ import pytest
 from jsonschema import Draft7Validator
 
 from campaign.experiments import experiments
+from campaign.importing.json_schema import mapping_schema
 from campaign.protocol.json_schema import bench_schema, protocol_schema
 from campaign.resources import protocols_folder
-from tests.system.user import campaign
+from tests.system.user import ROOT, campaign
 
 PROTOCOLS = sorted(protocols_folder().glob("*.toml"))
 BENCHES = sorted((protocols_folder() / "benches").glob("*.toml"))
@@ -82,6 +84,7 @@ def drop(*keys: str | int) -> Callable[[Tree], None]:
         (put("test", 0, "seed", value=-1), "test.0.seed"),
         (put("test", 0, "speeds", value="1 deg/s"), "test.0.speeds"),
         (put("tests", value=[]), ""),
+        (put("schema", value=3), "schema"),
         (put("tags", value="quickstart"), "tags"),
         (put("title", value=3), "title"),
         (put("check", value={"test": "velocity-map"}), "check"),
@@ -132,11 +135,53 @@ def test_what_a_field_means_is_said_with_its_units(benches: Draft7Validator) -> 
     assert "units: kg m^2" in json.dumps(inertia)
 
 
+MAPPINGS = [
+    block
+    for block in re.findall(
+        r"^```toml\n(.*?)^```$",
+        (ROOT / "docs" / "import.md").read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
+    )
+    if "[[test.recording]]" in block and "[columns" in block
+]
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (put("columns", "pos", "time", "sample_rate", value=1000), "columns.pos.time.sample_rate"),
+        (put("columns", "pos", "drive_torque", "unti", value="A"), "columns.pos.drive_torque"),
+        (put("columns", "pos", "drive_torque", "sign", value=2), "columns.pos.drive_torque.sign"),
+        (put("columns", "pos", value=[]), "columns.pos"),
+        (put("test", 0, "recording", 0, "fiel", value="a"), "test.0.recording.0"),
+        (drop("test", 0, "recording", 0, "file"), "test.0.recording.0"),
+        (put("test", 0, "kind", value="motoin"), "test.0.kind"),
+    ],
+)
+def test_a_mistake_in_a_mapping_is_found_where_it_is(
+    change: Callable[[Tree], None], place: str
+) -> None:
+    schema = mapping_schema(experiments())
+    Draft7Validator.check_schema(schema)
+    mappings = Draft7Validator(schema)
+    trees = [tomllib.loads(text) for text in MAPPINGS]
+    assert [places(mappings, tree) for tree in trees] == [set()] * len(trees)
+    tree = next(tree for tree in trees if "pos" in tree["columns"])
+    change(tree)
+    assert place in places(mappings, tree)
+
+
 def test_the_command_prints_each(tmp_path: Path) -> None:
-    for of, word in (("protocol", "matrix"), ("bench", "inertia"), ("report", "findings")):
+    known = {
+        "protocol": "matrix",
+        "bench": "inertia",
+        "mapping": "sample_rate",
+        "report": "findings",
+    }
+    for of, word in known.items():
         tree = json.loads(campaign(tmp_path, "schema", of).out)
         assert f'"{word}": ' in json.dumps(tree)
-    assert "there is no schema of 'mapping'" in campaign(tmp_path, "schema", "mapping", code=2).err
+    assert "there is no schema of 'maps'" in campaign(tmp_path, "schema", "maps", code=2).err
 
 
 def test_init_leaves_what_editors_look_for(tmp_path: Path) -> None:

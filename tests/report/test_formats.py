@@ -387,7 +387,12 @@ def test_the_program_can_be_cited(made_up: ModuleType) -> None:
     text = (made_up.ROOT / "CITATION.cff").read_text()
     keys = re.findall(r"^([a-z-]+):", text, re.MULTILINE)
     assert {"cff-version", "message", "title", "authors", "version"} <= set(keys)
-    assert f"\nversion: {__version__}\n" in text
+    changes = (made_up.ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    (version, date), *_ = re.findall(
+        r"^## \[([\d.]+)\] - (\d{4}-\d\d-\d\d)$", changes, re.MULTILINE
+    )
+    assert version == __version__
+    assert f"\nversion: {version}\ndate-released: {date}\n" in text
 
 
 # --- PDF ------------------------------------------------------------------------------------

@@ -69,7 +69,7 @@ def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
     with workers(run, 2) as two:
         found = two.found
         document = document_of(run, experiments(), found=found)
-        drawings = drawings_of(document)
+        drawings = drawings_of(document.tests, document.published)
         awaited = two.draw(drawings)
         drawn = {key: awaited(key) for key in drawings}
     assert found.keys() == {"calm", "steps"}

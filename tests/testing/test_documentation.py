@@ -59,7 +59,7 @@ def tx1(package: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 def told(drive: Drive, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """The names of the page's test, made for a drive."""
-    monkeypatch.setenv("TX1_PORT", str(drive.port))
+    monkeypatch.setenv("DRIVE_PORT", str(drive.port))
     names: dict[str, Any] = {}
     exec(compile(block("python test"), "page", "exec"), names)
     return names
@@ -73,10 +73,10 @@ def test_it_is_short(tx1: ModuleType) -> None:
 def test_it_passes_the_kit(name: str, tx1: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     with Drive() as drive, Drive("HOT") as hot:
         names = told(drive, monkeypatch)
-        names["TX1"] = replace(
-            names["TX1"], failing=lambda: tx1.BACKEND.open(tx1.DriveOptions(port=hot.port))
+        names["CASE"] = replace(
+            names["CASE"], failing=lambda: tx1.BACKEND.open(tx1.DriveOptions(port=hot.port))
         )
-        names["test_tx1"](name)
+        names["test_backend"](name)
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def opening_of(
     shown = [test for test in tests if not main or test.name in main]
     return Opening(
         tuple(_answer(test, truths.get(test.name), references) for test in tests),
-        _stated(tests) or _telling(shown) or _telling(tests),
+        leading_figure(tests),
         (*wrong_with(run, tests, damaged), *_without_stated(tests)),
         _asked(run, tests),
         _compared(scoreboard),
@@ -180,7 +180,7 @@ def _in_short(chosen: Sequence[Answer]) -> Short:
 def _answer(test: AnalysedTest, truth: Table | None, references: References) -> Answer:
     result = test.result
     said = tuple(sentence(each) for each in result.conclusions)
-    figure = _figure(result)
+    figure = most_telling(result)
     stated, files = references.stated.get(test.name), references.files.get(test.name, ())
     with axis_terms(test.sides):
         every, first = (
@@ -220,7 +220,14 @@ def _held(truth: Table) -> str:
 # The figure on top --------------------------------------------------------------------------------
 
 
-def _figure(result: Result) -> Figure | None:
+def leading_figure(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
+    """Test and key of the figure on top of the page; None without any."""
+    main = _main(tests)
+    shown = [test for test in tests if not main or test.name in main]
+    return _stated(tests) or _telling(shown) or _telling(tests)
+
+
+def most_telling(result: Result) -> Figure | None:
     """The most telling figure of a result; None without any."""
     named = (figure for figure in result.figures if figure.key == result.telling)
     return next(named, next(iter(result.figures), None))
@@ -249,7 +256,7 @@ def _telling(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
     One that draws intervals goes before one that does not; then the one whose test says most: how
     many ratios the data decide. Of equal ones the first of the protocol.
     """
-    found = [(test, figure) for test in tests if (figure := _figure(test.result)) is not None]
+    found = [(test, figure) for test in tests if (figure := most_telling(test.result)) is not None]
     if not found:
         return None
     test, figure = max(found, key=lambda pair: (_has_intervals(pair[1]), _decided(pair[0].result)))

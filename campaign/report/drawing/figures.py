@@ -117,6 +117,27 @@ def draw(
     published: values of a document that stand beside its curves.
     chosen: the looks of all series of the page; of this figure alone where they are not given.
     """
+    with _drawn(figure, published, chosen) as sheet:
+        return to_svg(sheet)
+
+
+def draw_sheet(
+    figure: Figure,
+    published: Marks | None = None,
+    chosen: Mapping[str, Look] | None = None,
+) -> Canvas:
+    """The same as a matplotlib figure, laid out; whatever style holds later, it stays as it is."""
+    with _drawn(figure, published, chosen) as sheet:
+        _place(sheet)
+        sheet.draw_without_rendering()  # ticks are made when they are drawn, in the style of then
+        return sheet
+
+
+@contextmanager
+def _drawn(
+    figure: Figure, published: Marks | None, chosen: Mapping[str, Look] | None
+) -> Iterator[Canvas]:
+    """A sheet with the figure on it, in the report's style."""
     published, chosen = published or {}, chosen or looks(series_of(figure))
     with canvas(*_size(figure)) as sheet:
         across = _across(figure)
@@ -138,7 +159,7 @@ def draw(
         own = not _titles_say_it(figure)
         add_legend(sheet, list(axes) if own else [], published_signs(figure, published, chosen))
         place_labels(sheet, marked)
-        return to_svg(sheet)
+        yield sheet
 
 
 def series_of(figure: Figure) -> list[str]:
@@ -149,18 +170,26 @@ def series_of(figure: Figure) -> list[str]:
 
 
 @contextmanager
-def canvas(width: float, height: float) -> Iterator[Canvas]:
-    """An empty matplotlib figure (inches) under the report's own style, whatever the user's is."""
+def style() -> Iterator[None]:
+    """Within the block matplotlib draws as the report does, whatever the user's style is."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure as Canvas
-
-    from campaign.report.drawing.margins import Margins
 
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
-        sheet = Canvas(figsize=(width, height), dpi=72)  # as an SVG document is drawn
+        yield
+
+
+@contextmanager
+def canvas(width: float, height: float) -> Iterator[Canvas]:
+    """An empty matplotlib figure (inches) under the report's own style."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    from campaign.report.drawing.margins import Margins
+    from campaign.report.drawing.sheet import Sheet
+
+    with style():
+        sheet = Sheet(figsize=(width, height), dpi=72)  # as an SVG document is drawn
         FigureCanvasSVG(sheet).get_renderer = _measuring  # type: ignore[attr-defined]
         sheet.set_layout_engine(Margins())
         yield sheet
@@ -182,12 +211,7 @@ def to_svg(sheet: Canvas) -> str:
 
     Coordinates are cut to a hundredth of a point; `slim` rounds those of curves further.
     """
-    engine = sheet.get_layout_engine()
-    if engine is not None:
-        # Saving would draw everything once in vain before it is drawn, to have the layout computed:
-        # even with "none", which leaves a placeholder; only the default can be no engine at all.
-        engine.execute(sheet)
-        sheet.set_layout_engine(None)
+    _place(sheet)
     out = io.StringIO()
     with settled(sheet.axes):
         sheet.savefig(out, format="svg", metadata=METADATA)
@@ -195,6 +219,17 @@ def to_svg(sheet: Canvas) -> str:
     text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
     text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
     return _SIGNS.sub(_styled_once, text)
+
+
+def _place(sheet: Canvas) -> None:
+    """Place the axes for good: saving would draw all in vain, to have the layout computed.
+
+    Even with "none", which leaves a placeholder; only the default can be no engine at all.
+    """
+    engine = sheet.get_layout_engine()
+    if engine is not None:
+        engine.execute(sheet)
+        sheet.set_layout_engine(None)
 
 
 _DIGITS = re.compile(r"(\d\.\d\d)\d+")

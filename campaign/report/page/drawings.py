@@ -6,19 +6,23 @@ of a document, and neither needs a drawing. So drawings can be made in any order
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from campaign.api.analysis import AnalysedTest
 from campaign.published.scoreboard import Scoreboard
-from campaign.report.content.document import Document
+from campaign.published.values import Published
 from campaign.report.drawing.drawing_files import Drawn
-from campaign.report.drawing.figures import draw, series_of
+from campaign.report.drawing.figures import draw, draw_sheet, series_of
 from campaign.report.drawing.published_marks import Marks, PublishedBeside, told
 from campaign.report.drawing.scoreboard_picture import draw_overview
 from campaign.report.palette import Look, looks_of_page
 from campaign.result import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Canvas
 
 AXES = 10
 """Curves that take as long to draw as the axes that they are in."""
@@ -72,21 +76,28 @@ class Drawing:
         """The drawing as a complete SVG document."""
         return draw(self.figure, self.marks, self.looks)
 
+    def sheet(self) -> Canvas:
+        """The drawing as a matplotlib figure."""
+        return draw_sheet(self.figure, self.marks, self.looks)
+
     def made(self) -> Drawn:
         return Drawn.of(self.svg(), self.figure)
 
 
-def drawings_of(document: Document) -> dict[Key, Drawing]:
-    """The drawings of all tests; a figure that no drawing can be made of is missing."""
+def drawings_of(tests: Sequence[AnalysedTest], compared: Published) -> dict[Key, Drawing]:
+    """The drawings of all tests; a figure that no drawing can be made of is missing.
+
+    compared: the values that the run's protocol compares with.
+    """
     series: dict[Key, list[str]] = {}
-    for test in document.tests:
+    for test in tests:
         for figure in test.result.figures:
             with suppress(Exception):  # a plug-in's, which is told where it is shown
                 series[test.name, figure.key] = series_of(figure)
     looks = looks_of_page(series.values())
     drawings: dict[Key, Drawing] = {}
-    for test in document.tests:
-        beside = PublishedBeside.of(document.published, test.reproduces, test.evidence().known)
+    for test in tests:
+        beside = PublishedBeside.of(compared, test.reproduces, test.evidence().known)
         for figure in test.result.figures:
             key = test.name, figure.key
             with suppress(Exception):

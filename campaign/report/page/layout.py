@@ -143,7 +143,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
     """
     folder, scoreboard = Folder(), document.scoreboard
     command = command or f"campaign report {quote(document.run.header.name)}"
-    drawings, top = drawings_of(document), Overview(scoreboard)
+    drawings, top = drawings_of(document.tests, document.published), Overview(scoreboard)
     drawn = draw_all({**drawings, OVERVIEW: top})
     made = _Made(drawings, drawn)
     makers = _makers(document, folder, command, made)

@@ -1,0 +1,76 @@
+"""`campaign new`: a package with one kind, a test of it, and what pip needs to install it.
+
+The texts lie in `package_templates`; the pages of docs/developers show the same ones.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import keyword
+import re
+from pathlib import Path
+from string import Template
+
+from campaign.cli.output import print_line
+from campaign.errors import UsageError
+
+TEMPLATES = Path(__file__).with_name("package_templates")
+POINTS = {
+    "experiment": ("campaign.experiments", "EXPERIMENT"),
+    "model": ("campaign.friction", "FRICTION"),
+    "backend": ("campaign.backends", "BACKEND"),
+    "format": ("campaign.exports", "EXPORT"),
+}
+"""By what is made: the group of its entry point, and the object in its module."""
+
+
+def new_package(kind: str, name: str, folder: Path) -> None:
+    """Write the package NAME with a kind of that name into a new folder, and say how to go on.
+
+    Raises UsageError when the kind is unknown, the name is none for a module or taken, or the
+    folder is there already or cannot be written.
+    """
+    if kind not in POINTS:
+        raise UsageError(f"there is no package for {kind!r}; there are {', '.join(POINTS)}")
+    _check_name(name)
+    package = folder / name
+    try:
+        package.mkdir(parents=True)
+        for path, text in package_files(kind, name).items():
+            (package / path).parent.mkdir(exist_ok=True)
+            (package / path).write_text(text, encoding="utf-8", newline="\n")
+            print_line(str(package / path))
+    except FileExistsError:
+        raise UsageError(f"{package} is there already; nothing was written") from None
+    except OSError as error:
+        raise UsageError(f"{package}: cannot be written: {error.strerror}") from None
+    print_line(f"now: pip install -e {package}; pytest {package}; campaign kinds {name}")
+
+
+def package_files(kind: str, name: str) -> dict[str, str]:
+    """The text of each file by its path in the package."""
+    group, attribute = POINTS[kind]
+    words = {
+        "name": name,
+        "dashed": name.replace("_", "-"),
+        "Name": "".join(part.capitalize() for part in name.split("_")),
+        "group": group,
+        "object": attribute,
+    }
+    texts = {"pyproject.toml": TEMPLATES / "pyproject.toml.txt"}
+    for source in sorted((TEMPLATES / kind).rglob("*.txt")):
+        path = source.relative_to(TEMPLATES / kind).with_suffix("").as_posix()
+        own = {"module.py": f"{name}.py", "tests/test.py": f"tests/test_{name}.py"}
+        texts[own.get(path, path)] = source
+    return {
+        path: Template(source.read_text(encoding="utf-8")).substitute(words)
+        for path, source in texts.items()
+    }
+
+
+def _check_name(name: str) -> None:
+    if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or len(name) > 60:
+        raise UsageError(f"{name!r} is no name: lower-case letters and digits, single _ between")
+    spec = importlib.util.find_spec(name)  # also of a mere folder, which has no origin
+    if keyword.iskeyword(name) or (spec is not None and spec.origin is not None):
+        raise UsageError(f"{name!r} is a name of Python or of an installed package; take another")

@@ -1,0 +1,17 @@
+"""A matplotlib figure that a notebook shows by itself."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+
+class Sheet(Figure):
+    """A figure; notebooks show one of matplotlib's own only where pyplot was set up for it."""
+
+    def _repr_svg_(self) -> str:
+        """In a notebook: the drawing, with the bytes of the report's file."""
+        from campaign.report.drawing.figures import style, to_svg
+        from campaign.report.drawing.slim_svg import slim
+
+        with style():
+            return slim(to_svg(self))

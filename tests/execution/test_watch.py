@@ -1,0 +1,163 @@
+"""`campaign run --watch`: what is drawn, and that no terminal is ever in the way of the run."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from campaign.archive import RunStatus, find_run, open_run
+from campaign.channels import info
+from campaign.execution.progress import Progress
+from campaign.execution.watch_display import AFTERWARDS, MOST, Trace, WatchDisplay, drawn
+from campaign.trial import Task, Trial
+from tests.system.user import ROOT, SEA, campaign
+
+pytest.importorskip("plotext")
+
+TASK = Task(mode="rate", duration=10.0, window=(0.0, 10.0), sample_rate=1000.0)
+TRIAL = Trial(number=1, test="sea", kind="motion", seed=1, bench={}, task=TASK)
+CHANNELS = (
+    info("command", "rate"),
+    info("relative_rate"),
+    info("motor_current"),
+    info("gyro_rate"),
+)
+BRAILLE = "⠀⣿"
+
+
+def handed(seen: Callable[..., None], trial: Trial, first: int, last: int) -> None:
+    """Samples of four channels, a sine each."""
+    at = np.arange(first, last) / 1000.0
+    seen(trial, CHANNELS, at, np.sin(at + np.arange(4.0)[:, None]))
+
+
+def lines_of(trace: Trace) -> list[str]:
+    return drawn(trace, trace.samples(), 80, 24)
+
+
+def has_curve(text: str) -> bool:
+    return any(BRAILLE[0] < letter <= BRAILLE[1] for letter in text)
+
+
+def test_a_running_trial_is_drawn_over_all_of_its_time_the_channels_it_needs_first() -> None:
+    trial = TRIAL.model_copy(update={"requires": {"gyro_rate": "the rate"}})
+    trace = Trace(trial, CHANNELS, 0.0)
+    for first in range(0, 2000, 200):
+        live = 1e-3 * first + 0.25
+        handed(
+            lambda t, c, at, block, now=live: trace.add(at, block, now), trial, first, first + 200
+        )
+    lines = lines_of(trace)
+    assert [each.name for each in trace.channels] == ["gyro_rate", "command", "relative_rate"]
+    assert lines[0].startswith("sea: trial-00001")
+    assert AFTERWARDS not in lines[0]
+    assert not trace.is_over
+    assert "(deg/s)" in lines[1]
+    assert has_curve("".join(lines))
+    assert not has_curve("".join(line[30:] for line in lines)), "8 of 10 s are still to come"
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+
+
+def test_what_is_delivered_at_the_end_says_so_and_much_of_it_is_thinned() -> None:
+    trace = Trace(TRIAL, CHANNELS, 0.0)
+    handed(lambda t, c, at, block: trace.add(at, block, 0.1), TRIAL, 0, 10_000)
+    assert AFTERWARDS in lines_of(trace)[0]
+    assert trace.is_over
+    for first in range(0, 200_000, 1000):
+        handed(lambda t, c, at, block: trace.add(at, block, 0.1), TRIAL, first, first + 1000)
+    assert trace.samples().shape[1] <= MOST
+    assert np.all(np.diff(trace.samples()[0][-100:]) > 0)
+
+
+def test_undefined_samples_and_no_samples_draw_nothing_and_break_nothing() -> None:
+    trace = Trace(TRIAL, CHANNELS, 0.0)
+    trace.add(np.arange(3.0), np.full((4, 3), np.nan), 3.0)
+    assert not has_curve("".join(lines_of(trace)))
+
+
+def test_a_terminal_that_takes_nothing_holds_up_neither_samples_nor_progress() -> None:
+    taken, terminal = os.pipe()
+    display = WatchDisplay(terminal, lambda: os.terminal_size((200, 60)))
+    progress = Progress(9, 1, 0, 0, (TRIAL,), 0.0, 1.0, 1.0, 8.0)
+    longest, began = 0.0, time.monotonic()
+    while time.monotonic() - began < 4.0:  # more than the pipe takes
+        before = time.perf_counter()
+        number = int(time.monotonic() - began)
+        handed(display.seen, TRIAL.model_copy(update={"number": number + 1}), 0, 10_000)
+        display(replace(progress, done=number))
+        longest = max(longest, time.perf_counter() - before)
+        time.sleep(0.05)
+    assert longest < 0.5
+    began = time.monotonic()
+    with display.hidden():
+        pass
+    display.end()
+    assert time.monotonic() - began < 3.0
+    os.close(taken)  # whoever writes is told so
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", ["quick", "slow", "dumb", "gone"])
+def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
+    (tmp_path / "sea.toml").write_text(SEA, encoding="utf-8")
+    ours, theirs = pty.openpty()
+    kept = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "FORCE_COLOR")}
+    running = subprocess.Popen(
+        [sys.executable, "-m", "campaign", "run", "sea.toml", "--watch"],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        env={
+            **kept,
+            "PYTHONPATH": str(ROOT),
+            "TERM": "dumb" if terminal == "dumb" else "xterm",
+            "COLUMNS": "100",
+            "LINES": "40",
+        },
+    )
+    os.close(theirs)
+    shown = b""
+    if terminal == "gone":
+        assert os.read(ours, 1)
+        os.close(ours)
+    else:
+        try:
+            while got := os.read(ours, 64 if terminal == "slow" else 65536):
+                shown += got
+                time.sleep(0.01 if terminal == "slow" else 0)
+        except OSError:
+            pass  # nobody writes any more
+        os.close(ours)
+    out, _ = running.communicate(timeout=120)
+    if terminal != "gone":  # then nothing can be said at the end, with --watch or without
+        assert running.returncode == 0
+        assert out.decode().strip().endswith(".nxs")
+    assert open_run(find_run(tmp_path / "results")).status is RunStatus.COMPLETE
+    text = shown.decode(errors="replace")
+    if terminal in ("quick", "slow"):
+        assert has_curve(text)
+        assert AFTERWARDS in text
+        assert "complete: 2 trials done" in text
+    if terminal == "dumb":
+        assert "no terminal that can be drawn to" in " ".join(text.split())
+        assert "\x1b[" not in text
+
+
+def test_nothing_is_begun_that_could_not_be_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sea.toml").write_text(SEA, encoding="utf-8")
+    done = campaign(tmp_path, "run", "sea.toml", "--watch", "--executor", "dask:here", code=2)
+    assert "leave --executor out" in done.err
+    assert not (tmp_path / "results").exists()
