@@ -224,8 +224,10 @@ def _analyse(data: TestData) -> Result:
     return Result((table,), figures, findings, notes, conclusions)
 
 
-def _count(slips: float) -> int | float:
-    """A mean of repeats may be no whole number, and a recording may not tell."""
+def _count(slips: float) -> int | float | None:
+    """A mean of repeats may be no whole number; None where a recording does not show it."""
+    if math.isnan(slips):
+        return None
     return int(slips) if slips.is_integer() else slips
 
 
@@ -428,7 +430,7 @@ EXPERIMENT = Experiment(
         DRIVE_TORQUE: "the torque of the spring",
     },
     can_use={
-        RELATIVE_ANGLE: "angle of the load in the figure",
+        RELATIVE_ANGLE: "number of rests, and angle of the load in the figure",
         COMMAND: "far end of the spring in the figure",
     },
     measure=_measure,

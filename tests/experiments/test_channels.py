@@ -31,6 +31,16 @@ def noisy() -> Bench:
     return bench(sampled)
 
 
+def specimen() -> Bench:
+    """Without limits that a load without drive would meet."""
+
+    def unlimited(tree: dict[str, Any]) -> None:
+        tree["axis"]["inertia"] = "1 kg m^2"
+        tree["limits"] |= {"angle": "1e3 rad", "rate": "100 rad/s", "torque": "1e6 N m"}
+
+    return bench(unlimited)
+
+
 @dataclass(frozen=True)
 class Case:
     """A small test of an experiment that makes everything that the experiment can make."""
@@ -63,6 +73,14 @@ SHAKEN = {
 }
 WAVES = {"lowest": "1 Hz", "highest": "20 Hz", "amplitude": "8 deg/s"}
 SERIES = {"signal": "fourier", "period": "4 s", "search": 10}
+CONTACT = {
+    "model": "lugre",
+    "coulomb_torque": "1 N m",
+    "static_torque": "1.5 N m",
+    "stribeck_velocity": "0.01 rad/s",
+    "viscous_friction": "0.4 N m s/rad",
+    "bristle_stiffness": "1e4 N m/rad",
+}
 CASES = (
     Case("breakaway", bench, {**RAMP, "positions": ["-5 deg", "0 deg", "5 deg"]}),
     Case("component_friction", bench, {**RAMP, "measurements": 2}),
@@ -75,6 +93,7 @@ CASES = (
     Case("friction_lag", bench, {"frequencies": ["5 Hz", "20 Hz"]}),
     Case("model_output", bench, {"compensation": ["static", "lugre"]}),
     Case("model_output", bench, {"vary": ["coulomb_torque", "bristle_damping"]}, also=" varied"),
+    Case("model_properties", specimen, {"models": ["dahl"], "sets": {"one": CONTACT}}),
     Case("move", bench, {"angle": "2 deg"}),
     Case(
         "observer_gain",
@@ -137,7 +156,9 @@ LOSSES = {
     ("stabilization", "friction_torque"): Loss(curves=("compensation-torque",)),
     ("step_response", "command"): Loss(curves=("step",)),
     ("stick_slip", "command"): Loss(curves=("stick-slip",)),
-    ("stick_slip", "relative_angle"): Loss(curves=("stick-slip",)),
+    ("stick_slip", "relative_angle"): Loss(
+        curves=("stick-slip",), columns=(("stick-slip", "rests"),)
+    ),
     ("velocity_map", "command"): Loss(curves=("one-point",)),
     ("velocity_map", "relative_angle"): Loss(),  # this bench has no ripple
     ("repeatability", "relative_angle"): Loss(),

@@ -191,6 +191,7 @@ def test_shipped_protocols_can_be_executed_within_the_limits(path) -> None:
     nothing_published = {
         "quickstart",
         "ship_motion",
+        "stick_slip_map",
         "linear",
         "presliding_multisine",
         "compensator_data",

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import Field, JsonValue
 
-from campaign.channels import FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
+from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import bracketed
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
@@ -169,6 +169,7 @@ EXPERIMENT = Experiment(
     requires={
         FRICTION_TORQUE: "all properties",
         LOAD_RATE: "breakaway, sliding, stick-slip",
+        DRIVE_TORQUE: "the torque of the spring",
         RELATIVE_ANGLE: "presliding, drift",
     },
     measure=_measure,

@@ -15,6 +15,7 @@ LOSS = 0.05
 CLOSES = 0.01
 """Of the torque of the outer loop, by which an inner loop may miss the point where it began."""
 REVERSIBLE = 0.5
+"""Share of a displacement that comes back, from which presliding is one."""
 
 
 @dataclass(frozen=True)
