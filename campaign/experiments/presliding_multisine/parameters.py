@@ -174,7 +174,8 @@ def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[s
     if not planned:
         yield (
             "These were not planned as small motions. The torque is taken as it was recorded: "
-            "noise in it makes everything stiffer, more damped and heavier by about its share of the "
+            "noise in it makes everything stiffer, more damped and heavier by about its share of "
+            "the "
             "torque's power."
         )
     if not planned and not _gives_way(found):
