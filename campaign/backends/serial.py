@@ -92,8 +92,7 @@ class SerialBackend:
         except LinkFaultError as error:
             raise BackendError(
                 f"no controller answers by the protocol on {self._options.port}: {error}; is it "
-                "the "
-                "right port and baud rate, and is the controller switched on?"
+                "the right port and baud rate, and is the controller switched on?"
             ) from None
         self._refusal = self._new_refusal()  # all trials are asked again, from the first on
         return self

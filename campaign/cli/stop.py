@@ -95,8 +95,7 @@ def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
         print_line(NOT_LATCHED)
         print_note(
             "The controller's firmware is of an earlier version: the program that runs it can "
-            "switch "
-            "it on again at any time. End that program, or cut the drive's power.",
+            "switch it on again at any time. End that program, or cut the drive's power.",
             "bold red",
         )
         return ExitCode.DONE

@@ -302,8 +302,7 @@ def _stribeck_part(fit: DirectionFit) -> str:
     if not fit.shows_stribeck_effect or fit.preferred == "none":
         return (
             "static friction is not distinguishable from Coulomb friction: there is no Stribeck "
-            "part "
-            "that these speeds could identify"
+            "part that these speeds could identify"
         )
     values = fit.fits[fit.preferred].values
     if values["static_torque"] < values["coulomb_torque"]:

@@ -175,8 +175,7 @@ def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[s
         yield (
             "These were not planned as small motions. The torque is taken as it was recorded: "
             "noise in it makes everything stiffer, more damped and heavier by about its share of "
-            "the "
-            "torque's power."
+            "the torque's power."
         )
     if not planned and not _gives_way(found):
         yield (
