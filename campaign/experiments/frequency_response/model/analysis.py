@@ -293,8 +293,8 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
                 f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
                 "the torque. Either friction turns its phase (a second amplitude shows which), or "
                 "the torque is recorded late, or a controller holds it and it is sampled at "
-                "points: then gain and inertia are off by up to a few percent at the highest frequencies, "
-                "and no scatter shows that. A lower highest line, or a faster controller, makes it "
+                "points: then gain and inertia are off by up to a few percent at the highest "
+                "frequencies, and no scatter shows that. A lower highest line, or a faster controller, makes it "
                 "small."
             )
 
