@@ -294,8 +294,8 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
                 "the torque. Either friction turns its phase (a second amplitude shows which), or "
                 "the torque is recorded late, or a controller holds it and it is sampled at "
                 "points: then gain and inertia are off by up to a few percent at the highest "
-                "frequencies, and no scatter shows that. A lower highest line, or a faster controller, makes it "
-                "small."
+                "frequencies, and no scatter shows that. A lower highest line, or a faster "
+                "controller, makes it small."
             )
 
 
