@@ -111,7 +111,7 @@ VOCABULARY = {
             _LOAD,
             _CONTROLLER,
             "Command",
-            "What the bench was told at that moment: a rate or a torque, as the task's mode says.",
+            "What was commanded at that moment: a rate or a torque, as the task's mode says.",
         ),
         ChannelMeaning(
             REFERENCE,

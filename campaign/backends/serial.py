@@ -91,8 +91,8 @@ class SerialBackend:
             raise BackendError(f"{self._options.port}: {error}") from None
         except LinkFaultError as error:
             raise BackendError(
-                f"nobody speaks the protocol on {self._options.port}: {error}; is it the right "
-                "port and baud rate, and is the controller switched on?"
+                f"no controller answers by the protocol on {self._options.port}: {error}; is it "
+                "the right port and baud rate, and is the controller switched on?"
             ) from None
         self._refusal = self._new_refusal()  # all trials are asked again, from the first on
         return self

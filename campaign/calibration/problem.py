@@ -78,7 +78,7 @@ def make_problem(protocol: Protocol, published: Published) -> CalibrationProblem
     warnings = []
     if len(parameters) > MANY_PARAMETERS:
         warnings.append(
-            f"{len(parameters)} parameters; more than {MANY_PARAMETERS} are seldom told apart"
+            f"{len(parameters)} parameters; more than {MANY_PARAMETERS} are seldom distinguishable"
         )
     if len(targets) <= len(parameters):
         warnings.append(

@@ -298,7 +298,7 @@ def verify(
 ) -> None:
     """Check every byte of archives against checksums, journal, format and fingerprints.
 
-    Whoever changes a run can compute its checksums anew: only a signature shows that.
+    Anyone who changes a run can compute its checksums anew: only a signature shows that.
     """
     from campaign.cli.signature import wanted_signature
     from campaign.cli.verify import verify_archives

@@ -26,7 +26,7 @@ GLANCE = 0.2
 """s between two looks at the stop switch while nobody types."""
 
 ASSUMED = "assumed done (--yes)"
-ON_ITS_PAGE = "told on the page of the trial"
+ON_ITS_PAGE = "described on the page of the trial"
 
 
 class NotStartedError(CampaignError):

@@ -114,7 +114,7 @@ TlsOption = Annotated[
 ]
 ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
 YesOption = Annotated[
-    bool, typer.Option("--yes", help="For scripts: ask nobody, also not before a bench moves.")
+    bool, typer.Option("--yes", help="For scripts: do not prompt, also not before a bench moves.")
 ]
 ClearStopOption = Annotated[
     int | None,
@@ -122,7 +122,7 @@ ClearStopOption = Annotated[
         "--clear-stop",
         metavar="COUNT",
         min=0,
-        help="Somebody stopped the bench: clear that stop, by the count that a person has seen.",
+        help="Clear a panic stop, by the count that a person has seen.",
         show_default=False,
     ),
 ]
@@ -169,7 +169,7 @@ TruthOption = Annotated[
     typer.Option(
         "--truth",
         metavar="BENCH",
-        help="What sim simulates in place of each test's bench; plan and analysis are not told.",
+        help="What sim simulates in place of each test's bench; plan and analysis do not know it.",
         show_default=False,
     ),
 ]

@@ -62,7 +62,7 @@ def rehearse_signing(key: Path) -> None:
     if made.asked:
         print_note(
             "the passphrase is asked for again when the run is sealed; with an agent "
-            f"(`ssh-add {key}`) nobody has to be there",
+            f"(`ssh-add {key}`) no person has to be there",
             "yellow",
         )
 

@@ -11,7 +11,7 @@ from campaign.archive.verification.statement import run_statement
 from campaign.cli.sign import WHAT_IT_PROVES
 from campaign.errors import ArchiveError, UsageError
 
-RECOMPUTED = "whoever changes a run can compute its checksums anew, and only a signature shows that"
+RECOMPUTED = "anyone who changes a run can compute its checksums anew; only a signature shows that"
 
 
 @dataclass(frozen=True)

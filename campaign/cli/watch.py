@@ -27,7 +27,7 @@ def require_watch(executor: str) -> None:
 def watching(console: Console) -> Iterator[Shown]:
     """Channels of the running trial, for as long as the block lasts; else the usual display."""
     if not console.is_terminal or console.is_dumb_terminal:
-        print_note("--watch: this is no terminal that can be drawn to; progress is told in lines")
+        print_note("--watch: this terminal cannot show pictures; progress is printed in lines")
         with progress_display(console) as usual:
             yield usual
         return

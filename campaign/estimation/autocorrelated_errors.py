@@ -62,7 +62,7 @@ def errors_of(jacobian: Array, residuals: Array) -> FitErrors:
     _, triangles, variances = _likelihoods(jacobian / scale, residuals, COEFFICIENTS[[best]])
     triangle, variance = triangles[0], float(variances[0])
     if np.linalg.cond(triangle) > 1e8:
-        raise ValueError("the parameters of the fit cannot be told apart")
+        raise ValueError("the parameters of the fit are not distinguishable")
     inverse = np.linalg.inv(triangle) / scale[:, None]
     return FitErrors(
         variance * (inverse @ inverse.T),

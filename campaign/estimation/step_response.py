@@ -38,7 +38,7 @@ SCATTERS = "the rate scatters by {noise_percent:.2g} % of the step (1 sigma)"
 """How the text of what noise hides begins."""
 HIDDEN_RISE = Cause(
     "rise hidden by noise",
-    SCATTERS + ", too much for 10 % of it to be told within its rise",
+    SCATTERS + ", too much to see 10 % of it within its rise",
 )
 HIDDEN_SETTLING = Cause(
     "settling hidden by noise",

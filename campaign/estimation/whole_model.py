@@ -40,7 +40,7 @@ METHOD = "least squares through the simulation; deviation with autocorrelation (
 NULL = 1e-6
 """Of the largest singular value: directions below it leave their parameters open."""
 WENT_TO_BOUND = Cause("at bound", "it went to its {side} bound")
-NOT_IN_MOTION = Cause("not in the motion", "nothing in the motion tells it")
+NOT_IN_MOTION = Cause("not in the motion", "the motion does not determine it")
 LEFT_OPEN = Cause("left open by the motion", "the motion leaves it open")
 LEFT_WIDE = Cause(
     "left wide by the motion",

@@ -400,8 +400,9 @@ def _scheduler(address: str, tls: Path | None) -> tuple[str, Path | None]:
     host, port = found.groups()
     if tls is None and host not in _LOOPBACK:
         raise UsageError(
-            f"--executor {address}: whoever reaches a scheduler executes code; name a folder with "
-            f"{', '.join(CERTIFICATES)} (--executor-tls DIR), or reach it by a tunnel to localhost"
+            f"--executor {address}: anyone who reaches a scheduler can execute code; name a "
+            f"folder with {', '.join(CERTIFICATES)} (--executor-tls DIR), or reach it by a "
+            "tunnel to localhost"
         )
     return f"{'tcp' if tls is None else 'tls'}://{host}:{port}", tls
 

@@ -136,7 +136,7 @@ class SupervisingRecorder:
     def remarks(self) -> tuple[str, ...]:
         """What somebody at the screen should know of the channels."""
         limits = ", ".join(self.unwatched)
-        unwatched = (f"no channel tells of these limits: {limits}",) if limits else ()
+        unwatched = (f"no channel shows these limits: {limits}",) if limits else ()
         return (*unwatched, *self._announced.converted)
 
     @property

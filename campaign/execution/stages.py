@@ -37,7 +37,7 @@ from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
 from campaign.trial import Role, Trial, canonical_json
 
-NOTHING_TOLD = Cause("nothing told", "the recording tells nothing")
+NOTHING_TOLD = Cause("nothing found", "the recording shows nothing")
 TOLD = 3
 """Refused trials of a stage that are told one by one; the journal has them all."""
 

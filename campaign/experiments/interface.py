@@ -35,7 +35,7 @@ from campaign.recording import Ending, Recording
 from campaign.result import RecordingDoubt, Result
 from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
 
-NOT_TOLD = Cause("not told by the recording", "the recording does not tell it")
+NOT_TOLD = Cause("not in the recording", "the recording does not tell it")
 
 _Options = TypeVar("_Options", bound=Options)
 

@@ -376,7 +376,7 @@ def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
     """How often the load slipped, if it did, and how fast it then was."""
     who, slips = place.label or "the load", found["slips"].value
     if math.isnan(slips):
-        return sentence(f"{who}: samples were lost, and nobody knows how often it slipped")
+        return sentence(f"{who}: samples were lost, and the number of slips is not known")
     if not slips:
         return sentence(f"{who}: it does not slip")
     top = amount(found["top_rate"].value, "rad/s")

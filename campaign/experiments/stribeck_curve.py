@@ -166,7 +166,7 @@ def _largest_deviation(points: _Points) -> Estimate:
     return replace(found, low=low, systematic=points.deviations[0].systematic)
 
 
-NOTHING_MOVED = "No reading has both a rate and a torque: nothing is told of friction in motion."
+NOTHING_MOVED = "No reading has both a rate and a torque: friction in motion is not determined."
 
 
 def _told(each: Mapping[str, Estimate]) -> bool:

@@ -154,7 +154,7 @@ def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]
     bristles = load is not None and load.model == "lugre"
     if not _tells_curve(section):
         settings = {path: each for path, each in settings.items() if not _bends(path)}
-        settings[model] = ("coulomb", "", "nothing else of the curve is told")
+        settings[model] = ("coulomb", "", "nothing else of the curve is determined")
         if bristles:
             del settings[model]
     elif bristles and settings[model][0] == "stribeck":

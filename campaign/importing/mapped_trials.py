@@ -42,7 +42,7 @@ from campaign.protocol.positions import Keys
 from campaign.unit_grammar import parse_unit
 
 TIMELESS = (
-    "nothing tells when its rows were sampled; give the columns a 'time': its column and unit, or "
+    "the time of its rows is not stated; give the columns a 'time': its column and unit, or "
     'sample_rate = "1 kHz"'
 )
 

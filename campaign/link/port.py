@@ -53,7 +53,7 @@ def _open_socket(name: str) -> Port:
         return SocketPort(socket.create_connection((host, number), timeout=5.0))
     except OSError as error:
         raise UsageError(
-            f"port {name!r}: nobody answers there ({error.strerror or error}); "
+            f"port {name!r}: no answer ({error.strerror or error}); "
             "is the controller, or `campaign device --tcp`, running?"
         ) from None
 

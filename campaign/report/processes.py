@@ -154,7 +154,7 @@ def _find(test: Tree, measure_anew: bool) -> TestAnalysis:
     from campaign.experiments import experiments
 
     if _run is None:
-        raise RuntimeError("the process was not told which run it works on")
+        raise RuntimeError("the process has no run to work on")
     return find(_run, test, experiments(), measure_anew=measure_anew)
 
 

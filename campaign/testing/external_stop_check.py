@@ -18,7 +18,7 @@ def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
             require(under_test.stop_outside is None, told)
             return
         require(under_test.stop_outside, "it can be stopped from outside: stop_outside says how")
-        require(backend.panic_stop() is None, "it is stopped before anybody has stopped it")
+        require(backend.panic_stop() is None, "it is stopped before a stop was sent")
         _stopped_in_mid_trial(under_test, backend)
         first = _found(backend)
         _moves_nothing(under_test.possible, backend)

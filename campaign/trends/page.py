@@ -163,9 +163,9 @@ def _how(trends: Trends) -> Iterator[str]:
     if trends.covariate.ordered:
         yield (
             "A jump needs five runs, two on each side of it. Its p value is that of the likeliest "
-            "place times the number of places. A line and a jump are told apart where one fits at "
-            "least three times as well as the other. A drift looks like a jump to a test for "
-            "jumps, and the other way round: both are in the family."
+            "place times the number of places. A line and a jump are distinguished where one "
+            "fits at least three times as well as the other. A drift looks like a jump to a test "
+            "for jumps, and the other way round: both are in the family."
         )
     yield (
         f"All {trends.tested} p values are one family: of what is declared, at most {100 * RATE:g} "

@@ -229,7 +229,7 @@ def _followed(series: Series, covariate: Covariate) -> Followed:
     own, cancelled, unknown = series.own()
     with axis_terms(series.points[0].member.sides):
         told_of = map(in_axis_terms, unknown)
-        notes = [f"not the same in all runs, and nobody said how uncertain: {s}" for s in told_of]
+        notes = [f"not the same in all runs, with no stated uncertainty: {s}" for s in told_of]
     notes += [series.bare] if series.bare else []
     try:
         found = change(x, series.values, own, jumps=covariate.ordered)

@@ -487,7 +487,7 @@ def test_a_load_that_slid_too_fast_for_its_samples_is_not_said_to_have_stayed() 
     assert any("too few for its torque; a higher sample_rate holds" in n for n in result.notes)
     (only,) = result.conclusions
     told = "".join(str(part) for part in only.parts)
-    assert told == "The load slid, and no recording of it tells at which torque it broke away."
+    assert told == "The load slid, and no recording shows at which torque it broke away."
     short = execute(trials("breakaway", bench(), {**TWO, "peak_torque": "10 N m"}))
     stayed = analyse("breakaway", short)
     assert any("the rate never reached" in note for note in stayed.notes)

@@ -565,7 +565,7 @@ def test_the_parameter_that_matters_most_is_named_where_the_data_say_so(
 
 def test_thresholds_that_need_every_trial_are_not_told() -> None:
     told = said(sensitivity_conclusions([error("lugre", 0.14)], 2e-4, {}))
-    assert told[1] == "How far a parameter may be off is not told: that needs every trial."
+    assert told[1] == "No threshold: it needs every trial."
 
 
 def gain(corner: float, value: float) -> Finding:

@@ -91,7 +91,7 @@ def test_a_breakaway_without_an_inertia_says_once_that_there_is_none() -> None:
     bare = analyse("breakaway", seen_by(BARE, ramps))
     assert bare.findings == ()
     (told,) = bare.conclusions
-    assert told.parts == ("No breakaway torque can be told, for the inertia is not known.",)
+    assert told.parts == ("No breakaway torque: the inertia is not known.",)
     assert len([note for note in bare.notes if "axis.inertia" in note]) == 1
 
 

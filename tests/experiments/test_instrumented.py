@@ -124,7 +124,7 @@ def test_without_what_was_wanted_the_force_stands_in_and_decides_nothing(noisy: 
     assert found.instruments is not None
     assert not found.instruments.of_wanted
     assert not found.biased
-    assert found.no_instruments == "nobody recorded what motion was wanted"
+    assert found.no_instruments == "the commanded motion was not recorded"
     for name, one in found.estimates.items():
         assert one.value == found.squares[name].value
         [part] = [p for p in one.systematic if p.source == "instruments"]

@@ -164,7 +164,7 @@ def test_a_run_of_the_pilot_that_settled_for_less_is_no_point(soft: Piloted) -> 
 def test_the_archive_and_the_page_say_why(soft: Piloted) -> None:
     reasons = {item.trial.note.partition("; window")[0] for item in soft.following}
     (reason,) = reasons
-    assert reason.startswith("where it tells most after a pilot: Ts 0.02")
+    assert reason.startswith("where a pilot shows that it determines most: Ts 0.02")
     assert "settled for" in reason
     assert reason in soft.result.notes
     assert all(item.trial.note.startswith("pilot; ") for item in soft.pilot)

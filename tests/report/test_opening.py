@@ -112,7 +112,7 @@ def test_no_difference_is_claimed_where_the_interval_holds_none(
 
 
 def test_a_run_that_found_nothing_says_why(made_up: ModuleType, tmp_path: Path):
-    note = "No reading has both a rate and a torque: nothing is told of friction in motion."
+    note = "No reading has both a rate and a torque: friction in motion is not determined."
     run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
     found = opening(made_up, tmp_path, run=run, stabilization=lambda data: Result(notes=(note,)))
     assert found.answers[0].sentences == ()

@@ -134,7 +134,7 @@ def test_a_rig_of_its_own_from_protocol_to_report(
     assert names == ["wrong sign", "too short", "clipped", "late"]
     for name in names:
         assert f"fault: {name}: " in err
-    assert "told on the page of the trial" in archive.journal
+    assert "described on the page of the trial" in archive.journal
 
     # What was found is the friction that the rig has.
     with next(tmp_path.glob("results/*-report/tables/map-map.csv")).open(encoding="utf-8") as file:

@@ -108,7 +108,7 @@ def test_what_a_plug_in_records_beyond_every_limit_is_no_completed_trial(tmp_pat
     assert "relative_rate reached" in trial.ending.reason
     assert "(the backend: completed)" in trial.ending.reason
     assert len(trial.recording().time) == 1
-    assert "home: no channel tells of these limits: angle" in said
+    assert "home: no channel shows these limits: angle" in said
     assert trial.ending.telemetry["unwatched_limits"] == ["angle"]
 
 

@@ -262,7 +262,7 @@ def _role(role: str) -> str:
     told: dict[str, str] = {
         Role.HOME: "; it brings the axis to where the next trial begins",
         Role.WARM_UP: "; it warms the bench up",
-        Role.CHECK: "; it tells whether the bench is still the same",
+        Role.CHECK: "; it shows whether the bench is still the same",
     }
     return told.get(role, "")
 

@@ -39,7 +39,7 @@ NO_EXTREMUM = Cause(
     "no extremum stands out",
     "no extremum of the response stands out of the scatter of its lines",
 )
-NEEDS_A_FIT = Cause("needs a fitted function", "only a fitted function tells a damping")
+NEEDS_A_FIT = Cause("needs a fitted function", "only a fitted function has a damping")
 
 
 def extrema(frequency: Array, gain: Array, scatter: Array | None) -> tuple[Mode, Mode]:

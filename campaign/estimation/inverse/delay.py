@@ -34,7 +34,9 @@ LIKE_OTHER_TERMS = Cause(
     "delay like other terms",
     "a later force looks like other terms in this motion: all but {own_percent:.1g} % of it",
 )
-STEADY_FORCE = Cause("force hardly changing", "the force hardly changes: its time cannot be told")
+STEADY_FORCE = Cause(
+    "force hardly changing", "the force hardly changes: its delay cannot be estimated"
+)
 
 
 def find_delay(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> Estimate:

@@ -241,5 +241,5 @@ def _checked(design: Array) -> Array:
         nothing = ", ".join(str(i + 1) for i in np.flatnonzero(length == 0))
         raise ValueError(f"column {nothing} is zero throughout")
     if np.linalg.cond(design / length) > COLLINEAR:
-        raise ValueError("some columns cannot be told apart")
+        raise ValueError("some columns are not distinguishable")
     return design

@@ -90,7 +90,7 @@ def held_out(pieces: Sequence[Piece]) -> tuple[Array, float]:
             own = part(piece, block)
             left = whole - own.columns.T @ own.columns
             if np.linalg.cond(left) > 1.0 / np.finfo(float).eps:
-                raise ValueError("some terms are told by one part of the motion alone")
+                raise ValueError("some terms rest on one part of the motion alone")
             values = np.linalg.solve(left, right - own.columns.T @ own.force)
             error = own.force - own.columns @ values
             found.append((float(error @ error), len(error)))

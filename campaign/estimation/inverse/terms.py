@@ -55,7 +55,7 @@ WARM = 20.0
 
 def _warmer(motion: Motion) -> Array:
     if motion.temperature is None:
-        raise ValueError("nobody recorded a temperature")
+        raise ValueError("no temperature was recorded")
     return motion.temperature - WARM
 
 

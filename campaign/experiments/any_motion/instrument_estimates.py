@@ -84,7 +84,7 @@ def instruments(
     wanted = [each.wanted for each in pieces]
     try:
         if any(each is None for each in wanted):
-            raise ValueError("nobody recorded what motion was wanted")
+            raise ValueError("the commanded motion was not recorded")
         loops = [
             find_loop(each.motion, each.wanted, filtering.low_pass)
             for each in pieces

@@ -338,7 +338,7 @@ def _without_shares(
 ) -> dict[str, Estimate]:
     """Without intervals of friction where a term that bends was added because it fits better.
 
-    It stands in for whatever bends friction, most often a Stribeck curve; what is called Coulomb
+    It stands for any curvature of friction, most often a Stribeck curve; what is called Coulomb
     and viscous friction then takes what is too much of it elsewhere.
     """
     if not any(term.family == "bend" for term in terms):

@@ -144,7 +144,7 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
         if term.name in together:
             other, share = together[term.name]
             advice = (
-                f"the motion hardly tells it from {other} (correlation {share:.2f}): {advice}"
+                f"the motion hardly separates it from {other} (correlation {share:.2f}): {advice}"
                 if advice
                 else f"move so that it differs from {other} (correlation {share:.2f})"
             )
@@ -254,7 +254,7 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
     for one, two, share in correlated(found.fit, found.best.structure.terms):
         yield (
             f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
-            "the motion hardly tells them apart, and only their sum is known well."
+            "the motion hardly separates them, and only their sum is known well."
         )
     if not _is_plain(found):
         yield (

@@ -47,9 +47,9 @@ def breakaway_conclusions(
     means = _top([each for each in findings if each.conditions.get("statistic") == "mean"])
     torques = of(means, TORQUE)
     if not torques and not inertia_known:
-        return (conclusion("No breakaway torque can be told, for the inertia is not known"),)
+        return (conclusion("No breakaway torque: the inertia is not known"),)
     if not torques and slid:
-        told = "The load slid, and no recording of it tells at which torque it broke away"
+        told = "The load slid, and no recording shows at which torque it broke away"
         return (conclusion(told),)
     if not torques:
         return (conclusion("No ramp came to a breakaway torque"),)

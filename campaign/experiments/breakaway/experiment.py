@@ -139,7 +139,7 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
 def _warnings(options: BreakawayOptions, bench: Bench) -> Iterator[str]:
     if bench.axis.inertia is None:
         yield (
-            "no breakaway torque can be told of its ramps, for the bench does not say axis.inertia "
+            "its ramps give no breakaway torque: the bench does not say axis.inertia "
             "(what the torque accelerates): add it before they are executed"
         )
 

@@ -56,7 +56,7 @@ def parameters_of(
     if 0 < len(seen) < len(shares):
         notes.append(
             f"{len(seen)} of {len(shares)} ramps show that some interfaces slip before the others; "
-            "that share is not told, since the other ramps do not."
+            "that share is not stated, since the other ramps do not."
         )
     elif seen:
         share = of_repeats(WEAKER, seen, "", "ramps")

@@ -134,7 +134,7 @@ def _warnings(options: ExcitationOptions, bench: Bench) -> Iterable[str]:
             f"with: write realisations = {FEWEST_REALISATIONS} or more"
         )
     if options.periods < 2:
-        yield "a single period tells no noise from distortion: write periods = 2 or more"
+        yield "a single period does not separate noise from distortion: write periods = 2 or more"
 
 
 def _measure(data: TrialData) -> Sequence[Estimate]:

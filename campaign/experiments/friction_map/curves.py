@@ -301,8 +301,8 @@ def _stribeck_part(fit: DirectionFit) -> str:
     # What is told by a line shows no Stribeck part, whatever a free curve could be bent to.
     if not fit.shows_stribeck_effect or fit.preferred == "none":
         return (
-            "static friction is not told from Coulomb friction: there is no Stribeck part that "
-            "these speeds could identify"
+            "static friction is not distinguishable from Coulomb friction: there is no Stribeck "
+            "part that these speeds could identify"
         )
     values = fit.fits[fit.preferred].values
     if values["static_torque"] < values["coulomb_torque"]:

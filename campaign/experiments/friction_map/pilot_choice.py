@@ -85,7 +85,7 @@ def choose(options: PilotedMapOptions, bench: Bench, pilot: Sequence[TrialData])
         longer = _longer(options, bench, fits, _memory(pilot))
         speeds = _speeds(options, longer, points, curves)
     except ValueError as error:
-        told = f"after a pilot that tells too little of friction: {error}"
+        told = f"after a pilot that shows too little of friction: {error}"
         return Choice(options, _plain(options, points), told)
     return Choice(longer, speeds, _reason(options, longer, fits))
 
@@ -205,7 +205,7 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves
         for name in PARAMETERS
     }
     told = (
-        f"where it tells most after a pilot: Ts {found['static_torque']:.3g} N·m, "
+        f"where a pilot shows that it determines most: Ts {found['static_torque']:.3g} N·m, "
         f"Tc {found['coulomb_torque']:.3g} N·m, "
         f"vs {in_words(found['stribeck_velocity'], 'rad/s', 'deg/s')}, "
         f"δ {found['stribeck_exponent']:.2g}"

@@ -112,7 +112,8 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
         notes.append("Normal loads differ, and some stretches have none.")
     elif FRICTION not in quantities:
         notes.append(
-            "Normal loads differ between stretches: friction over rate is told over the load only."
+            "Normal loads differ between stretches: friction over rate is reported over the load "
+            "only."
         )
     maps = tuple(fit_curves(points, first, each, force_of(first)) for each in quantities)
     notes += (note for each in maps for note in each.notes)

@@ -253,7 +253,7 @@ EXPERIMENT = Experiment(
     analyse=_analyse,
     perturbs_bench=True,
     requires={
-        LOAD_RATE: "the rate that the models are told",
+        LOAD_RATE: "the rate that the models are given",
         FRICTION_TORQUE: "the output of a friction model",
         COMPENSATION_TORQUE: "the output of a compensation",
     },

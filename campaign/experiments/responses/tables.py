@@ -27,7 +27,7 @@ NAME = Column("source", "Response", exact=True)
 SENSOR = Column("side", "Sensor", exact=True)
 EXCITATION = Column("excitation", "Excitation", exact=True)
 LEVEL_ONLY = Cause("level", "a level, not a number of the rig")
-NOT_FROM_ZERO = Cause("not told from zero", "not told from zero")
+NOT_FROM_ZERO = Cause("not distinguishable from zero", "not distinguishable from zero")
 ONE_REALISATION = Cause("distortion not shown", "a single realisation does not show it")
 
 

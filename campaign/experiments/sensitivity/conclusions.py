@@ -68,7 +68,7 @@ def sensitivity_conclusions(
 def _untold(found: Sequence[Finding], symbols: Mapping[str, str]) -> Iterator[Conclusion]:
     """Why no change of a parameter is told."""
     if not found:
-        yield conclusion("How far a parameter may be off is not told: that needs every trial")
+        yield conclusion("No threshold: it needs every trial")
     elif all(each.value == 0 for each in found):
         yield conclusion("That is too much already: how far a parameter may be off has no meaning")
     else:

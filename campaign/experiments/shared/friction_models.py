@@ -118,7 +118,7 @@ class ConditionGroup:
 
 OF_ONE = (
     "Without repeats an interval is of the one recording: repeat the test to see how trials "
-    "scatter. What the time step of a simulation adds, --check-step tells."
+    "scatter. --check-step shows what the time step of a simulation adds."
 )
 """For the note of a table of such experiments."""
 

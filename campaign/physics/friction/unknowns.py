@@ -157,8 +157,8 @@ def static(
         where = f"In the {tail[1:]} direction static" if tail else "Static"
         rises = f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
         open_ = (
-            f"{where} friction is not told from Coulomb friction: there is no Stribeck part that "
-            "this motion could identify."
+            f"{where} friction is not distinguishable from Coulomb friction: there is no Stribeck "
+            "part that this motion could identify."
         )
         found += [
             FrictionUnknown(

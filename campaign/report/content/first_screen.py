@@ -297,7 +297,7 @@ def _asked(run: RunReader, tests: Sequence[AnalysedTest]) -> str:
 
 
 def _compared(scoreboard: Scoreboard) -> str:
-    """How many published values are reproduced; those that nobody fitted apart from the others."""
+    """How many published values are reproduced; those not fitted apart from the others."""
     found = headline(scoreboard)
     if not found.compared:
         return ""
@@ -305,7 +305,7 @@ def _compared(scoreboard: Scoreboard) -> str:
     others = [count for count in found.counts if count.status not in NOBODY_FITTED]
     shares = [
         f"{sum(each.good for each in counts)} of {sum(each.compared for each in counts)} {which}"
-        for counts, which in ((free, "that nobody fitted"), (others, "others" if free else ""))
+        for counts, which in ((free, "that were not fitted"), (others, "others" if free else ""))
         if counts
     ]
     what = "published value was" if found.compared == 1 else "published values were"

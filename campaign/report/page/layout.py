@@ -243,7 +243,7 @@ def overview(scoreboard: Scoreboard, folder: Folder, drawn: Drawn | None) -> Sho
         drawn,
         "Deviation from the published values",
         "One sign per published number: how far the reproduced value is from it, and what the"
-        " comparison is worth; pointing at a sign tells which number it is. The axis is linear up"
+        " comparison is worth; pointing at a sign shows which number it is. The axis is linear up"
         " to ±1 % and logarithmic beyond.",
         tables.agreement(scoreboard),
         "scoreboard",

@@ -272,7 +272,7 @@ def _notes(found: Sequence[FrequencyFit], told: Masses, remarks: Sequence[str]) 
             "what the drive answers is not theirs alone, as friction makes it."
         )
     if told.drive is not None and told.drive.rigid:
-        yield f"Two inertias are not told: {RIGID()}."
+        yield f"Two inertias are not determined: {RIGID()}."
     if told.how:
         place = "at the driven inertia" if "motor" in told.places.values() else "behind the spring"
         yield f"The load's sensor is taken to be {place}: {told.how}."
@@ -291,11 +291,11 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
                 continue
             yield (
                 f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
-                "the torque. Either friction turns its phase (a second amplitude tells), or the "
-                "torque is recorded late, or a controller holds it and it is sampled at points: "
-                "then gain and inertia are off by up to a few percent at the highest frequencies, "
-                "and no scatter shows that. A lower highest line, or a faster controller, makes it "
-                "small."
+                "the torque. Either friction turns its phase (a second amplitude shows which), or "
+                "the torque is recorded late, or a controller holds it and it is sampled at "
+                "points: then gain and inertia are off by up to a few percent at the highest "
+                "frequencies, and no scatter shows that. A lower highest line, or a faster "
+                "controller, makes it small."
             )
 
 

@@ -30,7 +30,7 @@ fall before they slip, and 1, that of Coulomb friction."""
 FRICTION = "friction, at this excitation"
 UNKNOWN = Cause(
     "friction at one amplitude",
-    "friction has a part in it, and no second amplitude tells how large: measure at half or twice "
+    "friction has a part in it, and no second amplitude shows how large: measure at half or twice "
     "of this one",
 )
 BY_RULE = {
