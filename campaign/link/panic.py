@@ -7,8 +7,8 @@ from campaign.recording import PanicStop
 from campaign.wire.codes import LatchCause
 from campaign.wire.messages import Latch
 
-NOBODY = "a person without a name"
-FORGETFUL = "unknown: the controller has started anew and remembers no stops"
+NOBODY = "somebody who did not say who"
+FORGETFUL = "nobody: the controller has started anew and remembers no stops"
 
 
 def panic_stop_of(latch: Latch) -> PanicStop | None:

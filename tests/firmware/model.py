@@ -17,7 +17,7 @@ from campaign.wire.statemachine import (
 
 TIMEOUT = 100_000  # microseconds
 BRAKING = 2_000_000
-NOBODY = "a person without a name"
+NOBODY = "somebody who did not say who"
 State, NakCode = wire.State, wire.NakCode
 
 

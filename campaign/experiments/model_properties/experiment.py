@@ -26,7 +26,9 @@ from campaign.experiments.model_properties.virtual_experiments import (
     numbers_of,
     requests,
 )
+from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.common import COUNTED, failures_note
+from campaign.experiments.shared.friction_models import model_label
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
@@ -155,8 +157,10 @@ def _conclusion(found: Sequence[Judged]) -> Conclusion:
     best = [model for model, lacking in lacks.items() if len(lacking) == fewest]
     lacking = " and ".join(dict.fromkeys(", ".join(lacks[model]) or "none" for model in best))
     most = f"{len(RULES) - fewest} of {len(RULES)}"
-    text = f"{', '.join(best)}: most properties, {most} with all parameter sets; not {lacking}."
-    return Conclusion((text,))
+    sets = parts.setting(float(len(found[0].numbers)))
+    models = ", ".join(map(model_label, best))
+    text = f" parameter sets alike, the {models} has most properties, {most}; not met: {lacking}"
+    return parts.conclusion("With ", sets, text)
 
 
 EXPERIMENT = Experiment(
