@@ -171,10 +171,12 @@ class Part:
     Attributes:
         requests: its trials, from the scale and a bench of no importance.
         measure: numbers by name, from a recording and the scale.
+        requires: channels without which there is none.
     """
 
     requests: Callable[[Scale, Bench], Iterable[TrialRequest]]
     measure: Callable[[TrialData, Scale], Mapping[str, float]]
+    requires: frozenset[str] = frozenset({FRICTION_TORQUE, RELATIVE_ANGLE})
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,8 @@ def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]])
         seen: Any = _AsIf(data, chosen(scale))
         return {each.name: each.value for each in own(seen)}
 
-    return Part(lambda scale, bench: experiment.trials(chosen(scale), bench), measure)
+    needed = frozenset(experiment.requires)
+    return Part(lambda scale, bench: experiment.trials(chosen(scale), bench), measure, needed)
 
 
 def _pulled(*, stiff: bool) -> Part:
@@ -211,6 +214,7 @@ def _pulled(*, stiff: bool) -> Part:
     return Part(
         whole.requests,
         lambda data, scale: {"rests": whole.measure(data, scale)["stick_slip_rests"]},
+        whole.requires | {RELATIVE_ANGLE},
     )
 
 
@@ -274,7 +278,8 @@ def requests(scale: Scale, bench: Bench) -> Iterator[TrialRequest]:
     """All trials of a model, each with its part in its point."""
     for name, part in PARTS.items():
         for request in part.requests(scale, bench):
-            yield replace(request, point={"part": name, **request.point})
+            point = {"part": name, **request.point}
+            yield replace(request, point=point, requires=part.requires)
 
 
 def estimates(data: TrialData, scale: Scale) -> Sequence[Estimate]:
