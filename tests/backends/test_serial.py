@@ -262,7 +262,7 @@ def test_gains_and_limits_may_be_swept() -> None:
 def test_without_a_port_nothing_is_connected_and_the_message_says_what_to_do() -> None:
     with pytest.raises(UsageError, match="--port"):
         BACKEND.open(SerialOptions()).__enter__()
-    with pytest.raises(UsageError, match="nobody answers"):
+    with pytest.raises(UsageError, match="no answer"):
         SerialBackend(SerialOptions(port="socket://127.0.0.1:9")).__enter__()
     with pytest.raises(UsageError, match="plugged in"):
         SerialBackend(SerialOptions(port="/dev/no-such-port")).__enter__()

@@ -258,7 +258,7 @@ def test_columns_that_cannot_be_told_apart_are_refused() -> None:
     motion = smooth_motion()
     force = force_of(motion, inertia=2.0)
     names = [*DIRECTIONAL, "coulomb"]
-    with pytest.raises(ValueError, match="told apart"):
+    with pytest.raises(ValueError, match="not distinguishable"):
         structure([driven(motion, force)], [TERMS[n] for n in names], Filtering(100.0))
 
 

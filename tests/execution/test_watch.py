@@ -150,7 +150,7 @@ def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
         assert AFTERWARDS in text
         assert "complete: 2 trials done" in text
     if terminal == "dumb":
-        assert "no terminal that can be drawn to" in " ".join(text.split())
+        assert "this terminal cannot show pictures" in " ".join(text.split())
         assert "\x1b[" not in text
 
 

@@ -235,7 +235,7 @@ def rest_of(options: PilotedMapOptions) -> list[float]:
 def test_a_pilot_that_failed_leaves_the_plain_map(soft: Piloted) -> None:
     requests = asked(make_case(SOFT), soft.options, tuple(failed(item) for item in soft.pilot))
     assert [request.point["speed"] for request in requests] == rest_of(soft.options)
-    assert "tells too little of friction: it has no steady point" in requests[0].note
+    assert "shows too little of friction: it has no steady point" in requests[0].note
 
 
 def test_a_pilot_without_a_stribeck_effect_leaves_the_plain_map() -> None:
@@ -261,7 +261,7 @@ def test_a_pilot_without_friction_leaves_the_plain_map() -> None:
     free = replace(case, truth=case.truth.with_friction({}))
     found = run(free, pilot=True, points=FEWEST, warm_up_cycles=0)
     assert speeds(found.following) == rest_of(found.options)
-    assert "tells too little of friction" in found.following[0].trial.note
+    assert "shows too little of friction" in found.following[0].trial.note
     assert found.result.notes
 
 
@@ -280,7 +280,7 @@ def test_what_follows_stays_where_the_pilot_slid_steadily(soft: Piloted) -> None
     """Four of its runs are too few for a curve, and say all the same where the load slides."""
     some = soft.pilot[4:8]
     choice = choose(soft.options, make_case(SOFT).stated, some)
-    assert "tells too little of friction" in choice.reason
+    assert "shows too little of friction" in choice.reason
     slowest, *_, fastest = speeds(some)
     assert len(choice.speeds) == soft.options.points - SPEEDS
     assert slowest < min(choice.speeds)

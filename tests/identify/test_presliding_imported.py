@@ -101,7 +101,7 @@ def test_an_imported_small_motion_tells_stiffness_damping_and_inertia(results: P
         assert holds(told[name].estimate, true), (name, told[name].estimate)
         assert told[name].estimate.half_width < 0.02 * true
         assert told[name].bench == key
-    assert any("Nobody planned" in note for note in own.result.notes)
+    assert any("These were not planned" in note for note in own.result.notes)
 
 
 def test_slow_reversals_tell_stiffness_and_no_inertia(results: Path) -> None:

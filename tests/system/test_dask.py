@@ -215,7 +215,7 @@ def test_what_cannot_be_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest
     write(tmp_path, SEA)
     for arguments, why in (
         (("--executor", "slurm"), "is neither 'dask' nor dask://HOST:PORT"),
-        (("--executor", "dask://cluster.example:8786"), "whoever reaches a scheduler"),
+        (("--executor", "dask://cluster.example:8786"), "anyone who reaches a scheduler"),
         (("--executor", "dask://c.example:1", "--executor-tls", "."), "there is no such file"),
         (("--executor-tls", "."), "is for --executor"),
         (("--executor", "dask", "--backend", "serial", "--port", "x"), "leave --executor out"),

@@ -130,7 +130,7 @@ def test_other_commands_take_it_or_say_what_they_miss(folder: Path) -> None:
     plan = ("plan", "new/identify.toml", "--backend", "files", "--handover", "out", "--details")
     told = campaign(folder, *plan)
     assert "the rate loop is not described" in told.out
-    assert "no breakaway torque can be told of its ramps" in told.err
+    assert "its ramps give no breakaway torque" in told.err
     told = campaign(folder, "device", "--bench", "rig.toml", code=2).err
     assert all(path in told for path in PURPOSES if path != "limits")
 

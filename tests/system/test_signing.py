@@ -158,7 +158,7 @@ def test_an_unsigned_run_says_what_checksums_are_worth(
 ):
     assert verify(sealed) is ExitCode.DONE
     (said,) = capsys.readouterr().err.splitlines()
-    assert "not signed; whoever changes a run can compute its checksums anew" in said
+    assert "not signed; anyone who changes a run can compute its checksums anew" in said
     assert verify(sealed, "ada@lab", allowed) is ExitCode.ARCHIVE
     assert "is not signed" in capsys.readouterr().out
     assert verify(KEPT / "format-3.partial", "ada@lab", allowed) is ExitCode.ARCHIVE
