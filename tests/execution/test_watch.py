@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import pty
+import select
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -89,20 +91,28 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_samples_nor_progress() -
     taken, terminal = os.pipe()
     display = WatchDisplay(terminal, lambda: os.terminal_size((200, 60)))
     progress = Progress(9, 1, 0, 0, (TRIAL,), 0.0, 1.0, 1.0, 8.0)
-    longest, began = 0.0, time.monotonic()
-    while time.monotonic() - began < 4.0:  # more than the pipe takes
-        before = time.perf_counter()
-        number = int(time.monotonic() - began)
-        handed(display.seen, TRIAL.model_copy(update={"number": number + 1}), 0, 10_000)
+
+    def tell(number: int) -> None:
+        handed(display.seen, TRIAL.model_copy(update={"number": number}), 0, 10_000)
         display(replace(progress, done=number))
-        longest = max(longest, time.perf_counter() - before)
-        time.sleep(0.05)
-    assert longest < 0.5
-    began = time.monotonic()
-    with display.hidden():
-        pass
-    display.end()
-    assert time.monotonic() - began < 3.0
+
+    def run_on() -> None:
+        number = 0
+        while select.select([], [terminal], [], 0)[1]:  # until the pipe takes no more
+            number += 1
+            tell(number)
+            time.sleep(0.01)
+        for more in range(20):  # whose pictures nothing takes
+            tell(number + more)
+        with display.hidden():
+            pass
+        display.end()
+
+    # What waited for the terminal would wait for ever.
+    thread = threading.Thread(target=run_on, daemon=True)
+    thread.start()
+    thread.join(120.0)
+    assert not thread.is_alive()
     os.close(taken)  # whoever writes is told so
 
 

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE
+from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Systematic
 from campaign.estimation.sampled_curve import ALIKE, LOST
 from campaign.execution.trial_metrics import checked
 from campaign.experiments import experiments
 from campaign.experiments.model_output.experiment import NO_REVERSAL
 from campaign.experiments.shared.friction_models import with_model
-from campaign.experiments.stick_slip import TOO_FEW_SLIPS
+from campaign.experiments.stick_slip.experiment import TOO_FEW_SLIPS
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import Result
@@ -446,6 +446,18 @@ def test_many_pulls_over_two_numbers_are_a_map() -> None:
     assert panel.title == "stribeck"
     assert [len(curve.x) for curve in panel.curves] == [3, 3, 3]
     assert [panel.x.label, panel.y.label] == ["stiffness", "pull rate"]
+    unseen = [
+        replace(
+            item,
+            samples=replace(
+                item.samples,
+                channels={k: v for k, v in item.samples.channels.items() if k != RELATIVE_ANGLE},
+            ),
+        )
+        for item in done
+    ]
+    (panel,) = analyse("stick_slip", unseen).figures[0].panels
+    assert [curve.label for curve in panel.curves] == ["not determined"]
 
 
 def test_a_model_keeps_what_another_has_within_tables_too() -> None:

@@ -22,7 +22,7 @@ from campaign.physics.bench import Bench
 from campaign.published.values import thesis
 from campaign.recording import Recording
 from campaign.result import Result
-from tests.experiments.laboratory import analyse, execute, finding, table, trials
+from tests.experiments.laboratory import Done, analyse, execute, finding, table, trials
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 (TEST,) = tomllib.loads((PROTOCOLS / "friction_models.toml").read_text(encoding="utf-8"))["test"]
@@ -204,10 +204,52 @@ def test_tables_show_marks_numbers_rules_and_sizes() -> None:
 
 @pytest.mark.slow
 def test_a_model_whose_trials_are_not_all_there_is_left_out() -> None:
-    done = execute(planned(["dahl"]))
-    result = analyse("model_properties", done[1:])
+    result = analyse("model_properties", dahl()[1:])
     assert not result.findings
     assert result.notes == ("dahl, LuGre 1995: trials are missing; the model is left out.",)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "channel"),
+    [
+        ("ramp", FRICTION_TORQUE),
+        ("swing", FRICTION_TORQUE),
+        ("soft spring", RELATIVE_ANGLE),
+        ("presliding", FRICTION_TORQUE),
+        ("vibration", RELATIVE_ANGLE),
+        ("rest", FRICTION_TORQUE),
+    ],
+)
+def test_lost_samples_are_no_mark(part: str, channel: str) -> None:
+    done = list(dahl())
+    at = next(k for k, item in enumerate(done) if item.trial.point["part"] == part)
+    samples = done[at].samples
+    own = samples.channels[channel]
+    values = np.where(np.arange(len(own.samples)) % 7 == 3, np.nan, own.samples)
+    channels = {**samples.channels, channel: replace(own, samples=values)}
+    done[at] = replace(done[at], samples=replace(samples, channels=channels))
+    result = analyse("model_properties", done)
+    assert not result.findings
+    assert any("dahl, LuGre 1995: " in note and "left out" in note for note in result.notes)
+
+
+@cache
+def dahl() -> tuple[Done, ...]:
+    return execute(planned(["dahl"]))
+
+
+@pytest.mark.slow
+def test_one_table_is_not_made_of_two_benches() -> None:
+    twice = [
+        replace(
+            item, trial=item.trial.model_copy(update={"point": {**item.trial.point, "day": day}})
+        )
+        for day in (1, 2)
+        for item in dahl()
+    ]
+    with pytest.raises(ValueError, match="one bench"):
+        analyse("model_properties", twice)
 
 
 @pytest.mark.parametrize(

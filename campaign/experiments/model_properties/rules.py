@@ -82,8 +82,8 @@ RULES = (
     ),
     Rule(
         "stick-slip", "rests", 10.0,
-        "the load, pulled through a soft spring, comes to rest in ten successive periods, and "
-        "through a stiff one in none",
+        "the load, pulled through a soft spring, rests for about a fifth of a period in ten "
+        "successive periods, and through a stiff one in none",
         positive="stribeck", negative="coulomb", sign="smooth_when_stiff",
     ),
     Rule(

@@ -15,11 +15,12 @@ import numpy as np
 
 from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
-from campaign.experiments import force_rate, friction_lag, stick_slip, stribeck_curve
+from campaign.experiments import force_rate, friction_lag, stribeck_curve
 from campaign.experiments.interface import Experiment, TrialData
 from campaign.experiments.model_properties.parameter_set import Scale
 from campaign.experiments.model_properties.rules import CLOSES, LOSS, REVERSIBLE
 from campaign.experiments.presliding_hysteresis import Loop
+from campaign.experiments.stick_slip.experiment import EXPERIMENT as STICK_SLIP
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Array
@@ -33,8 +34,8 @@ SLOWEST_RAMP = 1e-3
 """of sigma0 vs, the ramp on which a bristle takes Ts/sigma0/vs to bend: three decades above it."""
 FREQUENCIES = (0.04, 0.4)
 """of vs / (2 pi Ts/sigma0), around a rate of 1.3 vs."""
-PULL, SOFT, STIFF = 20.0, 0.3, 5.0
-"""of vs; and of the stiffnesses up to which a pulled load slips and sticks: see `_pull`."""
+PULL, SOFT, STIFF = 20.0, 0.3, 100.0
+"""of vs; and of the stiffness in `_pull`: it rests for 0.4 of a period, and for 0.03."""
 PERIODS = 14
 """Of a pull."""
 PATH = (0.0, 1.0, -1.0, 1.0, -1.0, 0.2, -0.3, 0.2, 1.0)
@@ -47,17 +48,6 @@ RISE = 0.01
 """of Ts - Tc, by which fast sliding must lie above the dip to count as a rise."""
 DWELLS = (0.01, 1.0, 100.0)
 """s at rest."""
-
-
-def _forced(disturbance: Polyline, duration: float, rate: float) -> Task:
-    """A free load, pushed by a torque alone."""
-    return Task(
-        mode="spring",
-        disturbance=disturbance,
-        duration=duration,
-        window=(0.0, duration),
-        sample_rate=rate,
-    )
 
 
 def _moved(command: Polyline, windows: tuple[Window, ...], rate: float) -> TrialRequest:
@@ -96,17 +86,13 @@ def _lag(scale: Scale) -> Mapping[str, Any]:
     }
 
 
-def _pull(scale: Scale, *, stiff: bool) -> Mapping[str, Any]:
-    """Through a spring well below and well above the stiffness up to which a load slips and sticks.
+def _pull(scale: Scale, stiffness: float) -> Mapping[str, Any]:
+    """Through a spring of `stiffness` times ((Ts - Tc) / v)^2 / J, where v is the rate of the pull.
 
-    A load that is let go at Ts overtakes the pull below `overtakes`. Above, its rate just touches
-    zero after each period, until viscous friction has taken (Ts - Tc)^2 / (2 K J v^2) of it: beyond
-    a stiffness of (overtakes J / 4.7 sigma2)^2 / J in the first period.
+    Through one of that stiffness a load that is let go at Ts reaches a rate of v above the pull.
     """
     rate = PULL * scale.velocity
-    overtakes = (scale.excess / rate) ** 2 / scale.inertia
-    touches = (overtakes * scale.inertia / (4.7 * scale.viscous)) ** 2 / scale.inertia
-    stiffness = STIFF * touches if stiff else SOFT * overtakes
+    stiffness *= (scale.excess / rate) ** 2 / scale.inertia
     turned = math.sqrt(stiffness / scale.inertia)
     period = 2.0 * scale.excess / (stiffness * rate) + 2.0 * math.pi / turned
     return {
@@ -148,7 +134,14 @@ def _drift(scale: Scale) -> TrialRequest:
         Window("cycle 10", 10.0 / frequency, 11.0 / frequency),
         Window("cycle 100", stop - 1.0 / frequency, stop),
     )
-    return TrialRequest(_forced(torque, stop, 20.0 * frequency), windows=windows)
+    task = Task(
+        mode="spring",  # of no stiffness: a free load
+        disturbance=torque,
+        duration=stop,
+        window=(0.0, stop),
+        sample_rate=20.0 * frequency,
+    )
+    return TrialRequest(task, windows=windows)
 
 
 def _dwell(scale: Scale, rest: float) -> TrialRequest:
@@ -209,11 +202,11 @@ def _like(experiment: Experiment, options: Callable[[Scale], Mapping[str, Any]])
     return Part(lambda scale, bench: experiment.trials(chosen(scale), bench), measure, needed)
 
 
-def _pulled(*, stiff: bool) -> Part:
-    whole = _like(stick_slip.EXPERIMENT, lambda scale: _pull(scale, stiff=stiff))
+def _pulled(stiffness: float) -> Part:
+    whole = _like(STICK_SLIP, lambda scale: _pull(scale, stiffness))
     return Part(
         whole.requests,
-        lambda data, scale: {"rests": whole.measure(data, scale)["stick_slip_rests"]},
+        lambda data, scale: {"rests": whole.measure(data, scale).get("stick_slip_rests", math.nan)},
         whole.requires | {RELATIVE_ANGLE},
     )
 
@@ -261,8 +254,8 @@ PARTS: Mapping[str, Part] = {
     "ramp": _like(force_rate.EXPERIMENT, _ramps),
     "steady sliding": _like(stribeck_curve.EXPERIMENT, _steady),
     "swing": _like(friction_lag.EXPERIMENT, _lag),
-    "soft spring": _pulled(stiff=False),
-    "stiff spring": _pulled(stiff=True),
+    "soft spring": _pulled(SOFT),
+    "stiff spring": _pulled(STIFF),
     "presliding": Part(lambda scale, bench: [_presliding(scale)], presliding_numbers),
     "vibration": Part(lambda scale, bench: [_drift(scale)], _drift_numbers),
     "rest": Part(
@@ -288,19 +281,27 @@ def estimates(data: TrialData, scale: Scale) -> Sequence[Estimate]:
     return [Estimate.without_interval(name, value, "", COMPUTED()) for name, value in found.items()]
 
 
-Measured = Sequence[tuple[Mapping[str, Any], Mapping[str, float]]]
+Measured = Sequence[tuple[Mapping[str, Any], Mapping[str, Estimate]]]
 """Of each trial of a model its point, and what was measured."""
 
 
 def numbers_of(found: Measured, scale: Scale) -> dict[str, float]:
-    """What the rules decide on, by name; of all trials of a model."""
+    """What the rules decide on, by name; of all trials of a model.
+
+    Raises ValueError where a number is not determined: no mark follows from it.
+    """
+
+    def value(point: Mapping[str, Any], measured: Mapping[str, Estimate], name: str) -> float:
+        if not math.isfinite(measured[name].value):
+            raise ValueError(f"{name.replace('_', ' ')} is not determined ({point['part']})")
+        return measured[name].value
 
     def of(part: str, along: str, name: str) -> Array:
-        own = {float(p[along]): m[name] for p, m in found if p["part"] == part}
+        own = {float(p[along]): value(p, m, name) for p, m in found if p["part"] == part}
         return np.array([own[at] for at in sorted(own)])
 
     def single(part: str, name: str) -> float:
-        return next(m[name] for p, m in found if p["part"] == part)
+        return next(value(p, m, name) for p, m in found if p["part"] == part)
 
     ramps = of("ramp", "torque_rate", "breakaway_torque")
     speeds, sliding = (of("steady sliding", "speed", name) for name in ("rate", "friction_torque"))

@@ -27,13 +27,12 @@ from campaign.experiments.shared.friction_models import (
     ConditionGroup,
     combined,
     in_models,
-    model_label,
     model_series,
     places,
     simulated,
 )
 from campaign.experiments.shared.model_clauses import Rows, amount_of, each_model
-from campaign.experiments.shared.swept_words import axis_of, name_of, words
+from campaign.experiments.stick_slip.stick_slip_map import HISTORIES, Measured, counts, map_of
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -103,11 +102,6 @@ RESTS, AT_REST = 0.2, 0.005
 """Share of a period in which a load at rest moves by less than a share of what the pull moves in a
 period: 0.2 of one that swings about the pull without damping, and just comes to a halt, are 0.013.
 """
-SHORT = 0.1
-"""Of a pull, within which the load must first slip: a load that sticks again does so within twice
-that time, and a swing."""
-HISTORIES = 8
-"""So many pulls are drawn over time; of more with two swept numbers a map is drawn."""
 
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
@@ -187,9 +181,9 @@ def _analyse(data: TestData) -> Result:
             Column("top_rate", "Largest rate of the load", "rad/s", "rad/s"),
         ),
         rows=tuple(rows),
-        note="Rests: periods in a row, up to the last slip, in which the load rests. The period is "
-        "the mean time between slips after the first one, which started from an unstretched "
-        "spring. " + OF_ONE,
+        note="Rests: periods in a row, up to the last slip, of which the load rests for about a "
+        "fifth. The period is the mean time between slips after the first one, which "
+        "started from an unstretched spring. " + OF_ONE,
     )
     findings = tuple(
         Finding.of(replace(m[name], name=PREFIX + name), place.point)
@@ -213,9 +207,9 @@ def _analyse(data: TestData) -> Result:
     options = StickSlipOptions.model_validate(
         found[0].trials[0].trial.options, context={"si": True}
     )
-    drawn = _map(measured)
+    drawn = map_of(measured, StickSlipOptions)
     if drawn is not None:
-        return Result((table,), (drawn,), findings, notes, (_counts(measured),))
+        return Result((table,), (drawn,), findings, notes, (counts(measured),))
     settings = parts.Settings.of(data, StickSlipOptions)
     conclusions = stick_slip_conclusions(
         rows, found, settings, options.stiffness, options.pull_rate
@@ -244,82 +238,7 @@ def _shown(place: ConditionGroup) -> dict[str, Estimate]:
     return found
 
 
-def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
-    if found["rests"].value > 1.0:
-        return "stick-slip"
-    early = found["first_slip"].value < SHORT * place.trials[0].trial.task.duration
-    return "smooth" if early else "pull too short"
-
-
-def _counts(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Conclusion:
-    """In how many pulls each model sticks and slips."""
-    kinds: dict[str, list[str]] = {}
-    for place, found in measured:
-        model = str(place.point.get("model", ""))
-        kinds.setdefault(model and f" ({model_label(model)})", []).append(_kind(found, place))
-    told = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
-    return parts.conclusion(f"Stick-slip in {', '.join(told)}")
-
-
-def _map(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure | None:
-    """Stick-slip over the two swept numbers with most values; None where there are few pulls.
-
-    Rests in several periods tell stick-slip from a swing that dies out.
-    """
-    swept: dict[str, set[float]] = {}
-    for place, _ in measured:
-        for path, value in place.point.items():
-            if isinstance(value, int | float) and not isinstance(value, bool):
-                swept.setdefault(path, set()).add(value)
-    across = sorted((p for p in swept if len(swept[p]) > 1), key=lambda p: -len(swept[p]))[:2]
-    if len(measured) <= HISTORIES or len(across) < 2:
-        return None
-    trial = measured[0][0].trials[0].trial
-    x_axis, y_axis = (
-        replace(
-            axis_of(path, trial, StickSlipOptions), scale="log", label=name_of(path.split(".")[-1])
-        )
-        for path in across
-    )
-    panels: dict[str, list[tuple[str, float, float]]] = {}
-    for place, found in measured:
-        others = {path: value for path, value in place.point.items() if path not in across}
-        told = words(others, trial, StickSlipOptions, frozenset(others))
-        title = ", ".join(reversed(list(told)))
-        x, y = (float(str(place.point[path])) for path in across)
-        panels.setdefault(title, []).append((_kind(found, place), x, y))
-    looks = {"stick-slip": "measured", "smooth": "alternative", "pull too short": "reference"}
-    return Figure(
-        key="stick-slip",
-        title="Where a pulled load sticks and slips",
-        caption="A mark for each pull: stick-slip where the load rests in two or more periods in a "
-        f"row, up to the last; too short where it first slips after {SHORT:.0%} of the pull.",
-        alt="Marks of stick-slip and of smooth sliding over two swept numbers.",
-        panels=tuple(
-            Panel(
-                x_axis,
-                y_axis,
-                [
-                    Curve(
-                        np.array([x for own, x, _ in points if own == kind]),
-                        np.array([y for own, _, y in points if own == kind]),
-                        kind,
-                        look,
-                        "points",
-                    )
-                    for kind, look in looks.items()
-                    if any(own == kind for own, _, _ in points)
-                ],
-                title,
-            )
-            for title, points in panels.items()
-        ),
-        across=min(3, len(panels)),
-        thesis=("2.12",),
-    )
-
-
-def _figure(measured: Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]) -> Figure | None:
+def _figure(measured: Measured) -> Figure | None:
     """The first pull of each place over time; None without samples."""
     measured = [each for each in measured if not each[0].trials[0].not_kept]
     if not measured:

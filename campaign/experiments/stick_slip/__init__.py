@@ -1,0 +1,1 @@
+"""Stick-slip: a load pulled through a spring."""
