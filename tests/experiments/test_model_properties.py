@@ -16,7 +16,15 @@ from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE, RELATIVE
 from campaign.experiments.model_properties import virtual_experiments
 from campaign.experiments.model_properties.experiment import ModelPropertiesOptions
 from campaign.experiments.model_properties.parameter_set import Scale, options_of, with_friction
-from campaign.experiments.model_properties.rules import BLANK, DEPENDS, MET, PARTLY, RULES, Judged
+from campaign.experiments.model_properties.rules import (
+    BLANK,
+    DEPENDS,
+    MARKS,
+    MET,
+    PARTLY,
+    RULES,
+    Judged,
+)
 from campaign.experiments.model_properties.virtual_experiments import PULL
 from campaign.physics.bench import Bench
 from campaign.published.values import thesis
@@ -55,6 +63,20 @@ def test_a_rule_meets_its_controls(rule: Any) -> None:
     assert mark(rule.positive, rule.name) == MET
     if rule is not RULES[0]:  # no model of the table lacks Coulomb friction: see below
         assert mark(rule.negative, rule.name) == BLANK
+
+
+@pytest.mark.slow
+def test_the_page_shows_the_marks() -> None:
+    """Of the controls, and where it says that a mark depends on no parameter."""
+    page = (PROTOCOLS.parent / "docs" / "friction-models.md").read_text(encoding="utf-8")
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines()]
+    (head,) = [cells for cells in lines if cells[0] == "property"]
+    shown = {cells[0]: cells[1:] for cells in lines if len(cells) == len(head)}
+    for rule in RULES:
+        for names, sign in zip(head[1:], shown[rule.name], strict=True):
+            for name in names.replace("`", "").split(", "):
+                if name in CONTROLS and sign != "?":
+                    assert MARKS[mark(name, rule.name)] == sign, (rule.name, name)
 
 
 def test_viscous_friction_alone_has_no_coulomb_friction() -> None:
