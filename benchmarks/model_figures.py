@@ -125,7 +125,7 @@ def steady_curves() -> Figure:
         panel("Coulomb and viscous", "coulomb"),
         panel("With static friction", "stribeck", stribeck_velocity="1e-9 rad/s"),
         panel("Stribeck", "stribeck"),
-        Panel(RATE, TORQUE, [Curve(*swept, "", "measured")], "Smoothed"),
+        Panel(RATE, TORQUE, [Curve(swept[0], swept[1], "", "measured")], "Smoothed"),
         panel("Karnopp", "karnopp", Mark("2 DV", x=-VS, until=VS), zero_band="1 mrad/s"),
         Panel(RATE, TORQUE, [Curve(whole[forward], values[forward], "", "measured")],
               "Lubrication", regimes),
@@ -182,8 +182,9 @@ def preslidings() -> Figure:
 
     scale = replace(TORQUE, limits=(-1.4, 1.4))
     dahl = [
-        Curve(*turned(options("dahl", exponent=i), forth_and_back)[[0, 2]], f"i = {i:g}", f"{i:g}")
+        Curve(angle, friction, f"i = {i:g}", f"{i:g}")
         for i in (0.5, 1.0, 2.0)
+        for angle, _, friction in [turned(options("dahl", exponent=i), forth_and_back)]
     ]
     inner = (*forth_and_back, 0.2 * way, 0.7 * way, 0.2 * way, way)
     return _figure(
