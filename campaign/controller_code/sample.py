@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from campaign.controller_code.compensation import INPUTS, Sampled
-from campaign.controller_code.transpile import NUMBER, ROWS, Made, Program, finite
+from campaign.controller_code.syntax import NUMBER, ROWS, finite
+from campaign.controller_code.transpile import Made, Program
 from campaign.physics import elementary
 from campaign.physics.friction_elements import Interface
 from campaign.physics.step_function import AN_INSTANT, ROOM_TEMPERATURE, Motion

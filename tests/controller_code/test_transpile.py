@@ -9,8 +9,9 @@ from typing import Any, get_type_hints
 import pytest
 
 from campaign.cli.bench_commands import export_compensation_command
+from campaign.controller_code.syntax import INTEGER, MOTION, ROWS, Syntax, plain
 from campaign.controller_code.targets import c, matlab, structured_text, targets
-from campaign.controller_code.transpile import INTEGER, MOTION, ROWS, Program, Syntax, plain
+from campaign.controller_code.transpile import Program
 from campaign.errors import UsageError
 from campaign.physics.compilation import called
 from campaign.physics.elementary import bits_of, double_of, exp, where

@@ -11,16 +11,9 @@ import numpy as np
 
 from campaign.controller_code.compensation import INPUTS, Sampled
 from campaign.controller_code.sample import MEMORY, rows_of, sample
+from campaign.controller_code.syntax import INTEGER, NUMBER, TRUTH, Argument, Syntax, signs
 from campaign.controller_code.targets import Array, Target, about, vectors
-from campaign.controller_code.transpile import (
-    INTEGER,
-    NUMBER,
-    TRUTH,
-    Argument,
-    Program,
-    Syntax,
-    signs,
-)
+from campaign.controller_code.transpile import Program
 from campaign.physics import elementary
 
 SINGLE = 1e-3
