@@ -163,8 +163,8 @@ def _conclusion(found: Sequence[Judged]) -> Conclusion:
     most = f"{len(RULES) - fewest} of {len(RULES)}"
     sets = parts.setting(float(len(found[0].numbers)))
     models = ", ".join(map(model_label, best))
-    text = f" parameter sets alike, the {models} has most properties, {most}; not met: {lacking}"
-    return parts.conclusion("With ", sets, text)
+    text = f" parameter sets, the {models} has most properties, {most}; not met: {lacking}"
+    return parts.conclusion("With all ", sets, text)
 
 
 EXPERIMENT = Experiment(
