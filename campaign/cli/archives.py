@@ -1,4 +1,4 @@
-"""`campaign list` and `campaign init`."""
+"""`campaign list`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from pathlib import Path
 from campaign.archive import RunSummary, list_runs
 from campaign.archive.writing.remnants import find_remnants
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
-from campaign.cli.schemas import write_schemas
 from campaign.cli.selection import Selection
-from campaign.interrupts import unwinding
-from campaign.resources import copy_shipped
 
 _HEADINGS = (
     "run", "status", "date", "duration", "trials", "failed", "protocol", "backend", "tags", "size",
@@ -38,15 +35,6 @@ def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None
     for run in runs:
         if run.problem:
             print_note(f"{run.name}: {run.problem}", style="yellow")
-
-
-@unwinding()
-def init_folder(folder: Path) -> None:
-    """Copy what is shipped into `folder` and say how to go on."""
-    written = copy_shipped(folder)
-    print_line(f"{len(written)} files written to {folder}")
-    write_schemas(folder)
-    print_line(f"now: campaign run {folder / 'protocols' / 'quickstart.toml'} --report")
 
 
 def _row(run: RunSummary) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""`campaign schema`, and the schema files of `campaign init`."""
+"""`campaign schema` and `campaign init`, which writes schema files."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from campaign.cli.output import print_json
+from campaign.cli.output import print_json, print_line
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.importing.json_schema import mapping_schema
+from campaign.interrupts import unwinding
 from campaign.protocol.json_schema import bench_schema, protocol_schema
 from campaign.report.formats.as_json import report_schema
+from campaign.resources import copy_shipped
 
 SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "protocol": lambda: protocol_schema(experiments()),
@@ -36,6 +38,15 @@ schema = { path = "./schemas/bench.json" }
 """
 
 
+@unwinding()
+def init_folder(folder: Path) -> None:
+    """Copy what is shipped into `folder` and say how to go on."""
+    written = copy_shipped(folder)
+    print_line(f"{len(written)} files written to {folder}")
+    _write_schemas(folder)
+    print_line(f"now: campaign run {folder / 'protocols' / 'quickstart.toml'} --report")
+
+
 def print_schema(of: str) -> None:
     """The JSON Schema of what SCHEMAS names. Raises UsageError for anything else."""
     if of not in SCHEMAS:
@@ -43,7 +54,7 @@ def print_schema(of: str) -> None:
     print_json(SCHEMAS[of]())
 
 
-def write_schemas(folder: Path) -> None:
+def _write_schemas(folder: Path) -> None:
     """Those of protocols and benches, and the rules that name them; what is there stays."""
     files = {
         f"{FOLDER}/{of}.json": json.dumps(SCHEMAS[of](), indent=1, ensure_ascii=False) + "\n"

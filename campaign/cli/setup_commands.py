@@ -139,6 +139,6 @@ def init(
         init_for_bench(folder, bench)
     if bench and not everything:
         return
-    from campaign.cli.archives import init_folder
+    from campaign.cli.schemas import init_folder
 
     init_folder(folder)
