@@ -252,6 +252,17 @@ def test_a_model_that_is_true_is_contradicted_once_in_five() -> None:
     assert low <= count <= high
 
 
+def test_where_the_preferred_model_is_contradicted_the_free_one_is_accepted() -> None:
+    """The criterion of information is more patient with an exponent of 2 than the F test."""
+    found = [bent(2.0, seed) for seed in range(60)]
+    contradicted = [bool(fit.contradiction(fit.preferred)) for fit in found]
+    assert any(contradicted)
+    for fit, against in zip(found, contradicted, strict=True):
+        told = direction_estimates(fit, fit.accepted)
+        assert told["coulomb_torque"].origin is Origin.MEASURED
+        assert fit.accepted == ("free" if against else fit.preferred)
+
+
 def test_a_parameter_at_its_bound_says_that_its_model_is_contradicted() -> None:
     """Of a curve with little viscous friction and a long tail the exponent 2 finds none at all."""
     speed = np.geomspace(0.002, 1.0, 24)

@@ -138,7 +138,7 @@ class Curves:
     @property
     def found(self) -> dict[str, dict[str, Estimate]]:
         """Parameters by direction, then by name, systematic parts included."""
-        told = {way: self._fitted(way, fit.preferred) for way, fit in self.fits.items()}
+        told = {way: self._fitted(way, fit.accepted) for way, fit in self.fits.items()}
         for way, by_name in self.others.items():
             effects = self.moved[way]
             told[way] = {name: self._shared(one, way, effects) for name, one in by_name.items()}
@@ -189,12 +189,12 @@ class Curves:
     def curve(self, way: str, speed: Array, model: Model | None = None) -> list[Array]:
         """What was fitted at `speed`, shape (n,), and both ends of its 95 % band; none of a mean.
 
-        All positive where friction acts against the motion; of the preferred model, if none is
+        All positive where friction acts against the motion; of the accepted model, if none is
         named.
         """
         if way in self.fits:
             fit = self.fits[way]
-            model = model or fit.preferred
+            model = model or fit.accepted
             middle = np.asarray(stribeck(speed, fit.fits[model].values))
             half = band(fit, model, speed)
             return [middle, middle - half, middle + half]
@@ -299,12 +299,12 @@ def _fit(curves: Curves, name: str, own: Sequence[_Averaged]) -> None:
 def _stribeck_part(fit: DirectionFit) -> str:
     """Whether friction falls or rises as sliding sets in, in words."""
     # What is told by a line shows no Stribeck part, whatever a free curve could be bent to.
-    if not fit.shows_stribeck_effect or fit.preferred == "none":
+    if not fit.shows_stribeck_effect or fit.accepted == "none":
         return (
             "static friction is not distinguishable from Coulomb friction: there is no Stribeck "
             "part that these speeds could identify"
         )
-    values = fit.fits[fit.preferred].values
+    values = fit.fits[fit.accepted].values
     if values["static_torque"] < values["coulomb_torque"]:
         return "static friction lies below Coulomb friction: friction rises as sliding sets in"
     return "static friction lies above Coulomb friction, as of a Stribeck curve"
