@@ -9,7 +9,7 @@ NPM := tests/browser/node_modules
 NPM_CI := npm ci --prefix tests/browser --ignore-scripts --no-audit --no-fund
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test statistics soak mutants browser-tools lighthouse check format clean
+.PHONY: help demo test statistics soak mutants browser-tools lighthouse docs check format clean
 
 help:
 	@echo "make demo     run the quick-start protocol on the simulated bench and report it"
@@ -19,6 +19,7 @@ help:
 	@echo "make mutants  put small bugs into what keeps the bench safe: do the tests notice? (long)"
 	@echo "make browser-tools  what tests of the page in a browser need from npm; they skip without"
 	@echo "make lighthouse REPORT=FOLDER  scores of a report's page, served compressed"
+	@echo "make docs     README and docs/ as a site, in build/site"
 	@echo "make check    lint, formatting, types, import contracts"
 	@echo "make format   put the code into the project's format"
 	@echo "make clean    remove the environment and everything built (results/ stays)"
@@ -68,6 +69,11 @@ lighthouse: $(VENV)/installed-test
 	$(NPM_CI) --silent
 	$(BIN)/python benchmarks/lighthouse.py $(REPORT)
 
+# -n, -W: a link without a target fails.
+docs: $(VENV)/installed-docs
+	$(BIN)/sphinx-build -q -n -W --keep-going -c docs . build/site
+	@cp build/site/README.html build/site/index.html && echo "build/site/index.html"
+
 check: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -93,6 +99,10 @@ $(VENV)/installed: $(VENV)/made pyproject.toml constraints.txt
 
 $(VENV)/installed-test: $(VENV)/installed
 	$(PIP) install $(PINNED) --no-build-isolation --editable ".[test]"
+	@touch $@
+
+$(VENV)/installed-docs: $(VENV)/installed
+	$(PIP) install $(PINNED) --no-build-isolation --editable ".[docs]"
 	@touch $@
 
 # npm writes this file last; Lighthouse (dev) is large, and no test needs it.
