@@ -27,6 +27,7 @@ from campaign.experiments.model_properties.rules import (
 )
 from campaign.experiments.model_properties.virtual_experiments import PULL
 from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
 from campaign.published.values import thesis
 from campaign.recording import Recording
 from campaign.result import Result
@@ -78,6 +79,16 @@ def test_the_page_shows_the_marks() -> None:
             for name in names.replace("`", "").split(", "):
                 if name in CONTROLS and sign != "?":
                     assert MARKS[mark(name, rule.name)] == sign, (rule.name, name)
+
+
+def test_the_page_shows_states_and_switches() -> None:
+    page = (PROTOCOLS.parent / "docs" / "friction-models.md").read_text(encoding="utf-8")
+    for name in set(TEST["models"]) - {"armstrong"}:  # whose state depends on the step
+        made, model = options_of(name, GIVEN, own=True), friction_models()[name]
+        assert model.switches is not None
+        sizes = f"| {model.state_size(made, 1e-4)}, {model.switches(made)} |"
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| [`{name}`]")]
+        assert sizes in row
 
 
 def test_viscous_friction_alone_has_no_coulomb_friction() -> None:
