@@ -33,6 +33,7 @@ from campaign.cli.parameters import (
     SignOption,
     TlsOption,
     TruthOption,
+    WatchOption,
     WorkersOption,
     YesOption,
     output_option,
@@ -161,9 +162,7 @@ def run(
     profile: Annotated[
         bool, typer.Option("--profile", help="Say at the end where the time went.")
     ] = False,
-    watch: Annotated[
-        bool, typer.Option("--watch", help="Draw channels of the running trial in the terminal.")
-    ] = False,
+    watch: WatchOption = False,
 ) -> None:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
     from campaign.stopwatch import UNTIMED, Stopwatch, Work
@@ -215,6 +214,7 @@ def resume(
     yes: YesOption = False,
     clear_stop: ClearStopOption = None,
     sign: SignOption = None,
+    watch: WatchOption = False,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
     from campaign.cli.cluster import Where
@@ -232,6 +232,7 @@ def resume(
             yes=yes,
             clear_stop=clear_stop,
             sign=sign,
+            watch=watch,
         )
     )
 

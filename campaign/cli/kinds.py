@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pydantic import BaseModel
@@ -31,6 +32,8 @@ from campaign.units import convert
 CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
 MODEL = "model of identify"
 UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
+MANY = 20
+"""Options of a table from which it is listed once."""
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
@@ -102,8 +105,35 @@ def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -
     print_line(f"{name} ({room}): {summary}")
     if options is not None:
         print_line()
-        rows = [_row(info) for info in describe(options)]
+        rows = [_row(info) for info in _each_once(tuple(describe(options)))]
         print_table(("option", "unit or values", "default", "meaning"), rows)
+
+
+def _each_once(infos: Sequence[OptionInfo]) -> Iterator[OptionInfo]:
+    """What several words have alike, and a table that several options take, each once."""
+    tables: dict[str, str] = {}
+    alike: dict[str, list[OptionInfo]] = {}
+    within = "."
+    for info in infos:
+        if info.name.startswith(within):
+            continue
+        end = len(info.name)
+        below = [
+            repr(replace(each, name=each.name[end:], when=""))
+            for each in infos
+            if each.name.startswith(f"{info.name}.")
+        ]
+        if len(below) >= MANY:
+            first = tables.setdefault("".join(below), info.name)
+            if first != info.name:
+                within = f"{info.name}."
+                info = replace(info, meaning=f"{info.meaning} Same options as {first}.")
+        alike.setdefault(repr(replace(info, when="")), []).append(info)
+    for info, *others in alike.values():
+        # "method = a, model = b" and "method = a, model = c" differ in the last word.
+        start = info.when.rpartition(" = ")[0]
+        words = [info.when, *(other.when.removeprefix(f"{start} = ") for other in others)]
+        yield replace(info, when=" | ".join(words))
 
 
 def _show_needs(experiment: Experiment) -> None:

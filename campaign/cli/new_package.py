@@ -18,6 +18,7 @@ TEMPLATES = Path(__file__).with_name("package_templates")
 POINTS = {
     "experiment": ("campaign.experiments", "EXPERIMENT"),
     "model": ("campaign.friction", "FRICTION"),
+    "method": ("campaign.compensation", "COMPENSATION"),
     "backend": ("campaign.backends", "BACKEND"),
     "format": ("campaign.exports", "EXPORT"),
 }

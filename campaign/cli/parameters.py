@@ -93,6 +93,9 @@ FormatOption = Annotated[
 WorkersOption = Annotated[
     int | None, workers_option("Trials executed at once, where the backend can")
 ]
+WatchOption = Annotated[
+    bool, typer.Option("--watch", help="Draw channels of the running trial in the terminal.")
+]
 ExecutorOption = Annotated[
     str,
     typer.Option(

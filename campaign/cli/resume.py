@@ -22,6 +22,7 @@ from campaign.cli.prepare import Request, find_backend, open_backend, prepare
 from campaign.cli.session import Session, conduct, print_warning
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
+from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.resume import (
@@ -73,12 +74,15 @@ def resume_run(
     clear_stop: int | None = None,
     sign: Path | None = None,
     where: Where = HERE,
+    watch: bool = False,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.
 
     A `port` that is given is where the bench is today: no change that somebody has to accept.
     With a key to `sign` the run with: that it can sign is known before anything moves.
     """
+    if watch:
+        require_watch(where.executor)
     path = find_run(results, name)
     run = open_run(path)
     guardian = under_guardian(find_backend(run.header.backend))
@@ -131,6 +135,7 @@ def resume_run(
             asked=run.stages,
             guardian=guardian,
             executor=executor,
+            watch=watch,
         )
         code = conduct(session, open_archive, report=report, sign=sign)
     return worst_exit_code([code, read])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import chdir, closing, contextmanager
+from contextlib import chdir, closing, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -127,7 +127,8 @@ def conduct(
     began = time.monotonic()
     outcome, code = execute(session, open_archive)
     codes = [code]
-    say_outcome(outcome, time.monotonic() - began)
+    with suppress(OSError):  # the terminal is gone; the archive says it, too
+        say_outcome(outcome, time.monotonic() - began)
     try:
         if session.checks_step:
             say_step_check(outcome.archive)

@@ -86,7 +86,8 @@ def schema(
 @app.command()
 def new(
     kind: Annotated[
-        str, typer.Argument(metavar="experiment|model|backend|format", help="What it provides.")
+        str,
+        typer.Argument(metavar="experiment|model|method|backend|format", help="What it provides."),
     ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the package and its kind.")],
     output: Annotated[

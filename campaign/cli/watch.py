@@ -1,4 +1,4 @@
-"""`campaign run --watch`: whether it can be drawn here, and where."""
+"""`--watch` of `run` and `resume`: whether it can be drawn here, and where."""
 
 from __future__ import annotations
 

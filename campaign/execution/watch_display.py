@@ -1,4 +1,4 @@
-"""`campaign run --watch`: channels of the running trial, drawn in the terminal.
+"""`--watch` of `run` and `resume`: channels of the running trial, drawn in the terminal.
 
 Whoever runs trials only leaves samples and progress here, and goes on at once. A thread of its own
 draws them, through a descriptor of its own: a slow terminal sees fewer pictures, one that is gone

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -21,7 +22,8 @@ from campaign.channels import info
 from campaign.execution.progress import Progress
 from campaign.execution.watch_display import AFTERWARDS, MOST, Trace, WatchDisplay, drawn
 from campaign.trial import Task, Trial
-from tests.system.user import ROOT, SEA, campaign
+from tests.link.controllers import controller
+from tests.system.user import ROOT, SEA, begun, campaign
 
 pytest.importorskip("plotext")
 
@@ -116,15 +118,16 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_samples_nor_progress() -
     os.close(taken)  # whoever writes is told so
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("terminal", ["quick", "slow", "dumb", "gone"])
-def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
-    (tmp_path / "sea.toml").write_text(SEA, encoding="utf-8")
+def on_terminal(folder: Path, terminal: str, *arguments: str) -> str:
+    """`campaign` with a terminal as standard error: what that was sent.
+
+    The run must be complete, and named at the end, whatever the terminal.
+    """
     ours, theirs = pty.openpty()
     kept = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "FORCE_COLOR")}
     running = subprocess.Popen(
-        [sys.executable, "-m", "campaign", "run", "sea.toml", "--watch"],
-        cwd=tmp_path,
+        [sys.executable, "-m", "campaign", *arguments],
+        cwd=folder,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=theirs,
@@ -138,23 +141,27 @@ def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
     )
     os.close(theirs)
     shown = b""
-    if terminal == "gone":
-        assert os.read(ours, 1)
-        os.close(ours)
-    else:
-        try:
-            while got := os.read(ours, 64 if terminal == "slow" else 65536):
-                shown += got
-                time.sleep(0.01 if terminal == "slow" else 0)
-        except OSError:
-            pass  # nobody writes any more
-        os.close(ours)
+    try:
+        while got := os.read(ours, 64 if terminal == "slow" else 65536):
+            shown += got
+            if terminal == "gone" and has_curve(shown.decode(errors="replace")):
+                break
+            time.sleep(0.01 if terminal == "slow" else 0)
+    except OSError:
+        pass  # nobody writes any more
+    os.close(ours)
     out, _ = running.communicate(timeout=120)
-    if terminal != "gone":  # then nothing can be said at the end, with --watch or without
-        assert running.returncode == 0
-        assert out.decode().strip().endswith(".nxs")
-    assert open_run(find_run(tmp_path / "results")).status is RunStatus.COMPLETE
-    text = shown.decode(errors="replace")
+    assert running.returncode == 0
+    assert out.decode().strip().endswith(".nxs")
+    assert open_run(find_run(folder / "results")).status is RunStatus.COMPLETE
+    return shown.decode(errors="replace")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", ["quick", "slow", "dumb", "gone"])
+def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
+    (tmp_path / "sea.toml").write_text(SEA, encoding="utf-8")
+    text = on_terminal(tmp_path, terminal, "run", "sea.toml", "--watch")
     if terminal in ("quick", "slow"):
         assert has_curve(text)
         assert AFTERWARDS in text
@@ -162,6 +169,49 @@ def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
     if terminal == "dumb":
         assert "this terminal cannot show pictures" in " ".join(text.split())
         assert "\x1b[" not in text
+
+
+LIVE = SEA.replace("cycles = 1\n", 'cycles = 1\nfrequency = "0.5 Hz"\n', 1)
+
+
+def live(port: str) -> tuple[str, ...]:
+    return ("--backend", "serial", "--port", port, "--set", "backend.motion=emulated", "--yes")
+
+
+@pytest.mark.slow
+def test_a_live_bench_is_watched_as_it_moves_and_waits_for_no_terminal(tmp_path: Path) -> None:
+    """4 s of samples a trial, sent at their pace; a host that falls silent finds the drive off."""
+    (tmp_path / "sea.toml").write_text(LIVE, encoding="utf-8")
+    seen: dict[int, np.ndarray] = {}
+    with controller("--speed", "1", "--heartbeat-timeout", "3", bench="simulink", pty=True) as port:
+        for terminal in ("quick", "slow", "dumb", "gone"):
+            text = on_terminal(tmp_path, terminal, "run", "sea.toml", "--watch", *live(port))
+            assert has_curve(text) == (terminal != "dumb")
+            assert AFTERWARDS not in text
+            assert "Rate of the hull" in text or terminal in ("dumb", "gone")  # the second channel
+            for at, trial in enumerate(open_run(find_run(tmp_path / "results")).trials):
+                told = trial.ending.telemetry
+                assert told["oldest_sample_s"] < 2.0  # s; less than two pictures there
+                assert not told["lost_records"]
+                samples = trial.recording()["gyro_rate"]
+                np.testing.assert_array_equal(seen.setdefault(at, samples), samples)
+    assert len(seen) == 2
+
+
+@pytest.mark.slow
+def test_resume_is_watched_as_run_is(tmp_path: Path) -> None:
+    (tmp_path / "sea.toml").write_text(LIVE, encoding="utf-8")
+    with controller("--speed", "1", "--heartbeat-timeout", "3", bench="simulink", pty=True) as port:
+        process = begun(tmp_path, "run", "sea.toml", *live(port))
+        with process:
+            while not list(tmp_path.glob("results/*.partial")):
+                time.sleep(0.1)
+            time.sleep(1.0)
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+        text = on_terminal(tmp_path, "quick", "resume", "2", "--yes", "--watch")
+    assert has_curve(text)
+    assert AFTERWARDS not in text
 
 
 def test_nothing_is_begun_that_could_not_be_drawn(

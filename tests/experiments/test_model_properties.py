@@ -27,9 +27,11 @@ from campaign.experiments.model_properties.rules import (
 )
 from campaign.experiments.model_properties.virtual_experiments import PULL
 from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
 from campaign.published.values import thesis
 from campaign.recording import Recording
 from campaign.result import Result
+from campaign.signals import Polyline
 from tests.experiments.laboratory import Done, analyse, execute, finding, table, trials
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -77,6 +79,16 @@ def test_the_page_shows_the_marks() -> None:
             for name in names.replace("`", "").split(", "):
                 if name in CONTROLS and sign != "?":
                     assert MARKS[mark(name, rule.name)] == sign, (rule.name, name)
+
+
+def test_the_page_shows_states_and_switches() -> None:
+    page = (PROTOCOLS.parent / "docs" / "friction-models.md").read_text(encoding="utf-8")
+    for name in set(TEST["models"]) - {"armstrong"}:  # whose state depends on the step
+        made, model = options_of(name, GIVEN, own=True), friction_models()[name]
+        assert model.switches is not None
+        sizes = f"| {model.state_size(made, 1e-4)}, {model.switches(made)} |"
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| [`{name}`]")]
+        assert sizes in row
 
 
 def test_viscous_friction_alone_has_no_coulomb_friction() -> None:
@@ -211,6 +223,26 @@ def test_the_printed_table_is_met_where_the_models_are_those_of_the_print() -> N
 
 
 @pytest.mark.slow
+def test_without_a_rest_armstrongs_breakaway_falls_with_the_ramp_rate() -> None:
+    """By its dwell time, which is a row of its own: the note at its cell says so."""
+    scale, torques = Scale.of(GIVEN, 1.0, "armstrong"), []
+    for trial in planned(["armstrong"]):
+        if trial.point["part"] == "ramp":
+            task = trial.task
+            peak, lasts = task.disturbance.values[-1], task.duration
+            times = (0.0, 0.001, 0.01, 0.011, 0.025, 0.025 + lasts)
+            push = Polyline(times=times, values=(0.0, 2.0, 2.0, 0.0, 0.0, peak))
+            changed = {"disturbance": push, "duration": times[-1], "window": (0.0, times[-1])}
+            moved = trial.model_copy(update={"task": task.model_copy(update=changed)})
+            recording = execute([moved])[0].recording()
+            late = recording.window(0.025, times[-1])
+            slides = int(np.argmax(late[LOAD_RATE] > PULL * scale.velocity))
+            assert np.max(recording[LOAD_RATE][recording.time < 0.025]) > 3.0 * scale.velocity
+            torques.append(float(np.max(late[FRICTION_TORQUE][:slides])))
+    assert torques[0] - torques[-1] > 0.8 * scale.excess
+
+
+@pytest.mark.slow
 def test_tables_show_marks_numbers_rules_and_sizes() -> None:
     marks = {row["property"]: row for row in table(controls(), "model-properties").rows}
     assert marks["presliding"]["gms"] == "+"
@@ -218,7 +250,8 @@ def test_tables_show_marks_numbers_rules_and_sizes() -> None:
     assert marks["nonlocal memory"]["armstrong"] == "–"  # a spring has no loop to close
     assert marks["dwell time"]["lugre"] == "–"
     sizes = {row["model"]: row for row in table(controls(), "model-sizes").rows}
-    assert sizes["lugre"] == {"model": "lugre", "parameters": 6, "state": 1}
+    assert sizes["lugre"] == {"model": "lugre", "parameters": 6, "state": 1, "switches": 1}
+    assert (sizes["stribeck"]["switches"], sizes["gms"]["switches"]) == (2, 11)
     assert [figure.key for figure in controls().figures] == [
         "model-marks", "model-properties", "model-presliding", "model-lag",
     ]  # fmt: skip

@@ -83,11 +83,14 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     return tuple(estimates(data, _scale(data)))
 
 
-def _sizes(model: str, given: Any) -> dict[str, int]:
-    """How many of a set's parameters a model takes, and how many numbers of state it has."""
-    options = options_of(model, given, own=True)
-    own = options.model_fields_set - {"model"}
-    return {"parameters": len(own), "state": friction_models()[model].state_size(options, STEP)}
+def _sizes(model: str, given: Any) -> dict[str, int | None]:
+    """How many of a set's parameters a model takes; its numbers of state and switch functions."""
+    options, kind = options_of(model, given, own=True), friction_models()[model]
+    return {
+        "parameters": len(options.model_fields_set - {"model"}),
+        "state": kind.state_size(options, STEP),
+        "switches": kind.switches and kind.switches(options),
+    }
 
 
 def _options(data: TestData) -> ModelPropertiesOptions:
@@ -132,9 +135,8 @@ def _findings(judged: Judged) -> Iterator[Finding]:
         else:
             mark = bracketed("model_property", median_low(marks), "", ends, "over parameter sets")
         yield Finding.of(mark, {**conditions, "property": rule.name})
-    count = Estimate(
-        "model_parameters", judged.sizes["parameters"], "", kind="count", reason=COUNTED()
-    )
+    parameters = judged.sizes["parameters"] or 0
+    count = Estimate("model_parameters", parameters, "", kind="count", reason=COUNTED())
     yield Finding.of(count, conditions)
 
 

@@ -77,7 +77,8 @@ RULES = (
     ),
     Rule(
         "breakaway", "breakaway_fall", 0.1,
-        "fall of the breakaway torque over three decades of ramp rate, over Ts − Tc: at least 0.1",
+        "fall of the breakaway torque over three decades of ramp rate, after a long rest, over "
+        "Ts − Tc: at least 0.1",
         positive="lugre", negative="dahl",
     ),
     Rule(
@@ -118,12 +119,12 @@ class Judged:
 
     Attributes:
         numbers: what the rules decide on, by set and name.
-        sizes: numbers of `parameters` and of `state`.
+        sizes: numbers of `parameters`, of `state`, and of `switches`; None: not stated.
     """
 
     model: str
     numbers: Mapping[str, Mapping[str, float]]
-    sizes: Mapping[str, int]
+    sizes: Mapping[str, int | None]
 
     def marks(self, rule: Rule) -> list[float]:
         """`MET`, `PARTLY` or `BLANK` of each set, ascending."""

@@ -101,9 +101,13 @@ def tables(found: Sequence[Judged], sets: Mapping[str, Mapping[str, Any]]) -> tu
                 Column("model", "Model", exact=True),
                 Column("parameters", "Parameters", exact=True),
                 Column("state", "Numbers of state", exact=True),
+                Column("switches", "Switch functions", exact=True),
             ),
             tuple({"model": each.model, **each.sizes} for each in found),
-            note="Parameters: those of the first set that the model takes; others have defaults.",
+            note="Parameters: those of the first set that the model takes; others have defaults. "
+            "Switch functions of rate, state and torque: where one passes zero the equations "
+            "change, and an integrator with a variable step has an event. The cost of a step "
+            "depends on the machine, so it is not measured here: docs/friction-models.md.",
         ),
     )
 

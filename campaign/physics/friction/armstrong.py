@@ -237,6 +237,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 2,
     changeable=(*CURVE, "bristle_stiffness", "memory_lag", "dwell_time"),
     small_signal=_small_signal,
     fastest=lambda options: options.memory_lag,

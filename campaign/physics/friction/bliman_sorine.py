@@ -190,6 +190,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=coulomb_steady_state,
+    switches=lambda options: 1,
     changeable=(*CURVE, "bristle_stiffness", "slow_stiffness"),
     added=("viscous_friction",),
     small_signal=_small_signal,

@@ -95,6 +95,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 2,
     changeable=CURVE,
     small_signal=lambda options: SmallSignal(stuck=None, stuck_compensation=None),
     stored_energy=lambda options, state: 0.0,

@@ -112,6 +112,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 3,
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),

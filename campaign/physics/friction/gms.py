@@ -163,6 +163,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 1 + count_of(options),
     changeable=(*CURVE, "bristle_stiffness", "attraction"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,

@@ -164,6 +164,9 @@ class FrictionModel:
         unknowns: the parameters that motions identify, from the friction's sizes, for each
             direction (True) or both alike. None: it is not identified.
         added: names of options that the equations of its source do not have.
+        switches: how many functions of rate, state and torque change its equations where they pass
+            zero, from validated options: the events of an integrator with a variable step. None: it
+            is not stated.
     """
 
     name: str
@@ -183,6 +186,7 @@ class FrictionModel:
     no_compensation: str = ""
     unknowns: Callable[[Sizes, bool], Unknowns] | None = None
     added: tuple[str, ...] = ()
+    switches: Callable[[Any], int] | None = None
 
     def __post_init__(self) -> None:
         """Refuse a step function of the form that it had before lanes."""

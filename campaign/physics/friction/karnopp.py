@@ -95,6 +95,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 3,
     changeable=(*CURVE, "zero_band"),
     small_signal=lambda options: SmallSignal(stuck=None, stuck_compensation=None),
     stored_energy=lambda options, state: 0.0,

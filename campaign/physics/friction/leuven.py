@@ -164,6 +164,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 2 + count_of(options),
     changeable=LUGRE.changeable,
     small_signal=_small_signal,
     unknowns=LUGRE.unknowns,

@@ -163,6 +163,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 1,
     changeable=(*CURVE, "bristle_stiffness", "bristle_damping"),
     small_signal=_small_signal,
     stored_energy=_stored_energy,

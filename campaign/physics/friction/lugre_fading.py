@@ -121,6 +121,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 1,
     changeable=(*(LUGRE.changeable or ()), "damping_velocity"),
     small_signal=_small_signal,
     stored_energy=LUGRE.stored_energy,

@@ -204,6 +204,7 @@ FRICTION = FrictionModel(
     step=_step,
     viscous=mean_viscous,
     steady_state=steady_state,
+    switches=lambda options: 2,
     changeable=CURVE,
     small_signal=_small_signal,
     stored_energy=lambda options, state: 0.0,

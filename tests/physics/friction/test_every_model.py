@@ -48,6 +48,19 @@ def test_steady_sliding_is_the_models_own_curve_in_both_directions(name: str) ->
         )
 
 
+@pytest.mark.parametrize("name", WITH_STATE)
+def test_equations_change_where_the_rate_passes_zero(name: str) -> None:
+    """A switch function of each: a slide that goes on is flat, and one that turns back is not."""
+    undamped = {"bristle_damping": 0.0} if "bristle_damping" in MODELS[name] else {}
+    slopes = []
+    for way in (5e-5, -5e-5):  # at the rate of the slide
+        driven = Driven(name, viscous_friction=0.0, **undamped)
+        slid = driven.move(0.01)
+        slopes.append(abs(driven.move(way, 1) - slid) / 5e-5)
+    assert slopes[0] < 0.1 * 18000.0
+    assert slopes[1] > 0.9 * 18000.0
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_viscous_friction_of_both_directions_is_all_there(name: str) -> None:
     negative = {"viscous_friction": 3.0}

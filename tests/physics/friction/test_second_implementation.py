@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from campaign.physics.friction import friction_models
 from campaign.signals import Polyline, Signal, Sine
 from tests.physics.benches import run, task
-from tests.physics.friction.cases import on
+from tests.physics.friction.cases import on, options
 from tests.physics.friction.switched import (
     Armstrong,
+    ArmstrongMode,
     Gms,
     Karnopp,
     Leuven,
@@ -39,6 +41,22 @@ CASES: dict[str, tuple[Any, dict[str, Any], dict[str, Any]]] = {
         {**TWO, "transition_exponent": 2.0, "hysteresis_reserve": 1.3},
     ),
 }
+
+
+def test_switch_functions_are_the_events_of_the_second_implementation() -> None:
+    """Stuck, and in both directions, a function has an event at either sign."""
+    karnopp, armstrong = Karnopp(), Armstrong()
+    none = (False, False)
+    events = {
+        "karnopp": len(karnopp.events((1, False))) + len(karnopp.events((0, True))) // 2,
+        "armstrong": len(armstrong.events(ArmstrongMode(1, 0.0, 0.0)))
+        + len(armstrong.events(ArmstrongMode(0, 0.0, 0.0))) // 2,
+        "gms": len(Gms().events((1, none))),
+        "leuven": len(Leuven().events((1, 1, none))),
+    }
+    made = {name: options(name, **CASES[name][2]) for name in events}
+    stated = {name: friction_models()[name].switches for name in events}
+    assert {name: state and state(made[name]) for name, state in stated.items()} == events
 
 
 def function(sine: Sine) -> Callable[[float], float]:
