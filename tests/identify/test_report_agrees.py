@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from campaign.estimate import Estimate
+from campaign.estimation.presliding_dynamics.presliding_fit import (
+    PreslidingDynamics,
+    identify_presliding_dynamics,
+)
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, measured, result_of
+from campaign.experiments.presliding_multisine import experiment as presliding_multisine
 from campaign.protocol import load_protocol, make_plan
 from campaign.published.draws import SEED
 from campaign.resources import protocols_folder
@@ -70,7 +76,22 @@ AGREED: set[tuple[str, ...]] = set()
 """Trials of tests that agree: shipped protocols include each other's."""
 
 
+@pytest.fixture
+def presliding_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of equal records and assumptions: a trial, its test and its identification ask in turn."""
+    known: dict[bytes, PreslidingDynamics] = {}
+
+    def fitted(*asked: object) -> PreslidingDynamics:
+        key = pickle.dumps(asked)
+        if key not in known:
+            known[key] = identify_presliding_dynamics(*asked)  # type: ignore[arg-type]
+        return known[key]
+
+    monkeypatch.setattr(presliding_multisine, "identify_presliding_dynamics", fitted)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("presliding_fitted_once")
 @pytest.mark.parametrize("path", PROTOCOLS, ids=lambda path: path.stem)
 def test_report_and_identification_agree(path: Path) -> None:
     for test, trials in planned(path).items():
