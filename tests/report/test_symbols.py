@@ -11,7 +11,7 @@ import pytest
 from campaign.channels import VOCABULARY
 from campaign.physics.bench import Bench
 from campaign.protocol.shapes import shape_at
-from campaign.report.content.symbols import SYMBOLS, Symbol, markdown
+from campaign.report.content.symbols import SYMBOLS, Symbol
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCH = Bench.model_validate(
@@ -47,8 +47,3 @@ def test_a_channel_exists(symbol: Symbol) -> None:
 
 def test_no_symbol_stands_there_twice() -> None:
     assert len({each.symbol for each in SYMBOLS}) == len(SYMBOLS)
-
-
-def test_the_manual_has_the_same_table() -> None:
-    manual = (ROOT / "docs/reports.md").read_text(encoding="utf-8")
-    assert "\n".join(markdown()) in manual

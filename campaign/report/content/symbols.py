@@ -5,7 +5,7 @@ One table for who reads an equation and looks for the number, and for the other 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, axis_unit, in_axis_terms
@@ -112,13 +112,3 @@ def _unit(symbol: Symbol, sides: Sides) -> str:
         return "rad/m"
     with axis_terms(_own(symbol, sides)):
         return axis_unit(symbol.unit)
-
-
-def markdown() -> Iterator[str]:
-    """The table in Markdown, as docs/reports.md has it."""
-    yield "| symbol | in files | unit | meaning | defined in |"
-    yield "| --- | --- | --- | --- | --- |"
-    for each in SYMBOLS:
-        name = f"`{each.in_files}`" if each.in_files != "–" else "–"
-        unit = each.unit or "–"
-        yield f"| {each.symbol} | {name} | {unit} | {each.meaning} | {each.printed} |"
