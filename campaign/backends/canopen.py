@@ -20,6 +20,7 @@ from campaign.canopen_drive.bus_load import LARGEST, PROMISED, bus_load
 from campaign.canopen_drive.client import Client, Start, start_process
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.player import HEARTBEAT_LOST, EndedError, Player, channels, ending_of
+from campaign.canopen_drive.proof import RATE as PROOF_RATE
 from campaign.canopen_drive.proof import Proof
 from campaign.canopen_drive.settings import (
     cycle,
@@ -116,11 +117,13 @@ class CanopenBackend:
 
     def __exit__(self, *exception: object) -> None:
         client = self._client
-        if client is not None:
+        # A trial that hangs keeps its limits.
+        if client is not None and self._busy.acquire(blocking=False):
             with contextlib.suppress(DriveError):
                 for item, value in self._own.items():
                     client.write(item, value)
                 client.write(od.CONSUMER, 0)  # the heartbeat ends in order
+            self._busy.release()
         self._disconnect()
 
     def introduce(self, run: str) -> None:
@@ -240,7 +243,7 @@ class CanopenBackend:
         if lacking := set_limits(client, limits, scale, self._own):
             told = f"limits that the drive lacks, and this program alone watches: {lacking}"
             recorder.event(Event(0.0, told))
-        counted, here = set_times(client, task.sample_rate**-1), client.read(od.POSITION)
+        counted, here = set_times(client, 1 / PROOF_RATE), client.read(od.POSITION)
         angle = here / scale.position
         if abs(angle) > limits.angle:
             raise DriveError(f"the load stands at {angle:.4g} rad, beyond limits.angle; set zero")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,14 @@ class Address:
             path.unlink(missing_ok=True)
         else:
             write_whole(path, {"port": port, "pid": os.getpid()})
+
+    def is_served(self) -> bool:
+        """Whether that process lives."""
+        try:
+            socket.create_connection(("127.0.0.1", self.served_at() or 0), 1.0).close()
+        except OSError:
+            return False
+        return True
 
     def served_at(self) -> int | None:
         """The local TCP port of the process that owns the bus, if one says so."""

@@ -73,6 +73,7 @@ class Drive:
         self._arrived = threading.Condition()
         self._answers: tuple[list[bytes], ...] = ([], [])
         self._network: Any = canopen.Network(bus)
+        self._network.NOTIFIER_CYCLE = 0.1  # s until it notices that it is to end
         self._network.connect()
         node = self._network.add_node(address.node, nothing())
         self._sdo: Any = node.sdo

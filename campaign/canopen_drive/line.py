@@ -108,22 +108,19 @@ class Desk:
         self._at_work: threading.Thread | None = None
 
     def feed(self, data: bytes) -> bytes:
-        """The answers to what has come."""
-        answers = b""
+        """The answers to what has come: one for all of a kind."""
+        answers = {}
         for frame in self._decoder.feed(data):
-            try:
-                message = decode(frame.kind, frame.body)
-            except WireError:
-                continue
+            with contextlib.suppress(WireError):
+                answers[frame.kind] = frame.sequence, decode(frame.kind, frame.body)
+        told = b""
+        for sequence, message in answers.values():
             if isinstance(message, Safe):
                 self._safe(message)
-                status = self._status()
-                answers += _frame(Ack(frame.sequence, Kind.SAFE, status.state, 1))
-                answers += _frame(status) + _frame(self._latched())
+                told += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
             elif isinstance(message, Query):
-                held = Holder(bool(self._host), 0.0 if self._host else None, self._host)
-                answers += _frame(self._status()) + _frame(self._latched()) + _frame(held)
-        return answers
+                told += _frame(Holder(bool(self._host), 0.0 if self._host else None, self._host))
+        return told + _frame(self._status()) + _frame(self._latched()) if told else b""
 
     def _safe(self, message: Safe) -> None:
         by = printable(message.host) or "somebody who did not say who"

@@ -54,6 +54,7 @@ class Player:
 
     def __init__(self, client: Client, base: Mapping[str, Any], stop: Callable[[], bool]) -> None:
         self._client, self._base, self._stop = client, base, stop
+        self._halted = False
 
     def rows(
         self, job: Mapping[str, Any], expected: str = "played"
@@ -95,7 +96,8 @@ class Player:
         for item in self._items(job):
             if "sample" in item:
                 rows.append(item["sample"])
-            if len(rows) * period >= BLOCK or "sample" not in item:
+            # What comes after a stop is handed over at once, at the end.
+            if (len(rows) * period >= BLOCK and not self._halted) or "sample" not in item:
                 flush()
             if "lost" in item:
                 recorder.lost(np.array([item["lost"] * period]))
@@ -109,7 +111,8 @@ class Player:
 
         Signs of life are sent from here alone: who hangs with a sample in hand sends none.
         """
-        client, halted, alive = self._client, False, 0.0
+        client, alive = self._client, 0.0
+        self._halted = False
         client.play({**self._base, **job})
         heard = time.monotonic()
         while True:
@@ -117,9 +120,9 @@ class Player:
             if now - alive > KEEP_ALIVE:
                 client.tell("alive")
                 alive = now
-            if not halted and self._stop():
+            if not self._halted and self._stop():
                 client.tell("halt")
-                halted = True
+                self._halted = True
             item: dict[str, Any] | None = {}
             with contextlib.suppress(queue.Empty):
                 item = client.played.get(timeout=KEEP_ALIVE)
@@ -139,6 +142,8 @@ def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
     why = str(end["why"])
     safe = SafeState.CONFIRMED if end["safe"] else SafeState.NOT_CONFIRMED
     codes = [code for code, _ in end["emcy"]]
+    if not codes and end.get("error") and why.startswith("state"):
+        codes = [end["error"]]
     outcome, fault = Outcome.FAULT, None
     word = why.partition(":")[0]
     if codes and not why.startswith(("stopped", "panic stop", "host")):
@@ -150,7 +155,7 @@ def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
         outcome = Outcome.INTERRUPTED
         why = "stopped by the operator" if why == "stopped" else why
     elif word == "limit":
-        outcome = Outcome.LIMIT
+        outcome, why = Outcome.LIMIT, f"{why.partition(': ')[2]} (in numbers of the drive)"
     elif word == "lost" and not end["safe"]:
         fault, why = Fault.LOST_CONNECTION, f"the drive does not answer any more ({why})"
     else:

@@ -62,7 +62,7 @@ class Relay:
     def __init__(self, drive: Drive, out: BinaryIO) -> None:
         self.drive, self._out = drive, out
         self.latch = Latch(drive.address.latch_file)
-        self._telling, self._commanding = threading.Lock(), threading.Lock()
+        self._telling, self._commanding = threading.Lock(), threading.RLock()
         self._halted = HOST_STOP  # why nothing may enable the drive; empty during a trial
         self._armed = False
         self._cancelled = -1  # the last request that a stop came after
@@ -234,11 +234,11 @@ class Relay:
         finally:
             self.halt(why or "played")
             self._muted = False
-            with contextlib.suppress(DriveError):
-                fault = drive.read(od.ERROR_CODE)
             safe = drive.bring_to_rest(LAST_WORDS if self._halted == HOST_SILENT else REST)
             self._quiet = self._halted == HOST_SILENT
             self._armed = False
+        with contextlib.suppress(DriveError):
+            fault = drive.read(od.ERROR_CODE)
         if drive.boots != boots:
             why = "reset: the drive has started anew"
         return {"why": why, "safe": safe, "error": fault, "emcy": drive.emergencies[:], **seen}
@@ -346,7 +346,10 @@ def main(text: str) -> int:
         if hasattr(signal, stop):
             signal.signal(getattr(signal, stop), signal.SIG_IGN)
     try:
-        drive = Drive(address_of(text))
+        address = address_of(text)
+        if address.is_served():
+            raise UsageError(f"port {text!r}: another process of this computer has the drive")
+        drive = Drive(address)
     except UsageError as error:
         sys.stdout.buffer.write(json.dumps({"opened": False, "error": str(error)}).encode() + b"\n")
         return 2
