@@ -256,8 +256,10 @@ class CanopenBackend:
             "patience": self._late(1 / task.sample_rate),
         }
         player = Player(client, base, lambda: stop() or self._urgent.is_set())
+        proof = Proof(client, player.rows, scale, limits)
         try:
-            self._prove(client, trial, Proof(client, player.rows, scale, limits))
+            self._prove(client, trial, proof)
+            proof.goes_to(round(task.start_angle * scale.position), fast=True)
         except EndedError as error:
             return ending_of(error.end, {})
         targets = targets_of(task)
@@ -318,12 +320,12 @@ class CanopenBackend:
             proof.moves_as_commanded()
             proof.stops_in_silence(self._options.heartbeat)
             self._in_fault(client)  # its own, which is cleared
-            proof.goes_back(here)
+            proof.goes_to(here)
             self._proved.add("moves")
         if trial.task.mode == "torque" and "speed limit" not in self._proved:
             peak = float(np.max(np.abs(targets_of(trial.task).values)))
             proof.keeps_speed_limit(min(peak, proof.limits.torque))
-            proof.goes_back(here)
+            proof.goes_to(here)
             self._proved.add("speed limit")
 
     # Rest

@@ -19,6 +19,8 @@ INTERVAL = 0.02
 """s between two commands on the way to rest."""
 REST_TIME = 0.1
 """s in which a drive at rest moves by `Address.rest` increments at most."""
+READINGS = 5
+"""In a row, of a drive that is off."""
 SYNC = 0x80
 OPERATIONAL, PREOPERATIONAL = 0x01, 0x80
 """Commands of NMT."""
@@ -137,12 +139,11 @@ class Drive:
         self.send(SYNC, b"" if counter is None else bytes((counter,)))
         return not doubled
 
-    def sample(self, deadline: float) -> tuple[int, ...] | None:
-        """The values of `MAPPED` that answer the last SYNC; None without them."""
+    def sample(self, patience: float) -> tuple[int, ...] | None:
+        """The values of `MAPPED` that answer the last SYNC; None without them for so long (s)."""
         with self._arrived:
-            while not all(self._answers):
-                if not self._arrived.wait(max(0.0, deadline - time.monotonic())):
-                    return None
+            if not self._arrived.wait_for(lambda: all(self._answers), patience):
+                return None
             frames = [each[0] for each in self._answers]
         values: list[int] = []
         for items, data in zip(MAPPED, frames, strict=True):
@@ -185,7 +186,7 @@ class Drive:
         that stands.
         """
         deadline = time.monotonic() + patience
-        watch, state, at_rest = RestWatch(self.address.rest), None, False
+        watch, state, at_rest, off = RestWatch(self.address.rest), None, False, 0
         while True:
             word = stop_word(state, at_rest=at_rest)
             with contextlib.suppress(DriveError):
@@ -197,7 +198,8 @@ class Drive:
             except DriveError:
                 watch.unseen()
                 state, at_rest = None, False
-            if state is not None and state.off and at_rest:
+            off = off + 1 if state is not None and state.off else 0
+            if off >= READINGS and at_rest:
                 return True
             if time.monotonic() >= deadline:
                 return False

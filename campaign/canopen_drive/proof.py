@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +25,10 @@ TOLERANCE = 0.2
 """Relative, of the measured rate."""
 REACTION = 2.0
 """s beyond three times the heartbeat in which the drive stops by itself."""
+FAST = 0.5
+"""Of the rate limit, on the way to where a trial starts."""
+CLOSE = 5
+"""Samples of slow motion: nearer it does not go."""
 HOLD = 0.5
 """s at the largest torque, at the limit of speed."""
 OVERSHOOT, UNBOUNDED = 1.5, 8.0
@@ -105,14 +110,14 @@ class Proof:
                 + (f" ({end['why']})" if end["why"] else "")
             )
 
-    def goes_back(self, position: int) -> None:
-        """To where it was, at the slow rate."""
-        way = position - self.drive.read(od.POSITION)
-        rate = self.slow * abs(self.scale.position)
-        count = round(abs(way) / rate * RATE)
-        raw = round(self.slow * abs(self.scale.rate)) * (1 if way > 0 else -1)
-        if count > 1:
-            self._rate([raw] * count + [0] * round(LEG * RATE / 5))
+    def goes_to(self, position: int, *, fast: bool = False) -> None:
+        """To a position of the drive: fast first, where that is wanted, then slowly."""
+        for rate in (FAST * self.limits.rate, self.slow) if fast else (self.slow,):
+            way = position - self.drive.read(od.POSITION)
+            count = round(abs(way / self.scale.position) / rate * RATE)
+            raw = math.copysign(rate * abs(self.scale.rate), way)
+            if count > CLOSE:
+                self._rate([round(raw)] * count + [0] * round(LEG * RATE / 5))
 
     def _speed_limits(self) -> list[od.Item]:
         found = []

@@ -21,6 +21,7 @@ from typing import Any, BinaryIO
 from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.address import address_of
 from campaign.canopen_drive.drive import (
+    INTERVAL,
     OPERATIONAL,
     PREOPERATIONAL,
     Drive,
@@ -284,7 +285,11 @@ class Relay:
                 single = drive.sync(number % od.COUNTED + 1 if job["counted"] else None)
             late = time.monotonic() - due
             seen["late"] = max(seen["late"], late)
-            sample = drive.sample(due + period + patience)
+            while (sample := drive.sample(INTERVAL)) is None:
+                if time.monotonic() > due + period + patience or self._halted:
+                    break
+            if self._halted:
+                raise Halted
             if sample is None or not single:
                 self._tell({"lost": number})
                 return "lost: an answer to SYNC is " + ("missing" if single else "doubled")

@@ -83,6 +83,10 @@ TICK = 0.005
 """s of the wall clock between two looks at it."""
 STEP = 1e-3
 """s of the axis."""
+STRIBECK, PRESLIDING = 0.02, 0.01
+"""rad/s, rad."""
+STILL = 1e-3
+"""rad/s; slower it is at rest."""
 NO_SYNC = 0.5
 """s of the wall clock after which an enabled axis goes on without SYNC."""
 
@@ -114,7 +118,9 @@ class SimulatedDrive:
     """One drive.
 
     Attributes:
-        log: what happened, in order: ("word", w), ("state", name), ("moves",), ("rest",).
+        peak_friction: the largest torque of it (N m) while it was enabled last.
+        log: what happened, in order: ("word", w), ("state", name, angle), ("moves", angle),
+            ("rest", angle).
         quirks: what is wrong with it; see the tests.
         speed: of its clock for heartbeats, where the relay's is faster, too.
     """
@@ -135,6 +141,8 @@ class SimulatedDrive:
         self.quirks, self.stiff, self.speed = quirks, stiff, float(quirks.pop("speed", 1.0))
         self.log: list[tuple[Any, ...]] = []
         self.state, self.rate, self.angle, self.torque = "switch on disabled", 0.0, 0.0, 0.0
+        self.bristle, self.moves, self.peak_friction = 0.0, False, 0.0
+        self.peak_rate = 0.0
         self.reference = self.ramp = self.integral = 0.0
         self.error = self.last = 0
         self.operational = self.closed = False
@@ -191,7 +199,7 @@ class SimulatedDrive:
             time.sleep(0.005)
 
     def at_rest_and_off(self) -> bool:
-        return self.state in OFF and self.rate == 0.0
+        return self.state in OFF and not self.moves
 
     # The bus
 
@@ -236,7 +244,7 @@ class SimulatedDrive:
                 count = self.get(0x1A00 + number, 0)
                 entries = [self.get(0x1A00 + number, n) for n in range(1, 1 + count)]
                 raw = b"".join(self._value(each >> 16) for each in entries)
-                if not cob >> 31 and "mute tpdo" not in self.quirks:
+                for _ in range(self.quirks.get("frames", lambda syncs: 1)(self.syncs)):
                     self.network.send_message(cob, raw)
             self._advance(self.get(0x1006) * 1e-6)
 
@@ -276,8 +284,9 @@ class SimulatedDrive:
     def become(self, state: str) -> None:
         if state != self.state:
             self.state = state
-            self.log.append(("state", state))
+            self.log.append(("state", state, self.angle))
             self.integral, self.reference, self.ramp = 0.0, self.rate, 0.0
+            self.peak_friction *= state != "enabled"
 
     def control(self, word: int) -> None:  # noqa: C901 - a table of the standard
         with self._lock:
@@ -345,19 +354,20 @@ class SimulatedDrive:
     def _advance(self, duration: float) -> None:
         steps = max(1, round(duration / STEP))
         for _ in range(steps):
-            was = self.rate
             self.torque = self._drive()
             self._move()
-            if (self.rate != 0.0) != (was != 0.0):
-                self.log.append(("moves",) if self.rate else ("rest",))
+            if self.moves != (abs(self.rate) > (0.5 if self.moves else 1.0) * STILL):
+                self.moves = not self.moves
+                self.log.append(("moves" if self.moves else "rest", self.angle))
 
     def _drive(self) -> float:
         """Torque of the next step."""
-        most = min(self.get(0x6072), self.get(0x60E0), self.get(0x60E1)) * 1e-3 * 10.0
+        limits = [i for i in (0x6072, 0x60E0, 0x60E1) if i in self.node.object_dictionary]
+        most = min([1000, *map(self.get, limits)]) * 1e-3 * 10.0
         unit = 60e3 / (2 * math.pi)
         if self.state in ("quick stop", "fault reaction"):
             self._slew(0.0, self.get(0x6085) / unit)
-            if self.rate == 0.0 and self.reference == 0.0:
+            if abs(self.rate) < STILL and self.reference == 0.0:
                 stays = self.state == "quick stop" and self.get(0x605A) >= 5
                 if not stays:
                     self.become("fault" if self.state == "fault reaction" else "switch on disabled")
@@ -365,12 +375,17 @@ class SimulatedDrive:
         elif self.state != "enabled":
             return 0.0
         elif self.get(0x6060) == 3:
-            most_rate = min(self.get(0x607F) / unit, self.get(0x6080) * 2 * math.pi / 60)
+            most_rate = self._fastest(unit)
             target = self.get(0x60FF) / unit
             self._slew(max(-most_rate, min(target, most_rate)), self.get(0x6083) / unit)
         else:
             return self._limited_torque(most, unit)
         return self._rate_loop(self.reference, most)
+
+    def _fastest(self, unit: float) -> float:
+        scales = {0x607F: unit, 0x6080: 60 / (2 * math.pi)}
+        there = [self.get(i) / scales[i] for i in scales if i in self.node.object_dictionary]
+        return min([1e3, *there])
 
     def _slew(self, target: float, slope: float) -> None:
         step = slope * STEP
@@ -387,7 +402,7 @@ class SimulatedDrive:
         step = self.get(0x6087) * 1e-3 * 10.0 * STEP
         self.ramp += max(-step, min(target - self.ramp, step))
         torque = max(-most, min(self.ramp, most))
-        fastest = min(self.get(0x607F) / unit, self.get(0x6080) * 2 * math.pi / 60)
+        fastest = self._fastest(unit)
         if "no speed limit" in self.quirks:
             return torque
         way = math.copysign(1.0, torque)
@@ -397,11 +412,23 @@ class SimulatedDrive:
         return way * max(-most, min(abs(torque), limit))
 
     def _move(self) -> None:
-        if self.rate == 0.0 and abs(self.torque) <= self.static:
-            return
-        gain = STEP / self.inertia / (1.0 + STEP * self.viscous / self.inertia)
-        free = self.rate / (1.0 + STEP * self.viscous / self.inertia) + gain * self.torque
-        loss = gain * self.coulomb
+        """LuGre: bristles with a Stribeck curve, their damping and the viscous part implicit."""
         before = self.rate
-        self.rate = math.copysign(max(0.0, abs(free) - loss), free)
-        self.angle += 0.5 * (before + self.rate) * STEP
+        fall = math.exp(-((before / STRIBECK) ** 2))
+        level = self.coulomb + (self.static - self.coulomb) * fall
+        stiffness = self.static / PRESLIDING
+        damping = 1.6 * math.sqrt(stiffness * self.inertia)
+        # dz/dt = v (1 - sign(v) stiffness z / level)
+        slip = 1.0 - math.copysign(1.0, before) * stiffness * self.bristle / level
+        damping *= slip
+        free = self.torque - stiffness * self.bristle
+        self.rate = (before + STEP / self.inertia * free) / (
+            1.0 + STEP / self.inertia * (damping + self.viscous)
+        )
+        self.bristle += STEP * (self.rate - stiffness * abs(self.rate) / level * self.bristle)
+        rate = 0.5 * (before + self.rate)
+        self.angle += rate * STEP
+        friction = self.torque - self.inertia * (self.rate - before) / STEP
+        self.peak_rate = max(self.peak_rate, abs(self.rate))
+        if self.state == "enabled":
+            self.peak_friction = max(self.peak_friction, abs(friction))
