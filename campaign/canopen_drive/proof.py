@@ -17,9 +17,9 @@ from campaign.physics.bench import LimitsOptions
 
 RATE = 100.0
 """Hz."""
-LEG = 1.0
+LEG = 2.0
 """s of a slow move, one way."""
-RATE_SHARE, ANGLE_SHARE = 0.1, 0.05
+RATE_SHARE, ANGLE_SHARE = 0.1, 0.1
 """Of the limits: how fast and how far it goes."""
 TOLERANCE = 0.2
 """Relative, of the measured rate."""
@@ -56,9 +56,9 @@ class Proof:
         """There and back: commanded rate against position and velocity. Raises DriveError."""
         raw, count = round(self.slow * self.scale.rate), round(LEG * RATE)
         way = raw if self.drive.read(od.POSITION) * self.scale.position <= 0 else -raw
-        rows = self._rate([way] * count + [-way] * count + [0] * (count // 5))
+        rows = self._rate([way] * count + [-way] * count + [0] * (count // 10))
         for leg, target in ((rows[:count], way), (rows[count : 2 * count], -way)):
-            settled = leg[count // 2 :]
+            settled = leg[3 * count // 4 :]
             travel = (settled[-1, 3] - settled[0, 3]) / (len(settled) - 1) * RATE
             wanted = target / self.scale.rate
             for name, rate in (
@@ -76,7 +76,7 @@ class Proof:
         """Moves slowly while the heartbeat (s) falls silent. Raises DriveError if it goes on."""
         raw = round(self.slow * self.scale.rate)
         way = raw if self.drive.read(od.POSITION) * self.scale.position <= 0 else -raw
-        count = round(0.5 * LEG * RATE)
+        count = round(LEG / 4 * RATE)
         mute = {"mute": count - 1, "mute_patience": 3 * heartbeat + REACTION}
         _, end = self.play(self._job([way] * count, od.PROFILE_VELOCITY) | mute)
         if not end["reacted"]:
@@ -89,14 +89,18 @@ class Proof:
         slow, here = self.slow, self.drive.read(od.POSITION)
         had = {item: self.drive.read(item) for item in self._speed_limits()}
         way = 1.0 if here * self.scale.position <= 0 else -1.0
-        ramp = np.append(np.linspace(0, peak, round(LEG * RATE)), np.full(round(HOLD * RATE), peak))
+        ramp = np.append(
+            np.linspace(0, peak, round(LEG / 2 * RATE)), np.full(round(HOLD * RATE), peak)
+        )
         job = self._job(np.rint(way * ramp * self.scale.torque), od.PROFILE_TORQUE)
         job["fastest"] = round(UNBOUNDED * slow * abs(self.scale.rate))
         try:
             for item in had:
                 factor = self.scale.motor_rate if item is od.MAX_MOTOR_SPEED else self.scale.rate
                 written(self.drive, item, max(1, round(slow * abs(factor))))
-            self.drive.write(od.TORQUE_SLOPE, max(1, round(peak * abs(self.scale.torque) / LEG)))
+            self.drive.write(
+                od.TORQUE_SLOPE, max(1, round(2 * peak * abs(self.scale.torque) / LEG))
+            )
             rows, end = self.play(job, "limit: velocity")
         finally:
             for item, value in had.items():
@@ -117,7 +121,7 @@ class Proof:
             count = round(abs(way / self.scale.position) / rate * RATE)
             raw = math.copysign(rate * abs(self.scale.rate), way)
             if count > CLOSE:
-                self._rate([round(raw)] * count + [0] * round(LEG * RATE / 5))
+                self._rate([round(raw)] * count + [0] * round(LEG / 10 * RATE))
 
     def _speed_limits(self) -> list[od.Item]:
         found = []

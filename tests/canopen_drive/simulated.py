@@ -8,6 +8,7 @@ for each, however late it is. Otherwise it is the wall clock's.
 from __future__ import annotations
 
 import math
+import random
 import struct
 import threading
 import time
@@ -41,9 +42,9 @@ OBJECTS: dict[int, tuple[str, dict[int, int]]] = {
     0x6065: ("I", {0: 100000}),
     0x606C: ("i", {0: 0}),
     0x6071: ("h", {0: 0}),
-    0x6072: ("H", {0: 1000}),
-    0x6075: ("I", {0: 5000}),
-    0x6076: ("I", {0: 10000}),
+    0x6072: ("H", {0: 5000}),
+    0x6075: ("I", {0: 1000}),
+    0x6076: ("I", {0: 2000}),
     0x6077: ("h", {0: 0}),
     0x6078: ("h", {0: 0}),
     0x607D: ("i", {1: -(2**31), 2: 2**31 - 1}),
@@ -58,8 +59,8 @@ OBJECTS: dict[int, tuple[str, dict[int, int]]] = {
     0x60A9: ("I", {0: 0xFDB44700}),  # 1/1000 of 1/min
     0x60C5: ("I", {0: 2**32 - 1}),
     0x60C6: ("I", {0: 2**32 - 1}),
-    0x60E0: ("H", {0: 1000}),
-    0x60E1: ("H", {0: 1000}),
+    0x60E0: ("H", {0: 5000}),
+    0x60E1: ("H", {0: 5000}),
     0x60FF: ("i", {0: 0}),
 }
 RECORDS: dict[int, tuple[str, ...]] = {
@@ -85,6 +86,8 @@ STEP = 1e-3
 """s of the axis."""
 STRIBECK, PRESLIDING = 0.02, 0.01
 """rad/s, rad."""
+RATED = 2.0
+"""N m."""
 STILL = 1e-3
 """rad/s; slower it is at rest."""
 NO_SYNC = 0.5
@@ -254,14 +257,20 @@ class SimulatedDrive:
 
     def _measured(self, index: int) -> float:
         per_turn = 2 * math.pi
+        noise, draw = self.quirks.get("noise", 0.0), random.Random(self.syncs)
         limited = 0x0800 if self.quirks.get("limit bit") else 0
         values = {
             0x6041: STATUS[self.state] | limited,
             0x6061: self.get(0x6060),
             0x6064: round(self.angle / per_turn * (1 << 20) * self.quirks.get("scale", 1)),
-            0x606C: round(self.rate / per_turn * 60e3 * self.quirks.get("sign", 1)),
-            0x6077: round(self.torque / 10.0 * 1000),
-            0x6078: round(self.torque / 10.0 * 1000),
+            0x606C: round(
+                (self.rate + draw.gauss(0.0, 0.1 * noise))
+                / per_turn
+                * 60e3
+                * self.quirks.get("sign", 1)
+            ),
+            0x6077: round((self.torque + draw.gauss(0.0, noise)) / RATED * 1000),
+            0x6078: round(self.torque / RATED * 1000),
             0x603F: self.error,
         }
         return values[index] if index in values else self.get(index)
@@ -363,7 +372,7 @@ class SimulatedDrive:
     def _drive(self) -> float:
         """Torque of the next step."""
         limits = [i for i in (0x6072, 0x60E0, 0x60E1) if i in self.node.object_dictionary]
-        most = min([1000, *map(self.get, limits)]) * 1e-3 * 10.0
+        most = min([5000, *map(self.get, limits)]) * 1e-3 * RATED
         unit = 60e3 / (2 * math.pi)
         if self.state in ("quick stop", "fault reaction"):
             self._slew(0.0, self.get(0x6085) / unit)
@@ -398,8 +407,8 @@ class SimulatedDrive:
 
     def _limited_torque(self, most: float, unit: float) -> float:
         """Torque mode: a rate loop takes over at the limit of speed."""
-        target = self.get(0x6071) * 1e-3 * 10.0
-        step = self.get(0x6087) * 1e-3 * 10.0 * STEP
+        target = self.get(0x6071) * 1e-3 * RATED
+        step = self.get(0x6087) * 1e-3 * RATED * STEP
         self.ramp += max(-step, min(target - self.ramp, step))
         torque = max(-most, min(self.ramp, most))
         fastest = self._fastest(unit)

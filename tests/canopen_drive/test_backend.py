@@ -189,7 +189,7 @@ def test_a_drive_that_goes_on_without_a_heartbeat_is_refused(drives: Make) -> No
 
 TORQUE: dict[str, Any] = {
     "mode": "torque", "duration": 2.0, "window": (0.0, 2.0),
-    "command": {"shape": "polyline", "times": [0.0, 2.0], "values": [0.0, 2.5]},
+    "command": {"shape": "polyline", "times": [0.0, 2.0], "values": [0.0, 1.8]},
 }  # fmt: skip
 
 
@@ -201,7 +201,7 @@ def test_torque_needs_a_limit_of_speed_that_acts(drives: Make) -> None:
 
 
 def test_a_torque_that_moves_nothing_shows_no_limit_of_speed(drives: Make) -> None:
-    name, drive = drives(static=2.7, coulomb=2.6)
+    name, drive = drives(static=2.0, coulomb=1.9)
     refused(name, drive, "no limit of speed was seen to act", **TORQUE)
 
 
@@ -209,17 +209,17 @@ def test_limits_of_the_bench_are_in_the_drive_during_a_trial_and_its_own_after(
     drives: Make,
 ) -> None:
     name, drive = drives()
-    drive.put(0x60E0, 400)
+    drive.put(0x60E0, 2000)
     with backend(name) as connected:
         execute(connected, trial())
         found = {index: drive.get(index) for index in (0x6072, 0x60E0, 0x607F, 0x6080)}
         soft = drive.get(0x607D, 1), drive.get(0x607D, 2)
-    assert found[0x6072] == 600  # 6 N m of 10, in per mille
-    assert found[0x60E0] == 400, "its own is narrower"
+    assert found[0x6072] == 3000  # 6 N m of 2, in per mille
+    assert found[0x60E0] == 2000, "its own is narrower"
     assert found[0x607F] == pytest.approx(60e3 / (2 * np.pi), abs=1)  # 1 rad/s in 1e-3/min
     assert found[0x6080] == 9  # 1/min, rounded down
     assert soft == pytest.approx((-(2**20) / (2 * np.pi), 2**20 / (2 * np.pi)), abs=1)
-    assert (drive.get(0x6072), drive.get(0x60E0), drive.get(0x6080)) == (1000, 400, 3000)
+    assert (drive.get(0x6072), drive.get(0x60E0), drive.get(0x6080)) == (5000, 2000, 3000)
 
 
 def test_a_drive_in_fault_is_not_moved_and_its_fault_is_told(drives: Make) -> None:

@@ -38,7 +38,7 @@ RAMPS = {
 
 def executed(kind: str, options: dict[str, Any], drives: Make) -> tuple[list[Done], list[float]]:
     """All trials, and the largest friction of each."""
-    name, drive = drives(coulomb=1.0, static=1.5, viscous=0.5)
+    name, drive = drives(coulomb=1.0, static=1.5, viscous=0.5, noise=0.005)
     done, peaks = [], []
     with backend(name) as connected:
         for trial in trials(kind, DESK, options):
