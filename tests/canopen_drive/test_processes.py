@@ -1,0 +1,160 @@
+"""A relay as a process, over slcan: what of the host is killed or hangs, and what the bus loses."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from campaign.backends.canopen import CanopenBackend, CanopenOptions
+from campaign.recording import Fault, Outcome, SafeState
+from tests.canopen_drive.hub import Hub, cut
+from tests.canopen_drive.rig import PATIENT, channel, execute, trial
+from tests.canopen_drive.simulated import SimulatedDrive
+from tests.canopen_drive.test_backend import stays_off
+from tests.system.user import ROOT
+
+posix = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@contextmanager
+def rig() -> Iterator[tuple[SimulatedDrive, Hub]]:
+    name = channel()
+    with SimulatedDrive(name) as drive, Hub(name) as hub:
+        yield drive, hub
+
+
+@contextmanager
+def host(hub: Hub, drive: SimulatedDrive, **options: Any) -> Iterator[subprocess.Popen[str]]:
+    """A program in the midst of its trial: faster than any motion that proves the drive."""
+    settings = {**PATIENT, "port": hub.port, **options}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.canopen_drive.host", json.dumps(settings)],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+    try:
+        drive.wait(lambda: process.poll() is not None or abs(drive.rate) > 0.3)
+        assert process.poll() is None, process.communicate()
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=60)
+
+
+def states(drive: SimulatedDrive, since: int) -> list[str]:
+    return [event[1] for event in drive.log[since:] if event[0] == "state"]
+
+
+def gone(hub: Hub, drive: SimulatedDrive) -> None:
+    drive.wait(lambda: not hub.clients)
+
+
+@posix
+def test_a_killed_host_leaves_the_drive_at_rest_and_the_bus_silent() -> None:
+    with rig() as (drive, hub), host(hub, drive) as process:
+        since = len(drive.log)
+        process.kill()
+        stays_off(drive, since)
+        assert states(drive, since)[0] == "quick stop", "the relay stops it, before its heartbeat"
+        gone(hub, drive)
+        beats = hub.beats
+        drive.wait(lambda: drive.state == "fault")  # nobody sends a heartbeat
+        assert hub.beats == beats
+        stays_off(drive, since)
+
+
+@posix
+def test_a_host_that_hangs_is_silent_and_the_relay_stops_the_drive() -> None:
+    with rig() as (drive, hub), host(hub, drive, silence=1.0) as process:
+        since = len(drive.log)
+        process.send_signal(signal.SIGSTOP)
+        stays_off(drive, since)
+        assert states(drive, since)[0] == "quick stop"
+        drive.wait(lambda: drive.state == "fault")  # its heartbeat has ended
+        assert hub.clients, "the relay is there, and silent"
+        process.send_signal(signal.SIGCONT)
+        out, _ = process.communicate(timeout=60)
+        assert out.split() == ["heartbeat", "confirmed"]
+        stays_off(drive, since)
+
+
+@posix
+def test_a_killed_relay_is_the_drives_own_business(state_folder: Path) -> None:
+    with rig() as (drive, hub), host(hub, drive) as process:
+        since = len(drive.log)
+        (served,) = (state_folder / "campaign" / "canopen").glob("*.port.json")
+        os.kill(json.loads(served.read_text())["pid"], signal.SIGKILL)
+        out, _ = process.communicate(timeout=60)
+        assert out.split() == ["lost-connection", "confirmed"]
+        stays_off(drive, since)
+        assert states(drive, since)[0] == "fault reaction"
+
+
+def test_a_pulled_cable_is_the_drives_own_business() -> None:
+    with rig() as (drive, hub), host(hub, drive, late=2.0) as process:
+        since = len(drive.log)
+        hub.fate = cut
+        stays_off(drive, since)
+        assert states(drive, since)[0] == "fault reaction"
+        out, _ = process.communicate(timeout=90)
+        assert out.split() == ["lost-connection", "not", "confirmed"]
+        hub.fate = lambda to_drive, cob, data: [0.0]
+        stays_off(drive, since)
+
+
+@contextmanager
+def connected(hub: Hub, **options: Any) -> Iterator[CanopenBackend]:
+    settings = {**PATIENT, "port": hub.port, **options}
+    backend = CanopenBackend(CanopenOptions.model_validate(settings, context={"si": True}))
+    with backend:
+        first, _ = execute(backend, trial())
+        assert first.outcome is Outcome.COMPLETED, first
+        yield backend
+
+
+def test_delayed_frames_move_no_sample() -> None:
+    """Each SYNC waits for the answers to the last: the samples are those of a fast bus."""
+    draw = random.Random(4)
+    with rig() as (drive, hub), connected(hub) as backend:
+        drive.angle = drive.bristle = drive.rate = 0.0
+        _, quick = execute(backend, trial())
+        hub.fate = lambda to_drive, cob, data: [draw.choice((0.0, 0.0, 0.0, 0.012))]
+        drive.angle = drive.bristle = drive.rate = 0.0
+        ending, slow = execute(backend, trial())
+        assert ending.outcome is Outcome.COMPLETED, ending
+        for name in ("relative_rate", "drive_torque"):
+            assert np.allclose(quick[name], slow[name], atol=0.02), name
+
+
+@pytest.mark.parametrize("copies", [0, 2])
+@pytest.mark.parametrize("cob", [0x80, 0x185])
+def test_a_lost_or_doubled_frame_ends_the_trial_at_rest(cob: int, copies: int) -> None:
+    """SYNC, and an answer to it."""
+    with rig() as (drive, hub), connected(hub, late=5.0) as backend:
+        left = [100]
+
+        def harm(to_drive: bool, number: int, data: bytes) -> list[float]:
+            left[0] -= number == cob
+            return [0.0] * copies if number == cob and left[0] == 0 else [0.0]
+
+        hub.fate = harm
+        ending, recording = execute(backend, trial())
+        since = len(drive.log)
+        assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES), ending
+        assert ending.safe_state is SafeState.CONFIRMED
+        assert np.isnan(recording["relative_rate"][-1])
+        assert 95 <= len(recording.time) <= 105
+        stays_off(drive, since)
