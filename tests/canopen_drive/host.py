@@ -8,7 +8,7 @@ import sys
 from campaign.backends.canopen import BACKEND, CanopenOptions
 from tests.canopen_drive.rig import execute, trial
 
-SWING = {"shape": "sine", "amplitude": 0.4, "frequency": 0.25}
+SWING = {"shape": "sine", "amplitude": 0.8, "frequency": 0.5}
 
 
 def main(options: str) -> None:

@@ -149,7 +149,7 @@ class SimulatedDrive:
         self.reference = self.ramp = self.integral = 0.0
         self.error = self.last = 0
         self.operational = self.closed = False
-        self.syncs = 0
+        self.syncs = self.counter = 0
         self._beat: float | None = None  # own time since the last heartbeat; None before the first
         self._since_sync = math.inf
         self._lock = threading.RLock()
@@ -234,8 +234,10 @@ class SimulatedDrive:
         with self._lock:
             counts = self.get(0x1019) if 0x1019 in self.node.object_dictionary else 0
             assert len(data) == (1 if counts else 0), "SYNC and 1019h differ"
+            if counts and data[0] == self.counter:
+                return  # the same SYNC again
             if counts:
-                assert data[0] == self.syncs % counts + 1 or data[0] == 1, data[0]
+                self.counter = data[0]
                 self.syncs = 0 if data[0] == 1 else self.syncs
             self.syncs += 1
             self._since_sync = 0.0
@@ -276,6 +278,8 @@ class SimulatedDrive:
         return values[index] if index in values else self.get(index)
 
     def _reads(self, *, index: int, subindex: int, od: Any) -> int | None:
+        if index in self.quirks.get("stubborn", ()):
+            return int(od.default)  # whatever was written
         if index in (0x6041, 0x6061, 0x6064, 0x606C, 0x6077, 0x6078, 0x603F):
             value = int(self._measured(index))
             self.on_read(index)

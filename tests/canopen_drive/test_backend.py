@@ -155,6 +155,12 @@ def test_a_reaction_that_cannot_be_set_is_refused(drives: Make) -> None:
         pass
 
 
+def test_a_reaction_that_is_not_kept_is_refused(drives: Make) -> None:
+    name, _ = drives(stubborn=(0x605A,))
+    with pytest.raises(BackendError, match="605Ah"), backend(name):
+        pass
+
+
 def refused(name: str, drive: SimulatedDrive, what: str, **task: Any) -> None:
     with backend(name) as connected:
         ending, _ = execute(connected, trial(**task))
