@@ -73,6 +73,13 @@ def test_an_emergency_message_ends_the_trial_as_the_fault_that_it_names(
     assert ending.safe_state is SafeState.CONFIRMED
 
 
+def test_an_emergency_message_of_a_drive_that_goes_on_ends_the_trial(drives: Make) -> None:
+    name, drive = drives()
+    ending = ended(name, drive, lambda: drive.node.emcy.send(0x3210, 1, b""))
+    assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.DRIVE)
+    assert "3210h" in ending.reason
+
+
 def test_a_drive_that_leaves_its_state_without_a_word_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
     ending = ended(name, drive, lambda: drive.become("switched on"))

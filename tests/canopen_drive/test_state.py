@@ -51,6 +51,13 @@ def test_no_word_of_a_stop_enables_whatever_the_state_is_by_now(option: int) -> 
                     assert NEARNESS[drive.state] <= NEARNESS[actual], (read, word, actual)
 
 
+def test_no_state_as_read_lets_an_enabled_drive_coast() -> None:
+    """It may be enabled by now: only a quick stop that stands is switched off."""
+    for read in (*State, None):
+        assert stop_word(read, at_rest=False) == 0x0002
+        assert stop_word(read, at_rest=True) == (0x0002 if read is not State.QUICK_STOP else 0)
+
+
 def test_only_three_states_have_a_way_on() -> None:
     assert set(ENABLING) == {State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON}
 
