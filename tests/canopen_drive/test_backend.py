@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -306,6 +307,12 @@ def test_no_drive_is_said_as_what_it_is() -> None:
 )
 def test_a_port_that_is_none_is_said_with_its_form(port: str, told: str) -> None:
     with pytest.raises(UsageError, match=told), backend("", port=port):
+        pass
+
+
+def test_missing_packages_are_said_once_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "can", None)
+    with pytest.raises(UsageError, match=r"pip install 'campaign\[canopen\]'"), backend("x"):
         pass
 
 
