@@ -99,6 +99,7 @@ class CanopenBackend:
         self._scale: tuple[float, Scale] | None = None  # with the ratio that it is for
         self._own: dict[od.Item, int] = {}  # limits that the drive had
         self._proved: set[str] = set()
+        self._found = (0, 0)  # boots and 1016h, once its reactions were set
         self._busy = threading.RLock()
         self._urgent = threading.Event()  # set: the drive is being made safe, everything else ends
 
@@ -218,7 +219,7 @@ class CanopenBackend:
         """Set limits and ramps, prove the drive once, play the targets."""
         with self._busy:
             try:
-                client = self._client or self._connect()
+                client = self._still_set() or self._connect()
                 recorder.start(channels(trial.task.mode))
                 return self._execute(client, trial, recorder, stop)
             except (BackendError, UsageError) as error:
@@ -313,9 +314,9 @@ class CanopenBackend:
     def _prove(self, client: Client, trial: Trial, proof: Proof) -> None:
         """Once per connection, before the first motion of its kind. Raises DriveError."""
         ramp = max(1, round(proof.limits.acceleration * abs(proof.scale.rate)))
+        for item in (od.ACCELERATION, od.DECELERATION):
+            written(client, item, ramp)
         if "moves" not in self._proved:
-            for item in (od.ACCELERATION, od.DECELERATION):
-                written(client, item, ramp)
             proof.moves_as_commanded()
             proof.stops_in_silence(self._options.heartbeat)
             self._in_fault(client)  # its own, which is cleared
@@ -368,7 +369,7 @@ class CanopenBackend:
         client = self._client or self._opened()
         address = address_of(self._options.port)
         self._proved.clear()
-        self._scale = None
+        self._scale, self._found = None, (-1, -1)
         self._identify(client)
         if state_of(client.read(od.STATUSWORD)) is State.ENABLED:
             raise DriveError("it is enabled: another program moves it")
@@ -376,7 +377,15 @@ class CanopenBackend:
             client.ask("reset")
         set_pdos(client, address.node)
         set_reactions(client, address.host, self._options.heartbeat)
+        self._found = client.ask("boots"), client.read(od.CONSUMER)
         return client
+
+    def _still_set(self) -> Client | None:
+        """The connection, unless the drive has started anew, and forgotten its reactions."""
+        client = self._client
+        if client is not None and (client.ask("boots"), client.read(od.CONSUMER)) != self._found:
+            self._disconnect()
+        return self._client
 
     def _identify(self, client: Client) -> None:
         """Compare the EDS with the drive, which may be another one."""

@@ -141,6 +141,7 @@ class Relay:
             "read": lambda job: self.drive.read(_item(job)),
             "write": self._write,
             "nmt": lambda job: self.drive.nmt(job["command"]),
+            "boots": lambda job: self.drive.boots,
             "reset": self._reset,
             "jitter": self._jitter,
             "play": self._play,

@@ -120,6 +120,20 @@ def test_a_drive_that_starts_anew_ends_the_trial(drives: Make) -> None:
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.RESET)
 
 
+def test_a_drive_that_started_anew_between_trials_is_set_and_proved_again(drives: Make) -> None:
+    name, drive = drives()
+    with backend(name) as connected:
+        assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
+        drive.operational = False
+        for index, sub in ((0x1016, 1), (0x6007, 0), (0x1A00, 0), (0x1600, 0)):
+            drive.put(index, 0, sub)
+        since = len(drive.log)
+        assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
+        assert drive.get(0x1016, 1) == 127 << 16 | 2000
+        assert drive.get(0x6007) == 3
+        assert "fault" in [event[1] for event in drive.log[since:]], "its silence was not tried"
+
+
 def test_an_internal_limit_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
     ending = ended(name, drive, lambda: drive.quirks.update({"limit bit": True}))
