@@ -98,7 +98,7 @@ def test_a_host_that_hangs_is_silent_and_the_relay_stops_the_drive() -> None:
 
 @posix
 @pytest.mark.slow
-def test_a_killed_relay_is_the_drives_own_business(state_folder: Path) -> None:
+def test_a_killed_relay_is_followed_by_a_stop(state_folder: Path) -> None:
     with rig() as (drive, hub), host(hub, drive) as process:
         since = len(drive.log)
         (served,) = (state_folder / "campaign" / "canopen").glob("*.port.json")
@@ -106,7 +106,8 @@ def test_a_killed_relay_is_the_drives_own_business(state_folder: Path) -> None:
         out, _ = process.communicate(timeout=60)
         assert out.split() == ["lost-connection", "confirmed"]
         stays_off(drive, since)
-        assert states(drive, since)[0] == "fault reaction"
+        # By the drive itself, or by the next relay, which the host starts to make it safe.
+        assert states(drive, since)[0] in ("fault reaction", "quick stop")
 
 
 @pytest.mark.slow
