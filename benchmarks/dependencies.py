@@ -20,6 +20,7 @@ from benchmarks.document import DOCS, machine, table, write_section
 PAGE = DOCS / "developers" / "packaging.md"
 MODULES = {"tree-sitter": "tree_sitter", "tree-sitter-toml": "tree_sitter_toml"}
 MODULES |= {"pyserial": "serial", "isal": "isal.igzip_lib"}
+MODULES |= {"python-can": "can"}
 WHAT_FOR = {
     "h5py": "archives",
     "isal": "packs samples faster than zlib",
@@ -38,6 +39,8 @@ WHAT_FOR = {
     "tree-sitter-toml": "its grammar of TOML",
     "typer": "the command line",
     "pyserial": "controllers",
+    "canopen": "servo drives on CAN",
+    "python-can": "adapters of CAN",
     "xarray": "`trial.dataset()`",
     "h5netcdf": "archives opened by xarray alone",
     "pyarrow": "Parquet, written and imported",

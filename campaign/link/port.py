@@ -1,4 +1,4 @@
-"""The port of a controller: a serial device, or TCP as `socket://HOST:PORT`."""
+"""The port of a controller: a serial device, TCP as `socket://HOST:PORT`, or a drive on CAN."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from campaign.errors import UsageError
 POLL = 0.05
 """s a read waits for the first byte."""
 CHUNK = 65536
+ANSWER = 2.0
+"""s that the process that owns a CAN bus may take to answer."""
 STOLEN_READS = 20
 """Empty reads in a row until a serial port counts as lost: another process may read it as well."""
 
@@ -38,6 +40,8 @@ def open_port(name: str, baud: int, *, exclusive: bool) -> Port:
     """
     if name.startswith("socket://"):
         return _open_socket(name)
+    if name.startswith("can://"):
+        return _open_drive(name)
     return _open_serial(name, baud, exclusive)
 
 
@@ -56,6 +60,26 @@ def _open_socket(name: str) -> Port:
             f"port {name!r}: no answer ({error.strerror or error}); "
             "is the controller, or `campaign device --tcp`, running?"
         ) from None
+
+
+def _open_drive(name: str) -> Port:
+    """At the process that owns the bus; on the bus where none is, or where it hangs."""
+    from campaign.canopen_drive.address import address_of
+    from campaign.canopen_drive.line import DirectLine
+    from campaign.link.safe import query_frame
+
+    address = address_of(name)
+    port = address.served_at()
+    if port is not None:
+        with contextlib.suppress(UsageError, OSError):
+            line = _open_socket(f"socket://127.0.0.1:{port}")
+            line.write(query_frame())
+            deadline = time.monotonic() + ANSWER
+            while time.monotonic() < deadline:
+                if line.read():
+                    return line
+            line.close()
+    return DirectLine(address)
 
 
 class SocketPort:

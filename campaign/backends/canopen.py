@@ -1,0 +1,435 @@
+"""The `canopen` backend: one CiA 402 drive on a CAN bus; docs/canopen.md."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from campaign.axis_kind import AxisKind, sides_in
+from campaign.backends.interface import BackendKind, Source, StopFlag
+from campaign.canopen_drive import objects as od
+from campaign.canopen_drive.address import address_of
+from campaign.canopen_drive.bus_load import LARGEST, PROMISED, bus_load
+from campaign.canopen_drive.client import Client, Start, start_process
+from campaign.canopen_drive.drive import DriveError
+from campaign.canopen_drive.player import HEARTBEAT_LOST, EndedError, Player, channels, ending_of
+from campaign.canopen_drive.proof import RATE as PROOF_RATE
+from campaign.canopen_drive.proof import Proof
+from campaign.canopen_drive.settings import (
+    cycle,
+    present,
+    set_limits,
+    set_pdos,
+    set_reactions,
+    set_times,
+    written,
+)
+from campaign.canopen_drive.state import State, state_of
+from campaign.canopen_drive.targets import targets_of
+from campaign.canopen_drive.units import Scale, scale_of
+from campaign.errors import BackendError, UsageError
+from campaign.link.identity import identity
+from campaign.link.refusal import Refusal
+from campaign.options import Options
+from campaign.physics.bench import LimitsOptions
+from campaign.recording import (
+    Ending,
+    Event,
+    Fault,
+    Outcome,
+    PanicStop,
+    Recorder,
+    SafeState,
+)
+from campaign.trial import Trial
+from campaign.units import Current, Time, Torque
+
+RETRY = 0.2
+"""s between two attempts to find it again."""
+OVERSHOOT = 1.2
+"""times the rate limit: what one sample may show, where the limit is of a mean."""
+JITTER_TIME = 0.5
+"""s in which jitter is measured before more than the promised rate."""
+
+
+class CanopenOptions(Options):
+    """Options of a drive."""
+
+    port: str = ""
+    """Where it is: `can://INTERFACE/CHANNEL?node=N`, as `can://socketcan/can0?node=5`."""
+    heartbeat: Time = Field(default=0.2, ge=0.05, le=5)
+    """Without a heartbeat for so long, the drive stops by itself."""
+    silence: Time = Field(default=2.0, ge=0.1, le=60)
+    """Without a sign of life of this program for so long, a trial is stopped."""
+    late: Time | None = Field(default=None, gt=0, le=60)
+    """Largest delay of a SYNC and of its answer; absent: half of the time between two samples."""
+    safe_time: Time = Field(default=8.0, gt=0, le=9)
+    """How long the drive may take to be seen at rest and off."""
+    eds: str = ""
+    """Path of the drive's EDS, of which vendor, product and data types are compared."""
+    reverse: bool = False
+    """Whether positive is the drive's negative direction."""
+    units_per_turn: float | None = Field(default=None, gt=0)
+    """Units of 6064h per turn of the load; absent: by the drive's own factors."""
+    rate_units: float | None = Field(default=None, gt=0)
+    """Units of 606Ch at one turn of the load per second; absent: by the drive's own factors."""
+    rated_torque: Torque | None = Field(default=None, gt=0)
+    """Of the motor, for what is in per mille; absent: 6076h."""
+    rated_current: Current | None = Field(default=None, gt=0)
+    """Of the motor; absent: 6075h."""
+    clear_fault: bool = False
+    """Clear a fault of the drive when connecting; who sets it has seen why it was."""
+
+
+class CanopenBackend:
+    """One drive. One trial at a time."""
+
+    def __init__(self, options: CanopenOptions, start: Start = start_process) -> None:
+        self._options, self._start = options, start
+        self._refusal = self._new_refusal()
+        self._host = identity("campaign")
+        self._client: Client | None = None
+        self._scale: tuple[float, Scale] | None = None  # with the ratio that it is for
+        self._own: dict[od.Item, int] = {}  # limits that the drive had
+        self._proved: set[str] = set()
+        self._found = (0, 0)  # boots and 1016h, once its reactions were set
+        self._busy = threading.RLock()
+        self._urgent = threading.Event()  # set: the drive is being made safe, everything else ends
+
+    def __enter__(self) -> CanopenBackend:
+        try:
+            self._connect()
+        except DriveError as error:
+            self._disconnect()
+            told = "no drive answers" if error.silent else "the drive cannot be used"
+            raise BackendError(f"{self._options.port}: {told}: {error}") from None
+        except BaseException:
+            self._disconnect()
+            raise
+        self._refusal = self._new_refusal()  # all trials are asked again, from the first on
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        client = self._client
+        # A trial that hangs keeps its limits.
+        if client is not None and self._busy.acquire(blocking=False):
+            with contextlib.suppress(DriveError):
+                for item, value in self._own.items():
+                    client.write(item, value)
+                client.write(od.CONSUMER, 0)  # the heartbeat ends in order
+            self._busy.release()
+        self._disconnect()
+
+    def introduce(self, run: str) -> None:
+        """`campaign status` shows this run as the holder."""
+        self._host = identity(f"run {run}")
+
+    def stop_command(self) -> tuple[str, ...]:
+        """`campaign stop`: at the process that owns the bus, or on the bus."""
+        program = (sys.executable, "-P", "-m", "campaign")
+        return (*program, "stop", "--port", self._options.port, "--patience", "5")
+
+    def panic_stop(self) -> PanicStop | None:
+        """The stop from outside, by this computer's latch; the drive has none."""
+        try:
+            found = self._client.ask("latch") if self._client is not None else None
+        except DriveError:
+            return None  # the next trial is told
+        return None if found is None else PanicStop(found[0], found[1], found[2])
+
+    def clear_stop(self, count: int) -> None:
+        """Let the drive move again after the stop that a person has seen."""
+        try:
+            if self._client is not None and self._client.ask("clear", count=count):
+                return
+        except DriveError as error:
+            raise BackendError(f"the stop was not cleared: {error}") from None
+        raise BackendError(f"{count} is not the latest stop")
+
+    # What it can do
+
+    def _new_refusal(self) -> Refusal:
+        return Refusal(base_motion=False, remedy="a drive moves its own axis alone")
+
+    def refuses(self, trial: Trial) -> str | None:
+        """Why the drive, or its bus, cannot execute `trial`."""
+        return self._refusal(trial) or self._beyond_drive(trial) or self._beyond_bus(trial)
+
+    def _beyond_drive(self, trial: Trial) -> str | None:
+        task = trial.task
+        if task.mode not in ("rate", "torque"):
+            return f"task.mode = {task.mode!r}: a drive has the modes rate and torque"
+        if task.compensation != "none":
+            return (
+                "task.compensation: a loop through CAN and this computer is slower than the "
+                "drive's own; a compensation belongs into the drive"
+            )
+        for path in trial.point:
+            if path.startswith(("bench.controller", "bench.compensation")):
+                return f"{path}: the loops are the drive's own, and set with its vendor's tool"
+        if sides_in(trial.bench).load is AxisKind.LINEAR:
+            return "bench.axis.kind = 'linear': this backend has rotary axes only"
+        return None
+
+    def _beyond_bus(self, trial: Trial) -> str | None:
+        rate, bitrate = trial.task.sample_rate, 1_000_000
+        if self._options.port:
+            bitrate = address_of(self._options.port).bitrate
+        try:
+            cycle(1 / rate)
+        except ValueError as error:
+            return f"task.sample_rate = {rate:g} Hz: {error}; take 100 Hz"
+        load = bus_load(rate, bitrate, self._options.heartbeat)
+        if load > LARGEST:
+            return (
+                f"task.sample_rate = {rate:g} Hz takes {load:.0%} of a bus of {bitrate:g} bit/s; "
+                f"at most {LARGEST:.0%} is used: sample_rate = \"{PROMISED:g} Hz\""
+            )  # fmt: skip
+        if rate <= PROMISED or self._client is None:
+            return None
+        try:
+            count = round(JITTER_TIME * rate)
+            counted = present(self._client, od.COUNTER) is not None
+            jitter = self._client.ask("jitter", period=1 / rate, count=count, counted=counted)
+        except DriveError as error:
+            return f"task.sample_rate = {rate:g} Hz: the jitter cannot be measured: {error}"
+        if jitter > self._late(1 / rate):
+            return (
+                f"task.sample_rate = {rate:g} Hz: SYNC was up to {jitter * 1e3:.2g} ms late, at "
+                f"most {self._late(1 / rate) * 1e3:.2g} ms is allowed; take {PROMISED:g} Hz"
+            )
+        return None
+
+    def _late(self, period: float) -> float:
+        return self._options.late or 0.5 * period
+
+    def channels(self, trial: Trial) -> frozenset[str]:
+        return frozenset(each.name for each in channels(trial.task.mode))
+
+    # A trial
+
+    def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        """Set limits and ramps, prove the drive once, play the targets."""
+        with self._busy:
+            try:
+                client = self._still_set() or self._connect()
+                recorder.start(channels(trial.task.mode))
+                return self._execute(client, trial, recorder, stop)
+            except (BackendError, UsageError) as error:
+                reason, fault = f"the drive cannot be reached: {error}", Fault.LOST_CONNECTION
+            except DriveError as error:
+                reason = str(error)
+                fault = Fault.LOST_CONNECTION if error.silent else Fault.REFUSED
+            safe = self._seen_safe(time.monotonic() + RETRY)
+            if fault is Fault.LOST_CONNECTION:
+                self._disconnect()
+            return Ending(Outcome.FAULT, reason, _safe(seen=safe), fault)
+
+    def _execute(self, client: Client, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
+        task = trial.task
+        limits = LimitsOptions.model_validate(trial.bench["limits"], context={"si": True})
+        found = self.panic_stop()
+        if found is not None or stop() or self._urgent.is_set():
+            return Ending(Outcome.INTERRUPTED, str(found or "stopped by the operator"))
+        if (fault := self._in_fault(client)) is not None:
+            return fault
+        scale = self._scale_for(client, trial)
+        if lacking := set_limits(client, limits, scale, self._own):
+            told = f"limits that the drive lacks, and this program alone watches: {lacking}"
+            recorder.event(Event(0.0, told))
+        counted, here = set_times(client, 1 / PROOF_RATE), client.read(od.POSITION)
+        angle = here / scale.position
+        if abs(angle) > limits.angle:
+            raise DriveError(f"the load stands at {angle:.4g} rad, beyond limits.angle; set zero")
+        farthest = int(min(limits.angle * abs(scale.position), 2**31 - 1))
+        base = {
+            "positions": [-farthest, farthest],
+            "fastest": OVERSHOOT * limits.rate * abs(scale.rate),
+            "strongest": limits.torque * abs(scale.torque) + 1,
+            "counted": counted,
+            "patience": self._late(1 / task.sample_rate),
+        }
+        player = Player(client, base, lambda: stop() or self._urgent.is_set())
+        proof = Proof(client, player.rows, scale, limits)
+        try:
+            self._prove(client, trial, proof)
+            proof.goes_to(round(task.start_angle * scale.position), fast=True)
+        except EndedError as error:
+            return ending_of(error.end, {})
+        targets = targets_of(task)
+        rate = task.mode == "rate"
+        factor = scale.rate if rate else scale.torque
+        slope = min(max(1, round(targets.slope * abs(factor))), 2**32 - 1)
+        for ramp in (od.ACCELERATION, od.DECELERATION) if rate else (od.TORQUE_SLOPE,):
+            written(client, ramp, slope)
+        set_times(client, 1 / task.sample_rate)
+        job: dict[str, Any] = {
+            "mode": od.PROFILE_VELOCITY if rate else od.PROFILE_TORQUE,
+            "targets": [int(each) for each in np.rint(targets.values * factor)],
+            "period": 1 / task.sample_rate,
+        }
+        if task.stop_rate is not None:
+            job["stop"] = task.stop_rate * abs(scale.rate)
+        command = task.command.sample(np.arange(len(job["targets"])) / task.sample_rate)
+        end = player.record(job, recorder, command, scale)
+        return ending_of(end, self._telemetry(task.sample_rate, end))
+
+    def _telemetry(self, rate: float, end: Mapping[str, Any]) -> dict[str, Any]:
+        address = address_of(self._options.port)
+        return {
+            "sync_late_ms_max": round(end.get("late", 0.0) * 1e3, 3),
+            "bus_load": round(bus_load(rate, address.bitrate, self._options.heartbeat), 4),
+            "emergencies": [f"{code:04X}h" for code, _ in end["emcy"]],
+        }
+
+    def _in_fault(self, client: Client) -> Ending | None:
+        """How a trial ends on a drive in fault. A lost heartbeat of this program's is cleared."""
+        if state_of(client.read(od.STATUSWORD)) is not State.FAULT:
+            return None
+        code = present(client, od.ERROR_CODE) or 0
+        if code == HEARTBEAT_LOST and client.ask("reset") != State.FAULT.text:
+            return None
+        return ending_of(
+            {"why": "before the trial; see backend.clear_fault", "emcy": [(code, 0)], "safe": True},
+            {},
+        )
+
+    def _scale_for(self, client: Client, trial: Trial) -> Scale:
+        gear = trial.bench.get("gear")
+        ratio = float(gear["ratio"]) if isinstance(gear, Mapping) else 1.0  # type: ignore[arg-type]
+        if self._scale is None or self._scale[0] != ratio:
+            given = self._options.model_dump(
+                include={"reverse", "units_per_turn", "rate_units", "rated_torque", "rated_current"}
+            )
+            self._scale = ratio, scale_of(lambda item: present(client, item), ratio=ratio, **given)
+        return self._scale[1]
+
+    def _prove(self, client: Client, trial: Trial, proof: Proof) -> None:
+        """Once per connection, before the first motion of its kind. Raises DriveError."""
+        ramp = max(1, round(proof.limits.acceleration * abs(proof.scale.rate)))
+        for item in (od.ACCELERATION, od.DECELERATION):
+            written(client, item, ramp)
+        if "moves" not in self._proved:
+            proof.moves_as_commanded()
+            proof.stops_in_silence(self._options.heartbeat)
+            self._in_fault(client)  # its own, which is cleared
+            self._proved.add("moves")
+        if trial.task.mode == "torque" and "speed limit" not in self._proved:
+            peak = float(np.max(np.abs(targets_of(trial.task).values)))
+            proof.keeps_speed_limit(min(peak, proof.limits.torque))
+            self._proved.add("speed limit")
+
+    # Rest
+
+    def make_safe(self) -> SafeState:
+        """Rest with the drive off, over a new connection when there is none."""
+        self._urgent.set()  # a trial in another thread ends
+        deadline = time.monotonic() + self._options.safe_time
+        try:
+            seen = self._seen_safe(deadline)
+            while not seen and time.monotonic() < deadline:
+                self._disconnect()
+                time.sleep(RETRY)
+                seen = self._seen_safe(deadline)
+        finally:
+            self._urgent.clear()
+        return _safe(seen=seen)
+
+    def _seen_safe(self, deadline: float) -> bool:
+        try:
+            client = self._client or self._opened()
+            patience = max(0.5, deadline - time.monotonic())
+            return bool(client.ask("rest", patience + 1, patience=patience))
+        except (DriveError, UsageError):
+            return False
+
+    # The bus
+
+    def _opened(self) -> Client:
+        if not self._options.port:
+            raise UsageError(
+                "the backend 'canopen' needs a drive: --port can://socketcan/can0?node=5"
+            )
+        address_of(self._options.port)
+        client = Client(self._options.port, self._start)
+        options = self._options
+        client.ask("hello", heartbeat=options.heartbeat, silence=options.silence, who=self._host)
+        self._client = client
+        return client
+
+    def _connect(self) -> Client:
+        """Open the bus, know the drive, set its reactions. Raises DriveError, UsageError."""
+        client = self._client or self._opened()
+        address = address_of(self._options.port)
+        self._proved.clear()
+        self._scale, self._found = None, (-1, -1)
+        self._identify(client)
+        if state_of(client.read(od.STATUSWORD)) is State.ENABLED:
+            raise DriveError("it is enabled: another program moves it")
+        if self._options.clear_fault:
+            client.ask("reset")
+        set_pdos(client, address.node)
+        set_reactions(client, address.host, self._options.heartbeat)
+        self._found = client.ask("boots"), client.read(od.CONSUMER)
+        return client
+
+    def _still_set(self) -> Client | None:
+        """The connection, unless the drive has started anew, and forgotten its reactions."""
+        client = self._client
+        if client is not None and (client.ask("boots"), client.read(od.CONSUMER)) != self._found:
+            self._disconnect()
+        return self._client
+
+    def _identify(self, client: Client) -> None:
+        """Compare the EDS with the drive, which may be another one."""
+        vendor, product = client.read(od.VENDOR), present(client, od.PRODUCT) or 0
+        if not self._options.eds:
+            return
+        import canopen
+
+        try:
+            described = canopen.import_od(self._options.eds)
+        except Exception as error:  # noqa: BLE001 - of a parser of texts
+            raise UsageError(f"eds = {self._options.eds!r} cannot be read: {error}") from None
+        told = described.device_information
+        if (told.vendor_number, told.product_number) != (vendor, product):
+            raise DriveError(
+                f"wrong EDS: {self._options.eds} is of vendor {told.vendor_number}, product "
+                f"{told.product_number}; the drive says {vendor:#x}, {product:#x}"
+            )
+        for item in vars(od).values():
+            variable = isinstance(item, od.Item) and described.get_variable(item.index, item.sub)
+            if variable and len(variable) != item.bits:
+                raise DriveError(f"{item} has {len(variable)} bits in the EDS, not {item.bits}")
+
+    def _disconnect(self) -> None:
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+
+def _safe(*, seen: bool) -> SafeState:
+    return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
+
+
+def _open(options: Options) -> CanopenBackend:
+    return CanopenBackend(CanopenOptions.model_validate(options.model_dump(), context={"si": True}))
+
+
+BACKEND = BackendKind(
+    name="canopen",
+    summary="a CiA 402 servo drive on a CAN bus (CANopen)",
+    options=CanopenOptions,
+    open=_open,
+    source=Source.HARDWARE,
+    live=True,
+    needs=("limits",),
+    stopped_outside=True,
+)

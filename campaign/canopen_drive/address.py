@@ -1,0 +1,152 @@
+"""Where a drive is: `can://INTERFACE/CHANNEL?node=N`, and who serves it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from platformdirs import user_state_path
+
+from campaign.errors import UsageError
+
+SCHEME = "can://"
+FORM = "a drive is written can://INTERFACE/CHANNEL?node=N, as can://socketcan/can0?node=5"
+BITRATE = 1_000_000
+OWN = {"node": (1, 127), "host": (1, 127), "bitrate": (10_000, 1_000_000), "rest": (0, 10**6)}
+
+
+@dataclass(frozen=True)
+class Address:
+    """One drive on one bus.
+
+    Attributes:
+        text: as written.
+        interface, channel: of python-can.
+        node: the drive's node-ID.
+        host: the node-ID of this program's heartbeat.
+        bitrate: bit/s.
+        rest: increments of 6064h that it may move in `REST_TIME` and still be at rest.
+        others: arguments for python-can.
+    """
+
+    text: str
+    interface: str
+    channel: str
+    node: int
+    host: int = 127
+    bitrate: int = BITRATE
+    rest: int = 2
+    others: tuple[tuple[str, str], ...] = ()
+
+    def open_bus(self) -> Any:
+        """A bus of python-can. Raises UsageError, with what to do."""
+        try:
+            import can
+            import canopen  # noqa: F401 - said here, once, for both
+        except ImportError:
+            raise UsageError(
+                f"port {self.text!r} needs canopen and python-can; "
+                "`pip install 'campaign[canopen]'` brings them"
+            ) from None
+        extra: dict[str, Any] = {name: _number(value) for name, value in self.others}
+        try:
+            return can.Bus(
+                interface=self.interface, channel=self.channel, bitrate=self.bitrate, **extra
+            )
+        except Exception as error:  # noqa: BLE001 - of any adapter's driver
+            raise UsageError(
+                f"port {self.text!r} cannot be opened: {error}; is the adapter plugged in, the "
+                "interface up, and does no other program own it?"
+            ) from None
+
+    @property
+    def _file(self) -> Path:
+        """One for each drive: the node on its channel, however its address is spelled."""
+        key = f"{self.interface}/{self.channel}/{self.node}"
+        name = hashlib.sha256(key.encode()).hexdigest()[:16]
+        return user_state_path("campaign") / "canopen" / name
+
+    @property
+    def latch_file(self) -> Path:
+        """Where this computer remembers a stop."""
+        return self._file.with_suffix(".latch.json")
+
+    def serve(self, port: int | None) -> None:
+        """Say at which local TCP port `campaign stop` reaches the drive; None: at none more."""
+        path = self._file.with_suffix(".port.json")
+        if port is None:
+            path.unlink(missing_ok=True)
+        else:
+            write_whole(path, {"port": port, "pid": os.getpid()})
+
+    def is_served(self) -> bool:
+        """Whether that process lives."""
+        try:
+            socket.create_connection(("127.0.0.1", self.served_at() or 0), 1.0).close()
+        except OSError:
+            return False
+        return True
+
+    def served_at(self) -> int | None:
+        """The local TCP port of the process that owns the bus, if one says so."""
+        try:
+            tree = read_tree(self._file.with_suffix(".port.json")) or {}
+        except (OSError, ValueError):
+            return None
+        port = tree.get("port")
+        return port if isinstance(port, int) and 0 < port < 65536 else None
+
+
+def address_of(text: str) -> Address:
+    """Raises UsageError with the form that is expected."""
+    parts = urlsplit(text)
+    query = parse_qsl(parts.query)
+    values, others = dict[str, int](), []
+    for name, value in query:
+        if name not in OWN:
+            others.append((name, value))
+            continue
+        low, high = OWN[name]
+        if not value.isascii() or not value.isdigit() or not low <= int(value) <= high:
+            raise UsageError(f"port {text!r}: {name} is a number from {low} to {high}; {FORM}")
+        values[name] = int(value)
+    channel = parts.path.removeprefix("/")
+    if not text.startswith(SCHEME) or not parts.netloc or not channel or "node" not in values:
+        raise UsageError(f"port {text!r}: {FORM}")
+    if values["node"] == values.get("host", 127):
+        raise UsageError(f"port {text!r}: node and host are two different numbers")
+    return Address(text, parts.netloc, channel, others=tuple(others), **values)
+
+
+def _number(text: str) -> str | int | float:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def read_tree(path: Path) -> dict[str, Any] | None:
+    """A file's JSON object; None when there is none. Raises ValueError when it is damaged."""
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    if not isinstance(tree, dict):
+        raise ValueError(f"{path} holds no object")
+    return tree
+
+
+def write_whole(path: Path, tree: dict[str, Any]) -> None:
+    """All of it or nothing: a crash leaves the file as it was."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_suffix(f".{os.getpid()}")
+    beside.write_text(json.dumps(tree), encoding="utf-8")
+    beside.replace(path)

@@ -1,0 +1,219 @@
+"""A drive as `campaign stop` and `campaign status` reach it, and the latch it does not have.
+
+Both commands use the frames of the serial protocol. Here they are answered for a drive: by the
+process that owns the bus, at a local TCP port, or, without one, by the command itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from campaign.canopen_drive.address import Address, read_tree, write_whole
+from campaign.canopen_drive.drive import REST_TIME, Drive, DriveError, RestWatch
+from campaign.canopen_drive.state import State as DriveState
+from campaign.plain_text import printable
+from campaign.wire.codes import Fault, Kind, LatchCause, State, WireError
+from campaign.wire.frames import FrameDecoder, encode_frame
+from campaign.wire.messages import (
+    Ack,
+    Holder,
+    Message,
+    Query,
+    Safe,
+    Status,
+    decode,
+    encode,
+)
+from campaign.wire.messages import Latch as LatchMessage
+
+POLL = 0.05
+"""s that a read waits."""
+STOPPING = 2.0
+"""s of one attempt to bring the drive to rest."""
+UNREADABLE = "a file of this computer that cannot be read"
+
+
+class Latch:
+    """The last stop from outside, in a file of this computer: a drive cannot hold one."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._kept: dict[str, Any] = {}  # a stop that may not be in the file
+
+    def stop(self, by: str) -> None:
+        """Keep the drive off from now on: in this process at once, then in the file."""
+        count = int(self._tree().get("count", 0)) + 1
+        self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
+
+    def write(self) -> None:
+        """Remember the stop beyond this process. Raises OSError."""
+        if self._kept:
+            write_whole(self._path, self._kept)
+
+    def now(self) -> tuple[int, str, float | None] | None:
+        """Count, who it was, and the time since (s); None when nothing was stopped."""
+        tree = self._tree()
+        if not tree.get("latched"):
+            return None
+        at = tree.get("at")
+        age = max(0.0, time.time() - at) if isinstance(at, int | float) else None
+        return int(tree.get("count", 0)), str(tree.get("by", "")), age
+
+    def clear(self, count: int) -> bool:
+        """Let the drive move again; False when this is not the latest stop."""
+        found = self.now()
+        if found is None or found[0] != count:
+            return False
+        write_whole(self._path, {"latched": False, "count": count})
+        self._kept = {}
+        return True
+
+    def _tree(self) -> dict[str, Any]:
+        try:
+            tree = read_tree(self._path) or {}
+            int(tree.get("count", 0))
+        except (OSError, ValueError, TypeError):
+            tree = {"latched": True, "by": UNREADABLE}
+        newer = self._kept.get("count", 0) > tree.get("count", 0)
+        return self._kept if newer else tree
+
+
+class Desk:
+    """Answers QUERY and SAFE for one drive. One thread at a time.
+
+    Args:
+        running: whether a trial moves the drive now.
+        stop: told to end that trial at once.
+        host: who runs trials, or empty.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        latch: Latch,
+        running: Callable[[], bool] = lambda: False,
+        stop: Callable[[str], None] = lambda by: None,
+        host: str = "",
+    ) -> None:
+        self._drive, self._latch, self._running, self._stop = drive, latch, running, stop
+        self._host = host
+        self._decoder = FrameDecoder()
+        self._stopped = 0  # the session whose SAFE has been latched
+        self._at_work: threading.Thread | None = None
+
+    def feed(self, data: bytes) -> bytes:
+        """The answers to what has come: one for all of a kind."""
+        answers = {}
+        for frame in self._decoder.feed(data):
+            with contextlib.suppress(WireError):
+                answers[frame.kind] = frame.sequence, decode(frame.kind, frame.body)
+        told = b""
+        for sequence, message in answers.values():
+            if isinstance(message, Safe):
+                self._safe(message)
+                told += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
+            elif isinstance(message, Query):
+                told += _frame(Holder(bool(self._host), 0.0 if self._host else None, self._host))
+        return told + _frame(self._status()) + _frame(self._latched()) if told else b""
+
+    def _safe(self, message: Safe) -> None:
+        by = printable(message.host) or "somebody who did not say who"
+        if not self._stopped or message.session != self._stopped:
+            self._stopped = message.session
+            self._latch.stop(by)
+            self._stop(by)
+        if self._at_work is None or not self._at_work.is_alive():
+            work = threading.Thread(target=self._drive.bring_to_rest, args=(STOPPING,), daemon=True)
+            self._at_work = work
+            work.start()
+        self._latch.write()  # last: a full disk must not keep the drive moving
+
+    def _status(self) -> Status:
+        running, state, at_rest = self._running(), None, False
+        if not running:
+            with contextlib.suppress(DriveError):
+                watch = RestWatch(self._drive.address.rest)
+                watch.seen(self._drive.look()[1])
+                time.sleep(REST_TIME)
+                state, position = self._drive.look()
+                at_rest = watch.seen(position)
+        on = running or state is None or not state.off
+        said = State.IDLE
+        if running or on:
+            said = State.RUNNING
+        elif state is DriveState.FAULT:
+            said = State.FAULT
+        elif self._latch.now() is not None:
+            said = State.SAFE
+        fault = Fault.DRIVE if state is DriveState.FAULT else Fault.NONE
+        return Status(said, fault, at_rest, on, 1, time.monotonic(), 0, 0.0, 0, 0, 0, 0)
+
+    def _latched(self) -> LatchMessage:
+        found = self._latch.now()
+        if found is None:
+            return LatchMessage(latched=False, count=0, cause=LatchCause.NONE, age=None)
+        count, by, age = found
+        return LatchMessage(latched=True, count=count, cause=LatchCause.STOPPED, age=age, by=by)
+
+
+def _frame(message: Message) -> bytes:
+    kind, body = encode(message)
+    return encode_frame(kind, 0, body)
+
+
+class DirectLine:
+    """A drive that no other process serves, as a port with the bytes of the serial protocol."""
+
+    def __init__(self, address: Address) -> None:
+        """Raises UsageError."""
+        self._drive = Drive(address)
+        self._desk = Desk(self._drive, Latch(address.latch_file))
+        self._answers = b""
+
+    def read(self) -> bytes:
+        """The answers, after at most `POLL`."""
+        if not self._answers:
+            time.sleep(POLL)
+        answers, self._answers = self._answers, b""
+        return answers
+
+    def write(self, data: bytes) -> None:
+        """Take a command, and carry it out."""
+        self._answers += self._desk.feed(data)
+
+    def close(self) -> None:
+        """Let go of the bus."""
+        self._drive.close()
+
+
+class Counter:
+    """Serves a desk at a local TCP port, for as long as the process lives."""
+
+    def __init__(self, address: Address, make: Callable[[], Desk]) -> None:
+        self._address, self._make = address, make
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        address.serve(self._listener.getsockname()[1])
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def close(self) -> None:
+        """No more."""
+        self._address.serve(None)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                threading.Thread(target=self._answer, args=(near,), daemon=True).start()
+
+    def _answer(self, near: socket.socket) -> None:
+        desk = self._make()
+        with near, contextlib.suppress(OSError):
+            while data := near.recv(65536):
+                near.sendall(desk.feed(data))

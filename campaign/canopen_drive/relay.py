@@ -1,0 +1,373 @@
+"""The process that owns the bus: `python -m campaign.canopen_drive.relay ADDRESS`.
+
+It alone commands the drive. The drive is enabled inside `Relay._play` only, and however that ends,
+it ends by bringing the drive to rest. A line of JSON is a request or an answer.
+
+Heartbeat and SYNC are sent by threads of this process, never by an adapter or by the kernel: what
+goes on by itself would go on when this process hangs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, BinaryIO
+
+from campaign.canopen_drive import objects as od
+from campaign.canopen_drive.address import address_of
+from campaign.canopen_drive.drive import (
+    INTERVAL,
+    OPERATIONAL,
+    PREOPERATIONAL,
+    Drive,
+    DriveError,
+    RestWatch,
+)
+from campaign.canopen_drive.line import Counter, Desk, Latch
+from campaign.canopen_drive.objects import Item
+from campaign.canopen_drive.state import (
+    ENABLING,
+    INTERNAL_LIMIT,
+    QUICK_STOP,
+    State,
+    reset_words,
+    state_of,
+)
+from campaign.errors import UsageError
+
+BEATS = 4
+"""Heartbeats in the time after which the drive stops without one."""
+ENABLE = 3.0
+"""s from one state to the next, and to another mode."""
+REST = 8.0
+"""s to come to rest after a trial."""
+LAST_WORDS = 3.0
+"""s to come to rest when nobody is left to command."""
+LEAD = 0.02
+"""s from the last preparation to the first SYNC."""
+HOST_SILENT, HOST_GONE, HOST_STOP = "host silent", "host gone", "stopped"
+
+
+class Halted(Exception):  # noqa: N818 - no error: somebody stopped it
+    """Nothing that enables the drive may be sent any more."""
+
+
+class Relay:
+    """One drive, one host."""
+
+    def __init__(self, drive: Drive, out: BinaryIO) -> None:
+        self.drive, self._out = drive, out
+        self.latch = Latch(drive.address.latch_file)
+        self._telling, self._commanding = threading.Lock(), threading.RLock()
+        self._halted = HOST_STOP  # why nothing may enable the drive; empty during a trial
+        self._armed = False
+        self._cancelled = -1  # the last request that a stop came after
+        self._alive = time.monotonic()
+        self._beat = 0.0  # s between two heartbeats; 0: none
+        self._silence = 1.0
+        self._quiet = self._muted = self._closed = False
+        self._who = ""
+        self._jobs: list[dict[str, Any]] = []
+        self._more = threading.Condition()
+        self.counter: Counter | None = None
+
+    def serve(self, commands: BinaryIO) -> bool:
+        """Until the host has gone; whether the drive was then seen at rest and off."""
+        self.counter = Counter(self.drive.address, self._desk)
+        for work in (self._heartbeats, self._work):
+            threading.Thread(target=work, daemon=True).start()
+        self._tell({"opened": True})
+        with contextlib.suppress(OSError, ValueError):
+            for line in commands:
+                self._alive = time.monotonic()
+                self._take(json.loads(line))
+        return self.leave()
+
+    def leave(self) -> bool:
+        """Nobody is left to command. Heartbeat and SYNC end once the drive is at rest, or later."""
+        enabled = self._armed
+        self.halt(HOST_GONE)
+        used = enabled or self.drive.mapped
+        safe = self.drive.bring_to_rest(LAST_WORDS) if used else True
+        self._closed = True
+        if self.counter is not None:
+            self.counter.close()
+        self.drive.close()
+        return safe
+
+    def halt(self, why: str) -> None:
+        """From now on nothing that enables is sent; the quick stop is, without an answer."""
+        with self._commanding:
+            self._halted = self._halted or why
+            if self._armed:
+                with contextlib.suppress(DriveError):
+                    self.drive.command(QUICK_STOP)
+
+    def _desk(self) -> Desk:
+        def stop(by: str) -> None:
+            self.halt(f"panic stop by {by}")
+
+        return Desk(self.drive, self.latch, lambda: self._armed, stop, self._who)
+
+    # Requests
+
+    def _take(self, job: dict[str, Any]) -> None:
+        """What must not wait is done here."""
+        match job["do"]:
+            case "alive":
+                return
+            case "halt":
+                self._cancelled = job["id"]
+                self.halt(HOST_STOP)
+            case "rest":
+                self._cancelled = job["id"]
+                self.halt(HOST_STOP)
+                threading.Thread(target=self._do, args=(job, self._rest), daemon=True).start()
+            case "latch":
+                self._do(job, lambda job: self.latch.now())
+            case _:
+                with self._more:
+                    self._jobs.append(job)
+                    self._more.notify_all()
+
+    def _work(self) -> None:
+        tasks: dict[str, Callable[[dict[str, Any]], Any]] = {
+            "hello": self._hello,
+            "read": lambda job: self.drive.read(_item(job)),
+            "write": self._write,
+            "nmt": lambda job: self.drive.nmt(job["command"]),
+            "boots": lambda job: self.drive.boots,
+            "reset": self._reset,
+            "jitter": self._jitter,
+            "play": self._play,
+            "clear": lambda job: self.latch.clear(job["count"]),
+        }
+        while True:
+            with self._more:
+                while not self._jobs:
+                    self._more.wait()
+                job = self._jobs.pop(0)
+            self._do(job, tasks[job["do"]])
+
+    def _do(self, job: dict[str, Any], task: Callable[[dict[str, Any]], Any]) -> None:
+        try:
+            self._tell({"id": job["id"], "is": task(job)})
+        except DriveError as error:
+            self._tell({"id": job["id"], "error": str(error), "silent": error.silent})
+        except Exception as error:  # noqa: BLE001 - the host has to hear of a bug as well
+            self._tell({"id": job["id"], "error": f"{type(error).__name__}: {error}"})
+
+    def _tell(self, answer: dict[str, Any]) -> None:
+        with self._telling, contextlib.suppress(OSError, ValueError):
+            self._out.write(json.dumps(answer).encode() + b"\n")
+            self._out.flush()
+
+    def _hello(self, job: dict[str, Any]) -> None:
+        self._beat = job["heartbeat"] / BEATS
+        self._silence, self._who = job["silence"], job["who"]
+
+    def _write(self, job: dict[str, Any]) -> None:
+        item = _item(job)
+        if item.index == od.CONTROLWORD.index:
+            raise DriveError("the controlword is sent by the relay alone")
+        self.drive.write(item, job["value"])
+
+    def _rest(self, job: dict[str, Any]) -> bool:
+        return self.drive.bring_to_rest(job["patience"])
+
+    def _reset(self, job: dict[str, Any]) -> str:
+        """Clear a fault; the state afterwards."""
+        for word in reset_words(self.drive.look()[0]):
+            self.drive.write(od.CONTROLWORD, word)
+        self.drive.emergencies.clear()
+        state = self.drive.look()[0]
+        return state.text if state is not None else "unknown"
+
+    def _jitter(self, job: dict[str, Any]) -> float:
+        """Largest delay (s) of `count` SYNC; a drive that is pre-operational answers none."""
+        self.drive.nmt(PREOPERATIONAL)
+        worst, start = 0.0, time.monotonic() + LEAD
+        for number in range(job["count"]):
+            due = start + number * job["period"]
+            time.sleep(max(0.0, due - time.monotonic()))
+            self.drive.sync(1 if job["counted"] else None)
+            worst = max(worst, time.monotonic() - due)
+        return worst
+
+    # Heartbeat
+
+    def _heartbeats(self) -> None:
+        host = self.drive.address.host
+        while not self._closed:
+            if self._armed and time.monotonic() - self._alive > self._silence:
+                self.halt(HOST_SILENT)
+            if self._beat and not self._quiet and not self._muted:
+                with contextlib.suppress(DriveError):
+                    self.drive.send(0x700 + host, b"\x05")
+            time.sleep(self._beat or 0.02)
+
+    # A trial
+
+    def _play(self, job: dict[str, Any]) -> dict[str, Any]:
+        """Enable, play the targets, come to rest. Why it ended is empty when all were played."""
+        drive, why, fault = self.drive, "", 0
+        with self._commanding:
+            latched = self.latch.now()
+            if latched is not None or job["id"] <= self._cancelled:
+                why = f"panic stop by {latched[1]}" if latched else HOST_STOP
+                return {"why": why, "safe": False, "moved": False, "error": 0, "emcy": []}
+            self._halted, self._armed, self._quiet = "", True, False
+            self._alive = time.monotonic()
+            drive.mapped = True
+        drive.emergencies.clear()
+        boots, seen = drive.boots, {"state": "", "reacted": False, "samples": 0, "late": 0.0}
+        try:
+            self._enable(job)
+            why = self._run(job, seen)
+        except Halted:
+            why = self._halted
+        except DriveError as error:
+            why = f"{'silent' if error.silent else 'drive'}: {error}"
+        finally:
+            self.halt(why or "played")
+            self._muted = False
+            safe = drive.bring_to_rest(LAST_WORDS if self._halted == HOST_SILENT else REST)
+            self._quiet = self._halted == HOST_SILENT
+            self._armed = False
+        with contextlib.suppress(DriveError):
+            fault = drive.read(od.ERROR_CODE)
+        if drive.boots != boots:
+            why = "reset: the drive has started anew"
+        return {"why": why, "safe": safe, "error": fault, "emcy": drive.emergencies[:], **seen}
+
+    def _enable(self, job: dict[str, Any]) -> None:
+        drive = self.drive
+        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
+        drive.nmt(OPERATIONAL)
+        drive.write(target, 0)
+        drive.write(od.MODE, job["mode"])
+        self._until(lambda: drive.read(od.MODE_DISPLAY) == job["mode"], f"mode {job['mode']}")
+        while (state := state_of(drive.read(od.STATUSWORD))) is not State.ENABLED:
+            if state not in ENABLING:
+                raise DriveError(f"the state is {state.text if state else 'unknown'}")
+            with self._commanding:
+                if self._halted:
+                    raise Halted
+                drive.command(ENABLING[state])
+            word, last = od.STATUSWORD, state
+            self._until(lambda: state_of(drive.read(word)) is not last, "state")  # noqa: B023
+
+    def _until(self, condition: Callable[[], bool], what: str) -> None:
+        deadline = time.monotonic() + ENABLE
+        while not condition():
+            if self._halted:
+                raise Halted
+            if time.monotonic() > deadline:
+                raise DriveError(f"no other {what} within {ENABLE:g} s")
+            time.sleep(0.002)
+
+    def _run(self, job: dict[str, Any], seen: dict[str, Any]) -> str:
+        drive, period, patience = self.drive, job["period"], job["patience"]
+        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
+        cob = (0x300 if target is od.TARGET_VELOCITY else 0x400) + drive.address.node
+        start = time.monotonic() + LEAD
+        for number, value in enumerate(job["targets"]):
+            due = start + number * period
+            time.sleep(max(0.0, due - time.monotonic()))
+            with self._commanding:
+                if self._halted:
+                    raise Halted
+                drive.send(cob, target.pack(value))
+                single = drive.sync(number % od.COUNTED + 1 if job["counted"] else None)
+            late = time.monotonic() - due
+            seen["late"] = max(seen["late"], late)
+            while (sample := drive.sample(INTERVAL)) is None:
+                if time.monotonic() > due + period + patience or self._halted:
+                    break
+            if self._halted:
+                raise Halted
+            if sample is None or not single:
+                self._tell({"lost": number})
+                return "lost: an answer to SYNC is " + ("missing" if single else "doubled")
+            seen["samples"] += 1
+            self._tell({"sample": [number, *sample]})
+            if late > patience:
+                return f"late: SYNC {number} was {late * 1e3:.1f} ms late"
+            if why := self._judged(sample, job, seen):
+                return why if why != "reached" else ""
+            if job.get("mute") == number:
+                seen["reacted"] = self._muted_until_rest(job["mute_patience"])
+                return ""
+        return ""
+
+    def _judged(self, sample: tuple[int, ...], job: dict[str, Any], seen: dict[str, Any]) -> str:
+        """Why the trial ends with this sample; `reached` where it is to."""
+        status, velocity, torque, position, _, mode = sample
+        state = state_of(status)
+        seen["state"] = state.text if state is not None else f"{status:04X}h"
+        if state is not State.ENABLED:
+            return f"state: the drive left operation enabled: {seen['state']}"
+        if self.drive.emergencies:
+            return "emergency"
+        if mode != job["mode"]:
+            return f"state: the drive changed its mode to {mode}"
+        low, high = job["positions"]
+        if not low <= position <= high:
+            return f"limit: position {position} is outside {low} to {high}"
+        if abs(velocity) > job["fastest"]:
+            return f"limit: velocity {velocity} is above {job['fastest']}"
+        if abs(torque) > job["strongest"]:
+            return f"limit: torque {torque} is above {job['strongest']}"
+        if status & INTERNAL_LIMIT and job["mode"] == od.PROFILE_VELOCITY:
+            return "limit: the drive reports that an internal limit acts"
+        return "reached" if abs(velocity) >= job.get("stop", 2**31) else ""
+
+    def _muted_until_rest(self, patience: float) -> bool:
+        """Send neither heartbeat nor SYNC nor a command; whether the drive stopped by itself."""
+        self._muted = True
+        watch, deadline = RestWatch(self.drive.address.rest), time.monotonic() + patience
+        while time.monotonic() < deadline and not self._halted:
+            with contextlib.suppress(DriveError):
+                state, position = self.drive.look()
+                at_rest = watch.seen(position)
+                stopped = state is not None and (state.off or state is State.QUICK_STOP)
+                if stopped and at_rest:
+                    return True
+        return False
+
+
+def _item(job: dict[str, Any]) -> Item:
+    return Item(job["index"], job["sub"], job["code"], job["name"])
+
+
+def main(text: str) -> int:
+    """Serve one host until it goes; 0 when the drive was then seen safe, else 5 (2: no bus)."""
+    # Ctrl-C and a closing terminal are the host's business: it stops in order, with our help.
+    for stop in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, stop):
+            signal.signal(getattr(signal, stop), signal.SIG_IGN)
+    try:
+        address = address_of(text)
+        if address.is_served():
+            raise UsageError(f"port {text!r}: another process of this computer has the drive")
+        drive = Drive(address)
+    except UsageError as error:
+        sys.stdout.buffer.write(json.dumps({"opened": False, "error": str(error)}).encode() + b"\n")
+        return 2
+    relay = Relay(drive, sys.stdout.buffer)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0 if relay.leave() else 5))
+    return 0 if relay.serve(sys.stdin.buffer) else 5
+
+
+if __name__ == "__main__":
+    import os
+
+    code = main(sys.argv[1])
+    sys.stdout.flush()
+    # Not sys.exit: a thread that waits for a bus or a pipe must not keep the process.
+    os._exit(code)

@@ -1,0 +1,191 @@
+"""Settings of a drive before it may move: reactions, limits, PDOs. All are read back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from campaign.canopen_drive import objects as od
+from campaign.canopen_drive.drive import DriveError
+from campaign.canopen_drive.objects import Item, mapping
+from campaign.canopen_drive.units import Scale
+from campaign.physics.bench import LimitsOptions
+
+ABORTS = (3, 1, 2)
+"""Of 6007h, best first: quick stop, fault reaction, no voltage. 0 would be no reaction."""
+FOLLOWING = 0.02
+"""Of the angle limit: largest error in following a position, in modes that have one."""
+SYNCHRONOUS, AT_ONCE = 1, 255
+"""Transmission types of PDOs."""
+
+
+class Objects(Protocol):
+    """What reads and writes objects of a drive. Both raise DriveError."""
+
+    def read(self, item: Item) -> int: ...
+
+    def write(self, item: Item, value: int) -> None: ...
+
+
+def present(drive: Objects, item: Item) -> int | None:
+    """An object's value; None of one that the drive refuses to tell."""
+    try:
+        return drive.read(item)
+    except DriveError as error:
+        if error.silent:
+            raise
+        return None
+
+
+def written(drive: Objects, item: Item, value: int) -> None:
+    """Write and read back. Raises DriveError."""
+    drive.write(item, value)
+    found = drive.read(item)
+    if found != value:
+        raise DriveError(f"{item} is {found} after {value} was written")
+
+
+def set_reactions(drive: Objects, host: int, heartbeat: float) -> None:
+    """What the drive does when it no longer hears the host for `heartbeat` (s).
+
+    Raises DriveError naming the object without which it may not move.
+    """
+    wanted: tuple[tuple[Item, Sequence[int]], ...] = (
+        (od.CONSUMER, (host << 16 | round(heartbeat * 1e3),)),
+        (od.ERROR_BEHAVIOUR, (0,)),  # pre-operational: no PDO is obeyed then
+        (od.ABORT_OPTION, ABORTS),
+        (od.QUICK_STOP_OPTION, (2,)),  # along its ramp, then off
+        (od.FAULT_OPTION, (2, 1)),  # along the ramp of the quick stop, else of its own
+    )
+    for item, values in wanted:
+        for number, value in enumerate(values, start=1):
+            try:
+                written(drive, item, value)
+                break
+            except DriveError as error:
+                if error.silent:
+                    raise
+                if number == len(values):
+                    raise DriveError(
+                        f"the drive lacks a reaction that a motion needs: {error}"
+                    ) from None
+
+
+def set_pdos(drive: Objects, node: int) -> None:
+    """RPDO 1 the controlword, 2 the target velocity, 3 the target torque; TPDO 1 and 2 samples."""
+    received = ((od.CONTROLWORD,), (od.TARGET_VELOCITY,), (od.TARGET_TORQUE,))
+    for number, entries in enumerate(received):
+        kind = AT_ONCE if number == 0 else SYNCHRONOUS
+        _map(drive, 0x1400 + number, 0x200 + 0x100 * number + node, entries, kind)
+    for number, items in enumerate(od.MAPPED):
+        _map(drive, 0x1800 + number, 0x180 + 0x100 * number + node, items, SYNCHRONOUS)
+
+
+def _map(drive: Objects, index: int, cob: int, items: Sequence[Item], kind: int) -> None:
+    """One PDO; it is invalid (bit 31) while its mapping changes."""
+    name = f"{'R' if index < 0x1800 else 'T'}PDO {(index & 0xFF) + 1}"
+    valid = Item(index, 1, "I", f"COB-ID of {name}")
+    count = Item(index + 0x200, 0, "B", f"number of objects in {name}")
+    drive.write(valid, 1 << 31 | cob)
+    written(drive, Item(index, 2, "B", f"transmission type of {name}"), kind)
+    drive.write(count, 0)
+    for sub, item in enumerate(items, start=1):
+        written(drive, Item(index + 0x200, sub, "I", f"{name}, entry {sub}"), mapping(item))
+    written(drive, count, len(items))
+    drive.write(valid, cob)
+    found = drive.read(valid)
+    if found & 0x800007FF != cob:  # bits 30 and 29 may say more
+        raise DriveError(f"{valid} is {found:08X}h after {cob:08X}h was written")
+
+
+def set_times(drive: Objects, period: float) -> bool:
+    """Period of SYNC (s), in 1006h and 60C2h where there are such; whether SYNC is counted."""
+    counted = present(drive, od.COUNTER) is not None
+    if present(drive, od.CYCLE) is not None:
+        written(drive, od.CYCLE, 0)  # 1019h may change only while it is 0
+        if counted:
+            written(drive, od.COUNTER, od.COUNTED)
+        written(drive, od.CYCLE, round(period * 1e6))
+    elif counted:
+        written(drive, od.COUNTER, od.COUNTED)
+    if present(drive, od.CYCLE_VALUE) is not None:
+        value, exponent = cycle(period)
+        written(drive, od.CYCLE_EXPONENT, exponent)
+        written(drive, od.CYCLE_VALUE, value)
+    return counted
+
+
+def cycle(period: float) -> tuple[int, int]:
+    """60C2h: a whole number up to 255, times ten to the power of the other (s).
+
+    Raises ValueError for a period that cannot be written so.
+    """
+    for exponent in range(-3, -7, -1):
+        value = period / 10.0**exponent
+        if 1 <= round(value) <= 255 and math.isclose(value, round(value), rel_tol=1e-9):
+            return round(value), exponent
+    raise ValueError(f"a period of {period * 1e3:.9g} ms is no whole number of 60C2h")
+
+
+def set_limits(drive: Objects, limits: LimitsOptions, scale: Scale, own: dict[Item, int]) -> str:
+    """The bench's limits in the drive, or the drive's own, which are narrower.
+
+    Args:
+        own: values that the drive had, kept here at the first call and never exceeded.
+
+    Returns the limits that the drive does not have: they are watched here alone. Raises DriveError
+    when it has none of a torque, none of a speed, or no ramp for its quick stop.
+    """
+    position, rate, torque = abs(scale.position), abs(scale.rate), abs(scale.torque)
+    largest = {
+        od.MAX_TORQUE: limits.torque * torque,
+        od.POSITIVE_TORQUE: limits.torque * torque,
+        od.NEGATIVE_TORQUE: limits.torque * torque,
+        od.MAX_PROFILE_VELOCITY: limits.rate * rate,
+        od.MAX_MOTOR_SPEED: limits.rate * scale.motor_rate,
+        od.HIGHEST_POSITION: limits.angle * position,
+        od.LOWEST_POSITION: -limits.angle * position,
+        od.MAX_ACCELERATION: limits.acceleration * rate,
+        od.MAX_DECELERATION: limits.acceleration * rate,
+        od.FOLLOWING_ERROR: FOLLOWING * limits.angle * position,
+    }
+    lacking = [item for item, most in largest.items() if not _limited(drive, item, most, own)]
+    both = {od.POSITIVE_TORQUE, od.NEGATIVE_TORQUE}
+    if od.MAX_TORQUE in lacking and both & set(lacking):
+        raise DriveError(f"the drive limits no torque: {od.MAX_TORQUE}, or 60E0h and 60E1h")
+    if {od.MAX_PROFILE_VELOCITY, od.MAX_MOTOR_SPEED} <= set(lacking):
+        raise DriveError(
+            f"the drive limits no speed: {od.MAX_PROFILE_VELOCITY}, or {od.MAX_MOTOR_SPEED}"
+        )
+    ramp = max(1, round(limits.acceleration * rate))
+    try:
+        written(drive, od.QUICK_STOP_DECELERATION, ramp)
+    except DriveError as error:
+        if error.silent:
+            raise
+        raise DriveError(f"the drive lacks a reaction that a motion needs: {error}") from None
+    return ", ".join(str(item) for item in lacking)
+
+
+def _limited(drive: Objects, item: Item, most: float, own: dict[Item, int]) -> bool:
+    """Whether the drive keeps to `most`: written and read back, or narrower by itself."""
+    if not math.isfinite(most):
+        return True
+    had = own.get(item, present(drive, item))
+    if had is None:
+        return False
+    own.setdefault(item, had)
+    low, high = item.range
+    wanted = min(max(math.trunc(most), low), high)
+    # 607Dh: both 0 is no limit. 0 of any other would let nothing move: it is unset.
+    if had and abs(had) < abs(wanted):
+        wanted = had
+    try:
+        written(drive, item, wanted)
+    except DriveError as error:
+        if error.silent:
+            raise
+        found = present(drive, item)
+        return found is not None and 0 < abs(found) <= abs(most)
+    return True
