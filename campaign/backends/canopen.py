@@ -19,6 +19,7 @@ from campaign.canopen_drive.address import address_of
 from campaign.canopen_drive.bus_load import LARGEST, PROMISED, bus_load
 from campaign.canopen_drive.client import Client, Start, start_process
 from campaign.canopen_drive.drive import DriveError
+from campaign.canopen_drive.ends import End
 from campaign.canopen_drive.player import HEARTBEAT_LOST, EndedError, Player, channels, ending_of
 from campaign.canopen_drive.proof import RATE as PROOF_RATE
 from campaign.canopen_drive.proof import Proof
@@ -297,7 +298,12 @@ class CanopenBackend:
         if code == HEARTBEAT_LOST and client.ask("reset") != State.FAULT.text:
             return None
         return ending_of(
-            {"why": "before the trial; see backend.clear_fault", "emcy": [(code, 0)], "safe": True},
+            {
+                "end": End.STATE,
+                "why": "before the trial; see backend.clear_fault",
+                "emcy": [(code, 0)],
+                "safe": True,
+            },
             {},
         )
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from campaign.canopen_drive.client import GONE, Client
 from campaign.canopen_drive.drive import DriveError
+from campaign.canopen_drive.ends import FAULTS as END_FAULTS
+from campaign.canopen_drive.ends import LIMITS, STOPPED, End
 from campaign.canopen_drive.units import Scale
 from campaign.channels import info
 from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome, Recorder, SafeState
@@ -25,7 +27,7 @@ ENDING = 20.0
 """s without a word from the relay, which brings the drive to rest meanwhile."""
 HEARTBEAT_LOST = 0x8130
 """Error code: life guard or heartbeat error (CiA 301)."""
-FAULTS = {0x4: Fault.OVER_TEMPERATURE, 0x73: Fault.SENSOR, 0x8130: Fault.HEARTBEAT}
+ERRORS = {0x4: Fault.OVER_TEMPERATURE, 0x73: Fault.SENSOR, 0x8130: Fault.HEARTBEAT}
 """Of error codes of CiA 301 and CiA 402, by their first digits."""
 
 
@@ -33,7 +35,7 @@ class EndedError(Exception):
     """A motion ended before it was over."""
 
     def __init__(self, end: Mapping[str, Any]) -> None:
-        super().__init__(end["why"])
+        super().__init__(end["why"] or end["end"])
         self.end = end
 
 
@@ -57,11 +59,11 @@ class Player:
         self._halted = False
 
     def rows(
-        self, job: Mapping[str, Any], expected: str = "played"
+        self, job: Mapping[str, Any], expected: End = End.PLAYED
     ) -> tuple[Array, Mapping[str, Any]]:
         """Samples (n, 6) in numbers of the drive, and how it ended.
 
-        Raises EndedError unless it was played to its end, or ended for the reason `expected`.
+        Raises EndedError unless it was played to its end, or ended as `expected`.
         """
         rows, end = [], None
         for item in self._items(job):
@@ -70,7 +72,7 @@ class Player:
             end = item.get("is", end)
         if end is None:
             raise DriveError(GONE, silent=True)
-        if end["why"] and not end["why"].startswith(expected):
+        if end["end"] not in (End.PLAYED, expected):
             raise EndedError(end)
         return np.array(rows, dtype=float).reshape(-1, 6), end
 
@@ -139,30 +141,25 @@ class Player:
 
 def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
     """The ending of a trial, from what the relay says of it."""
-    why = str(end["why"])
+    how, why = End(end["end"]), str(end["why"])
     safe = SafeState.CONFIRMED if end["safe"] else SafeState.NOT_CONFIRMED
     codes = [code for code, _ in end["emcy"]]
-    if not codes and end.get("error") and why.startswith("state"):
+    if not codes and end.get("error") and how is End.STATE:
         codes = [end["error"]]
     outcome, fault = Outcome.FAULT, None
-    word = why.partition(":")[0]
-    if codes and not why.startswith(("stopped", "panic stop", "host")):
+    if codes and how not in STOPPED:
         fault, shown = fault_of(codes[0]), ", ".join(f"{code:04X}h" for code in codes)
-        why = f"the drive reports error {shown}; its manual says what it is ({why})"
-    elif not why:
+        why = f"the drive reports error {shown}; its manual says what it is ({why or how})"
+    elif how is End.PLAYED:
         outcome = Outcome.COMPLETED
-    elif why == "stopped" or why.startswith("panic stop"):
-        outcome = Outcome.INTERRUPTED
-        why = "stopped by the operator" if why == "stopped" else why
-    elif word == "limit":
-        outcome, why = Outcome.LIMIT, f"{why.partition(': ')[2]} (in numbers of the drive)"
-    elif word == "lost" and not end["safe"]:
+    elif how in (End.STOPPED, End.PANIC_STOP):
+        outcome, why = Outcome.INTERRUPTED, why or "stopped by the operator"
+    elif how in LIMITS:
+        outcome, why = Outcome.LIMIT, f"{how}: {why} (in numbers of the drive)"
+    elif how is End.LOST and not end["safe"]:
         fault, why = Fault.LOST_CONNECTION, f"the drive does not answer any more ({why})"
     else:
-        fault = {
-            "lost": Fault.LOST_SAMPLES, "late": Fault.RECORDING, "silent": Fault.LOST_CONNECTION,
-            "host silent": Fault.HEARTBEAT, "reset": Fault.RESET, "drive": Fault.REFUSED,
-        }.get(word, Fault.DRIVE)  # fmt: skip
+        fault = END_FAULTS[how]
         if fault is Fault.HEARTBEAT:
             why = "this program gave no sign of life; the drive was stopped"
     return Ending(outcome, why, safe, fault, dict(telemetry))
@@ -171,6 +168,6 @@ def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
 def fault_of(code: int) -> Fault:
     """The fault that an error code of a drive tells of."""
     for digits in (0, 8, 12):
-        if (found := FAULTS.get(code >> digits)) is not None:
+        if (found := ERRORS.get(code >> digits)) is not None:
             return found
     return Fault.DRIVE

@@ -11,13 +11,14 @@ import numpy as np
 
 from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.drive import DriveError
+from campaign.canopen_drive.ends import End
 from campaign.canopen_drive.settings import Objects, written
 from campaign.canopen_drive.units import Scale
 from campaign.physics.bench import LimitsOptions
 
 RATE = 100.0
 """Hz."""
-LEG = 2.0
+LEG = 1.0
 """s of a slow move, one way."""
 RATE_SHARE, ANGLE_SHARE = 0.1, 0.1
 """Of the limits: how fast and how far it goes."""
@@ -27,6 +28,8 @@ REACTION = 2.0
 """s beyond three times the heartbeat in which the drive stops by itself."""
 FAST = 0.5
 """Of the rate limit, on the way to where a trial starts."""
+LONGEST = 6.0
+"""s of one such move: samples have to come 15 s after a trial began."""
 CLOSE = 5
 """Samples of slow motion: nearer it does not go."""
 HOLD = 0.5
@@ -101,13 +104,13 @@ class Proof:
             self.drive.write(
                 od.TORQUE_SLOPE, max(1, round(2 * peak * abs(self.scale.torque) / LEG))
             )
-            rows, end = self.play(job, "limit: velocity")
+            rows, end = self.play(job, End.RATE_LIMIT)
         finally:
             for item, value in had.items():
                 written(self.drive, item, value)
         rates = np.abs(rows[:, 1] / self.scale.rate) if len(rows) else np.zeros(1)
         held = float(rates[-len(rates) // 4 :].mean())
-        if end["why"] or not 0.5 * slow <= held <= OVERSHOOT * slow:
+        if end["end"] != End.PLAYED or not 0.5 * slow <= held <= OVERSHOOT * slow:
             raise DriveError(
                 f"{', '.join(map(str, had))}: no limit of speed was seen to act in torque mode: at "
                 f"{slow:.4g} rad/s, torque up to {peak:.4g} N m reached {rates.max():.4g} rad/s"
@@ -119,6 +122,11 @@ class Proof:
         for rate in (FAST * self.limits.rate, self.slow) if fast else (self.slow,):
             way = position - self.drive.read(od.POSITION)
             count = round(abs(way / self.scale.position) / rate * RATE)
+            if count > LONGEST * RATE:
+                raise DriveError(
+                    f"the way to the start angle takes {count / RATE:.3g} s at {rate:.3g} rad/s; "
+                    f"turn the load nearer, at most {LONGEST:g} s are allowed"
+                )
             raw = math.copysign(rate * abs(self.scale.rate), way)
             if count > CLOSE:
                 self._rate([round(raw)] * count + [0] * round(LEG / 10 * RATE))

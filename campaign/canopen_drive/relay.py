@@ -28,6 +28,7 @@ from campaign.canopen_drive.drive import (
     DriveError,
     RestWatch,
 )
+from campaign.canopen_drive.ends import End
 from campaign.canopen_drive.line import Counter, Desk, Latch
 from campaign.canopen_drive.objects import Item
 from campaign.canopen_drive.state import (
@@ -50,7 +51,9 @@ LAST_WORDS = 3.0
 """s to come to rest when nobody is left to command."""
 LEAD = 0.02
 """s from the last preparation to the first SYNC."""
-HOST_SILENT, HOST_GONE, HOST_STOP = "host silent", "host gone", "stopped"
+Why = tuple[End, str]
+"""How a trial ended, and more of it for people."""
+PLAYED: Why = (End.PLAYED, "")
 
 
 class Halted(Exception):  # noqa: N818 - no error: somebody stopped it
@@ -64,7 +67,10 @@ class Relay:
         self.drive, self._out = drive, out
         self.latch = Latch(drive.address.latch_file)
         self._telling, self._commanding = threading.Lock(), threading.RLock()
-        self._halted = HOST_STOP  # why nothing may enable the drive; empty during a trial
+        self._halted: Why | None = (
+            End.STOPPED,
+            "",
+        )  # nothing may enable the drive; None in a trial
         self._armed = False
         self._cancelled = -1  # the last request that a stop came after
         self._alive = time.monotonic()
@@ -91,7 +97,7 @@ class Relay:
     def leave(self) -> bool:
         """Nobody is left to command. Heartbeat and SYNC end once the drive is at rest, or later."""
         enabled = self._armed
-        self.halt(HOST_GONE)
+        self.halt(End.HOST_GONE)
         used = enabled or self.drive.mapped
         safe = self.drive.bring_to_rest(LAST_WORDS) if used else True
         self._closed = True
@@ -100,17 +106,20 @@ class Relay:
         self.drive.close()
         return safe
 
-    def halt(self, why: str) -> None:
+    def halt(self, end: End, text: str = "") -> None:
         """From now on nothing that enables is sent; the quick stop is, without an answer."""
         with self._commanding:
-            self._halted = self._halted or why
+            self._halted = self._halted or (end, text)
             if self._armed:
                 with contextlib.suppress(DriveError):
                     self.drive.command(QUICK_STOP)
 
+    def _is_halted_by(self, end: End) -> bool:
+        return self._halted is not None and self._halted[0] is end
+
     def _desk(self) -> Desk:
         def stop(by: str) -> None:
-            self.halt(f"panic stop by {by}")
+            self.halt(End.PANIC_STOP, f"panic stop by {by}")
 
         return Desk(self.drive, self.latch, lambda: self._armed, stop, self._who)
 
@@ -123,10 +132,10 @@ class Relay:
                 return
             case "halt":
                 self._cancelled = job["id"]
-                self.halt(HOST_STOP)
+                self.halt(End.STOPPED)
             case "rest":
                 self._cancelled = job["id"]
-                self.halt(HOST_STOP)
+                self.halt(End.STOPPED)
                 threading.Thread(target=self._do, args=(job, self._rest), daemon=True).start()
             case "latch":
                 self._do(job, lambda job: self.latch.now())
@@ -205,7 +214,7 @@ class Relay:
         host = self.drive.address.host
         while not self._closed:
             if self._armed and time.monotonic() - self._alive > self._silence:
-                self.halt(HOST_SILENT)
+                self.halt(End.HOST_SILENT)
             if self._beat and not self._quiet and not self._muted:
                 with contextlib.suppress(DriveError):
                     self.drive.send(0x700 + host, b"\x05")
@@ -214,14 +223,16 @@ class Relay:
     # A trial
 
     def _play(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Enable, play the targets, come to rest. Why it ended is empty when all were played."""
-        drive, why, fault = self.drive, "", 0
+        """Enable, play the targets, come to rest: how it ended."""
+        drive, fault = self.drive, 0
+        why: Why = (End.DRIVE, "a bug of the relay")
         with self._commanding:
             latched = self.latch.now()
             if latched is not None or job["id"] <= self._cancelled:
-                why = f"panic stop by {latched[1]}" if latched else HOST_STOP
-                return {"why": why, "safe": False, "moved": False, "error": 0, "emcy": []}
-            self._halted, self._armed, self._quiet = "", True, False
+                end = End.PANIC_STOP if latched else End.STOPPED
+                text = f"panic stop by {latched[1]}" if latched else ""
+                return {"end": end, "why": text, "safe": False, "error": 0, "emcy": []}
+            self._halted, self._armed, self._quiet = None, True, False
             self._alive = time.monotonic()
             drive.mapped = True
         drive.emergencies.clear()
@@ -230,20 +241,28 @@ class Relay:
             self._enable(job)
             why = self._run(job, seen)
         except Halted:
-            why = self._halted
+            why = self._halted or why
         except DriveError as error:
-            why = f"{'silent' if error.silent else 'drive'}: {error}"
+            why = (End.SILENT if error.silent else End.DRIVE, str(error))
         finally:
-            self.halt(why or "played")
+            self.halt(*why)
             self._muted = False
-            safe = drive.bring_to_rest(LAST_WORDS if self._halted == HOST_SILENT else REST)
-            self._quiet = self._halted == HOST_SILENT
+            silent = self._is_halted_by(End.HOST_SILENT)
+            safe = drive.bring_to_rest(LAST_WORDS if silent else REST)
+            self._quiet = silent  # from now on without a heartbeat, at rest
             self._armed = False
         with contextlib.suppress(DriveError):
             fault = drive.read(od.ERROR_CODE)
         if drive.boots != boots:
-            why = "reset: the drive has started anew"
-        return {"why": why, "safe": safe, "error": fault, "emcy": drive.emergencies[:], **seen}
+            why = (End.RESET, "the drive has started anew")
+        return {
+            "end": why[0],
+            "why": why[1],
+            "safe": safe,
+            "error": fault,
+            "emcy": drive.emergencies[:],
+            **seen,
+        }
 
     def _enable(self, job: dict[str, Any]) -> None:
         drive = self.drive
@@ -271,7 +290,7 @@ class Relay:
                 raise DriveError(f"no other {what} within {ENABLE:g} s")
             time.sleep(0.002)
 
-    def _run(self, job: dict[str, Any], seen: dict[str, Any]) -> str:
+    def _run(self, job: dict[str, Any], seen: dict[str, Any]) -> Why:
         drive, period, patience = self.drive, job["period"], job["patience"]
         target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
         cob = (0x300 if target is od.TARGET_VELOCITY else 0x400) + drive.address.node
@@ -293,39 +312,41 @@ class Relay:
                 raise Halted
             if sample is None or not single:
                 self._tell({"lost": number})
-                return "lost: an answer to SYNC is " + ("missing" if single else "doubled")
+                return End.LOST, "an answer to SYNC is " + ("missing" if single else "doubled")
             seen["samples"] += 1
             self._tell({"sample": [number, *sample]})
             if late > patience:
-                return f"late: SYNC {number} was {late * 1e3:.1f} ms late"
+                return End.LATE, f"SYNC {number} was {late * 1e3:.1f} ms late"
             if why := self._judged(sample, job, seen):
-                return why if why != "reached" else ""
+                return why
             if job.get("mute") == number:
                 seen["reacted"] = self._muted_until_rest(job["mute_patience"])
-                return ""
-        return ""
+                break
+        return PLAYED
 
-    def _judged(self, sample: tuple[int, ...], job: dict[str, Any], seen: dict[str, Any]) -> str:
-        """Why the trial ends with this sample; `reached` where it is to."""
+    def _judged(
+        self, sample: tuple[int, ...], job: dict[str, Any], seen: dict[str, Any]
+    ) -> Why | None:
+        """How the trial ends with this sample; None where it goes on."""
         status, velocity, torque, position, _, mode = sample
         state = state_of(status)
         seen["state"] = state.text if state is not None else f"{status:04X}h"
         if state is not State.ENABLED:
-            return f"state: the drive left operation enabled: {seen['state']}"
+            return End.STATE, f"the drive left operation enabled: {seen['state']}"
         if self.drive.emergencies:
-            return "emergency"
+            return End.STATE, "emergency message"
         if mode != job["mode"]:
-            return f"state: the drive changed its mode to {mode}"
+            return End.STATE, f"the drive changed its mode to {mode}"
         low, high = job["positions"]
         if not low <= position <= high:
-            return f"limit: position {position} is outside {low} to {high}"
+            return End.POSITION_LIMIT, f"position {position} is outside {low} to {high}"
         if abs(velocity) > job["fastest"]:
-            return f"limit: velocity {velocity} is above {job['fastest']}"
+            return End.RATE_LIMIT, f"velocity {velocity} is above {job['fastest']}"
         if abs(torque) > job["strongest"]:
-            return f"limit: torque {torque} is above {job['strongest']}"
+            return End.TORQUE_LIMIT, f"torque {torque} is above {job['strongest']}"
         if status & INTERNAL_LIMIT and job["mode"] == od.PROFILE_VELOCITY:
-            return "limit: the drive reports that an internal limit acts"
-        return "reached" if abs(velocity) >= job.get("stop", 2**31) else ""
+            return End.DRIVE_LIMIT, "the drive reports that an internal limit acts"
+        return PLAYED if abs(velocity) >= job.get("stop", 2**31) else None
 
     def _muted_until_rest(self, patience: float) -> bool:
         """Send neither heartbeat nor SYNC nor a command; whether the drive stopped by itself."""
