@@ -162,11 +162,13 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         columns=(
             *named,
             Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA()),
+            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA(), file_only=True),
             Column("gain_margin", "Gain margin", "dB"),
-            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA()),
+            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA(), file_only=True),
             Column("phase_margin", "Phase margin", "rad", "deg"),
-            Column("phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA()),
+            Column(
+                "phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA(), file_only=True
+            ),
             Column("gain_margin_bound", "Gain margin at least", "dB"),
         ),
         rows=tuple(rows),

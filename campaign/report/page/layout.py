@@ -129,6 +129,15 @@ class Layout:
         return {figure.anchor: title for title, figure in of}
 
     @property
+    def long_tables(self) -> tuple[ShownTable, ...]:
+        """The tables whose further rows stand in the appendix."""
+        of_tests = (item for section in self.sections for item in section.items)
+        found = (
+            each for each in (*of_tests, *self.incident_tables) if isinstance(each, ShownTable)
+        )
+        return tuple(each for each in found if each.content.as_text)
+
+    @property
     def telling(self) -> ShownFigure | None:
         """The figure on top of the page."""
         wanted = self.document.opening.telling
