@@ -407,6 +407,7 @@ class _Maker:
         reproduced = [self.published[n] for n in self.test.reproduces if n in self.published]
         table = with_published(table, reproduced, self.test.evidence().known)
         page = self.units.table(as_compared(table))
+        table = self.units.in_si(table)
         return self.folder.shown_table(table, numbers, f"{self.test.name}-{table.key}", page=page)
 
 
