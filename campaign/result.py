@@ -163,6 +163,7 @@ class Column:
             has by their names; published values of it then stand beside it.
         decimals: digits after the point that the page shows at least, of numbers that were printed
             with so many.
+        file_only: the page leaves it to the CSV file: a standard error, where it shows intervals.
     """
 
     name: str
@@ -173,6 +174,7 @@ class Column:
     reason: Reason = NONE
     quantity: str = ""
     decimals: int = 0
+    file_only: bool = False
 
 
 @dataclass(frozen=True)

@@ -65,23 +65,42 @@
   const escaped = { "&": "\\&", "%": "\\%", "#": "\\#", "_": "\\_", "$": "\\$", "{": "\\{", "}": "\\}",
     "\\": "\\textbackslash{}", "^": "\\^{}", "~": "\\~{}", "±": "$\\pm$", "−": "$-$", "·": "$\\cdot$",
     "≤": "$\\le$", "≥": "$\\ge$", "≈": "$\\approx$", "°": "$^\\circ$", "²": "$^2$", "³": "$^3$", "µ": "$\\mu$",
-    "σ": "$\\sigma$", "δ": "$\\delta$", "✓": "$\\checkmark$", "\u00a0": "~" };
+    "σ": "$\\sigma$", "δ": "$\\delta$", "✓": "$\\checkmark$", "\u00a0": "~", "†": "\\dag{}",
+    "\ue000": "\\", "\ue001": "{", "\ue002": "}", "\ue003": "^" };
   const latex = (text) => Array.from(text, (each) => escaped[each] ?? each).join("");
-  const line = (cells) => `${cells.map(latex).join(" & ")} \\\\`;
+  // Numbers and units are set by siunitx; private letters stand for those of its commands.
+  const ONE = "[-−+]?\\d+(?:\\.\\d+)?", BOTH = `${ONE}[ \u00a0]±[ \u00a0]${ONE}`, TEN = " × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)";
+  const NUMBER = new RegExp(`\\((${BOTH})\\)${TEN}|(?<![\\w.])(${BOTH}|${ONE})(?:${TEN})?(?![\\w.])`, "g");
+  const UNIT = /\((1?(?:[·/]?(?:[A-Za-zµ]{1,4}|[°%Ω])[²³]?)+)\)$/;
+  const command = (name, text) => `\ue000${name}\ue001${text}\ue002`;
+  const number = (text) => latex(text.replace(NUMBER, (_, all, ofAll, one, ofOne) => {
+    const power = Array.from(ofAll ?? ofOne ?? "", (each) => (each === "⁻" ? "-" : "⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(each))).join("");
+    const value = (all ?? one).replaceAll("−", "-").replace("±", "\ue000pm").replaceAll("\u00a0", " ");
+    return command("num", power ? `${value} e${power}` : value);
+  }));
+  const unit = { "²": "\ue0032", "³": "\ue0033", "·": ".", "%": "\ue000percent ", "°": "\ue000degree ", "µ": "\ue000micro ", "Ω": "\ue000ohm " };
+  const head = (text) => latex(text.replace(UNIT, (_, told) =>
+    `(${command("unit", Array.from(told, (each) => unit[each] ?? each).join(""))})`));
+  const line = (cells) => `${cells.join(" & ")} \\\\`;
   const forms = {
     TSV: (rows) => rows.map((cells) => cells.join("\t")).join("\n"),
     Markdown: ([head, ...rows], right) => [
       head, right.map((each) => (each ? "---:" : "---")), ...rows,
     ].map((cells) => `| ${cells.map((each) => each.replaceAll("|", "\\|")).join(" | ")} |`).join("\n"),
-    LaTeX: ([head, ...rows], right) => [
-      `\\begin{tabular}{${right.map((each) => (each ? "r" : "l")).join("")}}`, "\\toprule", line(head),
-      "\\midrule", ...rows.map(line), "\\bottomrule", "\\end{tabular}",
+    LaTeX: ([first, ...rows], right) => [
+      `\\sisetup{separate-uncertainty,retain-explicit-plus}\\begin{tabular}{${right.map((each) => (each ? "r" : "l")).join("")}}`, "\\toprule", line(first.map(head)),
+      "\\midrule", ...rows.map((cells) => line(cells.map((each, n) => (right[n] ? number : latex)(each)))), "\\bottomrule", "\\end{tabular}",
     ].join("\n"),
   };
 
-  async function copy(table, form, told) {
+  async function copy(table, form, bar) {
+    const told = bar.querySelector("output") ?? bar.appendChild(document.createElement("output"));
     const rows = Array.from(table.rows, (row) =>
       Array.from(row.cells, (cell) => cell.textContent.replace(/[^\S\u00a0]+/g, " ").trim()));
+    const further = document.querySelector(`#${table.closest(".table").id}-rows > pre`);
+    for (const line of further?.textContent.split("\n").slice(1) ?? []) {
+      rows.push(line.split("\t").map((each) => each.trim()));
+    }
     const right = Array.from(table.rows[0].cells, (cell) => cell.classList.contains("n"));
     try {
       await navigator.clipboard.writeText(forms[form](rows, right));
@@ -92,7 +111,6 @@
   }
   for (const box of document.querySelectorAll(".table")) {
     const table = box.querySelector("table"), bar = document.createElement("p");
-    const told = document.createElement("output");
     bar.className = "copy";
     bar.append("Copy as ");
     for (const form of Object.keys(forms)) {
@@ -100,10 +118,9 @@
       button.type = "button";
       button.textContent = form;
       button.setAttribute("aria-label", `Copy ${box.querySelector(".number").textContent} as ${form}`);
-      button.addEventListener("click", () => copy(table, form, told));
+      button.addEventListener("click", () => copy(table, form, bar));
       bar.append(button);
     }
-    bar.append(told);
     box.append(bar);
   }
 })();

@@ -93,6 +93,9 @@ def _options(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    no_pager: Annotated[
+        bool, typer.Option("--no-pager", help="Show long output as it comes, not by PAGER (less).")
+    ] = False,
 ) -> None:
     pass
 

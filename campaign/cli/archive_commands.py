@@ -168,14 +168,16 @@ def compare(
 @app.command()
 def index(
     results: Annotated[
-        Path, typer.Argument(metavar="[RESULTS]", help="The folder of the archives.")
-    ] = RESULTS,
+        Path | None,
+        typer.Argument(metavar="[RESULTS]", help="As --results.", show_default=False),
+    ] = None,
+    folder: ResultsOption = RESULTS,
     open_it: OpenOption = False,
 ) -> None:
     """Write index.html into a results folder: one searchable page over all its runs."""
     from campaign.cli.index import index_results
 
-    print_line(str(index_results(results, open_it=open_it)))
+    print_line(str(index_results(results or folder, open_it=open_it)))
 
 
 @app.command()

@@ -84,14 +84,16 @@ def _tell(against: Against, comparison: Comparison) -> None:
     reference, other = against.reference, against.other
     print_line(f"{reference.letter}  {reference.run.name}  {reference.title}")
     print_line(f"{other.letter}  {other.run.name}  {other.title}")
+    for line in textwrap.wrap(" ".join(sentences(against, comparison.tested)), WIDTH):
+        print_line(line)
     benches = list(bench_lines(against))
     for told in benches[:BENCH_LINES]:
         for line in textwrap.wrap(told, WIDTH, subsequent_indent="  "):
             print_line(line)
     if len(benches) > BENCH_LINES:
         print_line(f"and {len(benches) - BENCH_LINES} more of the bench, on the page")
-    for line in textwrap.wrap(" ".join(sentences(against, comparison.tested)), WIDTH):
-        print_line(line)
+    if against.equal:
+        return
     for why in islice(not_judged(against.pairs), REASONS):
         for line in textwrap.wrap(f"not judged, {why}", WIDTH, subsequent_indent="  "):
             print_line(line)

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from campaign.backends import backends
 from campaign.channels import UNITS, VOCABULARY, AxisKind
-from campaign.cli.output import print_line, print_note, print_table
+from campaign.cli.output import console, print_line, print_note, print_table
 from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.experiments.interface import Experiment
@@ -34,6 +34,8 @@ MODEL = "model of identify"
 UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
 MANY = 20
 """Options of a table from which it is listed once."""
+MOST = 60
+"""Options of a kind that a terminal is shown at once."""
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
@@ -64,8 +66,9 @@ def show_kind(name: str) -> None:
     if name == UNITS_KIND[1]:
         _show_units()
         return
-    if name == BENCH[1]:
-        _show(*BENCH)
+    bench, _, table = name.partition(".")
+    if bench == BENCH[1] and (not table or table in BENCH[3].model_fields):
+        _show(*BENCH, within=table)
         return
     named = [room for room in rooms() if name in room]
     models = {} if named else experiments_by_model()
@@ -101,11 +104,21 @@ def kind_names() -> list[str]:
     return sorted({*own, *experiments_by_model(), *(name for room in rooms() for name in room)})
 
 
-def _show(room: str, name: str, summary: str, options: type[BaseModel] | None) -> None:
+def _show(
+    room: str, name: str, summary: str, options: type[BaseModel] | None, within: str = ""
+) -> None:
     print_line(f"{name} ({room}): {summary}")
     if options is not None:
         print_line()
-        rows = [_row(info) for info in _each_once(tuple(describe(options)))]
+        infos = list(_each_once(tuple(describe(options))))
+        if within:
+            infos = [i for i in infos if i.name == within or i.name.startswith(f"{within}.")]
+        elif len(infos) > MOST and console().is_terminal:
+            print_line(
+                f"{len(infos)} options; `campaign kinds {name}.TABLE` shows those of a table."
+            )
+            infos = [info for info in infos if "." not in info.name]
+        rows = [_row(info) for info in infos]
         print_table(("option", "unit or values", "default", "meaning"), rows)
 
 

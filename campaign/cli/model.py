@@ -220,7 +220,7 @@ def _figure(met: Sequence[Met], motion: MotionOptions) -> Figure:
 def _csv(met: Sequence[Met], motion: MotionOptions) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["time_s", "rate_rad_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])
+    rows.writerow(["time_s", "rate_rad_per_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])
     columns = (*_motion(motion), *(each.friction for each in met))
     rows.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
     return text.getvalue()

@@ -8,6 +8,12 @@ of what they are given before they add their own.
 
 from __future__ import annotations
 
+import io
+import os
+import shlex
+import shutil
+import signal
+import subprocess
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -89,6 +95,48 @@ def others_print_aside() -> Iterator[None]:
         yield
     finally:
         sys.stdout, _ours = _ours, before
+
+
+class _Kept(io.StringIO):
+    """What is written for a terminal, kept."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@contextmanager
+def paged() -> Iterator[None]:
+    """Inside the block, output for a terminal is kept; what is longer than its screen is then
+    shown by the program that `PAGER` names (`less`; "" or `cat` for none).
+    """
+    before = sys.stdout
+    if before is None or not before.isatty():
+        yield
+        return
+    kept = _Kept()
+    sys.stdout = cast(TextIO, PlainStream(kept))
+    try:
+        yield
+    finally:
+        sys.stdout = before
+        text = kept.getvalue()
+        pager = shlex.split(os.environ.get("PAGER", "less"))
+        long = text.count("\n") >= shutil.get_terminal_size().lines
+        if not (long and pager and shutil.which(pager[0]) and _paged(pager, text)):
+            _beneath(before).write(text)
+
+
+def _paged(command: Sequence[str], text: str) -> bool:
+    """Whether a pager has shown the text; as of `git`, `less` keeps its colours."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the pager
+    try:
+        environment = {"LESS": "FRX", **os.environ}
+        done = subprocess.run(command, input=text, text=True, encoding="utf-8", env=environment)  # noqa: S603 (the user's)
+    except OSError:
+        return False
+    finally:
+        signal.signal(signal.SIGINT, before)
+    return done.returncode not in (126, 127)
 
 
 def _beneath(stream: TextIO) -> TextIO:

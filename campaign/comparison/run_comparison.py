@@ -15,6 +15,7 @@ from campaign.comparison.finding_pairs import Pair, pairs_of
 from campaign.comparison.same_quantity import Pairing, pair_tests
 from campaign.comparison.shared_systematics import shared_sources, source_called
 from campaign.errors import UsageError
+from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.references.verdict import Verdict, with_verdicts
@@ -73,6 +74,14 @@ class Against:
         return tuple(found)
 
     @property
+    def equal(self) -> bool:
+        """Whether both runs found the same numbers, to the last digit, and each all of them."""
+        alone = any(tested.only_reference or tested.only_other for tested in self.pairing.tests)
+        alone = alone or bool(self.pairing.only_reference or self.pairing.only_other)
+        numbers = ((pair.reference, pair.other) for pair in self.pairs)
+        return bool(self.pairs) and not alone and all(_same(*each) for each in numbers)
+
+    @property
     def without_interval(self) -> tuple[Pair, ...]:
         """Pairs of simulated numbers neither of which has an interval, as without any noise."""
         return tuple(pair for pair in self.pairs if pair.simulated_bare)
@@ -108,6 +117,11 @@ class Comparison:
     def different(self) -> tuple[Pair, ...]:
         """What was declared different."""
         return tuple(pair for each in self.against for pair in each.of(Verdict.DIFFERENT))
+
+
+def _same(one: Estimate, other: Estimate) -> bool:
+    same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
+    return same and (one.low, one.high) == (other.low, other.high)
 
 
 def size_of(pair: Pair) -> float:

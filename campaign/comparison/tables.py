@@ -163,7 +163,11 @@ def headline(pair: Pair) -> str:
 def sentences(against: Against, tested: int) -> Iterator[str]:
     """What the comparison with one run comes to. `tested`: size of the family."""
     pairs, judged = against.pairs, against.tested
+    if against.equal:
+        yield f"Equal: all {len(pairs)} numbers are the same to the last digit."
     yield from common_draws(against.pairing)
+    if against.equal:
+        return
     several = len(pairs) != 1
     yield (
         f"{len(pairs)} number{'s are' if several else ' is'} found in both runs,"

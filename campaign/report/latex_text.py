@@ -42,6 +42,7 @@ _COMMANDS = {
     "€": r"\texteuro{}",
     "©": r"\textcopyright{}",
     "®": r"\textregistered{}",
+    "†": r"\textdagger{}",
 }
 _MATHS = {
     "−": "-",
@@ -76,6 +77,14 @@ _T1 = frozenset(
 """Letters beyond ASCII that the T1 encoding has."""
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ", "0123456789+-n")
 _LOWERED = str.maketrans("₀₁₂₃₄₅₆₇₈₉₊₋", "0123456789+-")
+_SYMBOLS = {
+    **{f"σ{n}": rf"\sigma_{n}" for n in "012"},
+    "Tc": r"T_\mathrm{c}",
+    "Ts": r"T_\mathrm{s}",
+    "vs": r"v_\mathrm{s}",
+}
+"""Symbols of the LuGre model, where they stand as words."""
+_WORDS = re.compile(rf"(?<!\w)(?:{'|'.join(_SYMBOLS)})(?!\w)(?<!vs(?=\.))")
 _PIECES = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ]+|[₀₁₂₃₄₅₆₇₈₉₊₋]+|.", re.DOTALL)
 """The digits of one exponent belong together; all else is taken letter by letter."""
 
@@ -87,6 +96,15 @@ LONGEST, PART = 24, 8
 def latex(text: str) -> str:
     """`text` within a paragraph, a caption or a cell: one line, in which nothing is a command."""
     line = unicodedata.normalize("NFC", " ".join(text.split()))
+    done, told = 0, ""
+    for match in _WORDS.finditer(line):
+        told += _letters(line[done : match.start()])
+        told += rf"\ensuremath{{{_SYMBOLS[match[0]]}}}"
+        done = match.end()
+    return told + _letters(line[done:])
+
+
+def _letters(line: str) -> str:
     return "".join(_piece(match[0], line[match.end() :][:1]) for match in _PIECES.finditer(line))
 
 
@@ -119,3 +137,82 @@ def _piece(piece: str, following: str) -> str:
     if " " <= letter <= "~" or letter in _T1:
         return letter
     return _LIKE_LATIN.get(letter) or f"{{[}}U+{ord(letter):04X}{{]}}"
+
+
+_PREFIXES = {"n": "nano", "µ": "micro", "m": "milli", "k": "kilo", "M": "mega"}
+_UNITS = {
+    "N": "newton",
+    "m": "metre",
+    "s": "second",
+    "rad": "radian",
+    "deg": "degree",
+    "°": "degree",
+    "°C": "degreeCelsius",
+    "degC": "degreeCelsius",
+    "Hz": "hertz",
+    "A": "ampere",
+    "V": "volt",
+    "Ω": "ohm",
+    "H": "henry",
+    "J": "joule",
+    "W": "watt",
+    "g": "gram",
+    "K": "kelvin",
+    "dB": "decibel",
+    "%": "percent",
+    "min": "minute",
+    "h": "hour",
+}
+_POWERS = {"²": r"\squared", "³": r"\cubed"}
+_ONE = r"[-−+]?\d+(?:\.\d+)?"
+_POWER = r" × 10(?P<{}>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"
+_NUMBER = re.compile(
+    rf"\((?P<all>{_ONE} ± {_ONE})\){_POWER.format('of_all')}"
+    rf"|(?<![\w.])(?P<one>{_ONE}(?: ± {_ONE})?)(?:{_POWER.format('of_one')})?(?![\w.])"
+)
+
+
+def cell_numbers(text: str) -> str:
+    r"""A cell of numbers, each set by siunitx: `3.87 ± 0.12` is `\num{3.87 \pm 0.12}`."""
+    done, told = 0, []
+    for match in _NUMBER.finditer(text):
+        number = (match["all"] or match["one"]).replace("−", "-").replace("±", r"\pm")
+        power = (match["of_all"] or match["of_one"] or "").translate(_RAISED)
+        told += [_between(text[done : match.start()]), rf"\num{{{number}{power and ' e' + power}}}"]
+        done = match.end()
+    return "".join((*told, _between(text[done:])))
+
+
+def _between(text: str) -> str:
+    """Words between numbers, with the spaces around them."""
+    before, after = text[:1] == " ", text[-1:] == " " and bool(text.strip())
+    return " " * before + latex(text) + " " * after
+
+
+def column_head(text: str) -> str:
+    r"""The head of a column, a unit at its end set by siunitx: `Error (\unit{\milli\radian})`."""
+    match = re.fullmatch(r"(.*) \(([^()]*)\)", text)
+    shown = unit(match[2]) if match else ""
+    return f"{breakable(match[1])} ({shown})" if match and shown else breakable(text)
+
+
+def unit(text: str) -> str:
+    """A unit as the page writes it (`N·m/rad`), for siunitx; "" for what is none it knows."""
+    macros = []
+    for place, part in enumerate(text.split("/")):
+        for factor in part.split("·"):
+            macro = "" if (place, factor) == (0, "1") else _factor(factor)
+            if macro is None:
+                return ""
+            macros.append(rf"\per{macro}" if place else macro)
+    return rf"\unit{{{''.join(macros)}}}"
+
+
+def _factor(text: str) -> str | None:
+    """One factor of a unit; None for an unknown one."""
+    name, power = (text[:-1], _POWERS[text[-1]]) if text[-1:] in _POWERS else (text, "")
+    if name in _UNITS:
+        return rf"\{_UNITS[name]}{power}"
+    if name[:1] in _PREFIXES and name[1:] in _UNITS:
+        return rf"\{_PREFIXES[name[0]]}\{_UNITS[name[1:]]}{power}"
+    return None

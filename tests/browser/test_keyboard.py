@@ -57,7 +57,8 @@ def test_strokes_are_counted_with_jumps():
 
 
 NUMBERS = """() => [...document.querySelectorAll("#scoreboard table li")]
-  .filter((e) => e.checkVisibility()).map((e) => e.textContent.trim())"""
+  .filter((e) => e.checkVisibility())
+  .map((e) => getComputedStyle(e, "::before").content[1] + e.textContent.trim())"""
 """The scoreboard's published numbers that are seen; each begins with the sign of its status."""
 
 
@@ -105,4 +106,5 @@ def test_a_table_is_copied_by_a_button(show, form):
         assert lines[1] == r"\toprule"
         assert lines[-2:] == [r"\bottomrule", r"\end{tabular}"]
         assert not re.search(r"[±−·%_](?<!\\%)(?<!\\_)", text)
+        assert r"\num{" in text
         assert len(lines) == rows + 6

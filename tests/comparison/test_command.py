@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from campaign.archive import find_run, open_run
 from campaign.cli import compare as command
 from campaign.cli.compare import compare_archives
+from campaign.comparison.run_comparison import compare_runs
+from campaign.comparison.tables import sentences
 from campaign.errors import ExitCode, UsageError
+from campaign.experiments import experiments
+from campaign.references.verdict import Verdict
 
 
 def typed(results: Path, *names: str, **more: object) -> tuple[Path, ExitCode]:
@@ -41,6 +47,20 @@ def test_declared_differences_come_first_and_the_code_is_0(
 def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
     """No page is drawn, which takes seconds."""
     monkeypatch.setattr(command, "write_comparison", lambda found, output, *_: output)
+
+
+def test_equal_runs_are_said_to_be_in_the_first_line(results: Path):
+    runs = [open_run(find_run(results, name)) for name in ("before", "after")]
+    (against,) = compare_runs(runs, experiments()).against
+    assert not against.equal
+    pairs = tuple(replace(pair, other=pair.reference) for pair in against.pairs)
+    nothing_alone = replace(against.pairing, only_reference=(), only_other=(), tests=())
+    same = replace(against, pairs=pairs, pairing=nothing_alone)
+    assert (
+        next(sentences(same, 1))
+        == f"Equal: all {len(pairs)} numbers are the same to the last digit."
+    )
+    assert not replace(same, pairs=(*pairs, against.of(Verdict.DIFFERENT)[0])).equal
 
 
 @pytest.mark.usefixtures("unwritten")

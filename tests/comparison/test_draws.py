@@ -76,11 +76,11 @@ def test_simulated_numbers_without_an_interval_are_listed_where_they_differ(plat
     assert not any(pair.simulated_bare for pair in compared("hardware", platform))
 
 
-def test_the_terminal_says_what_differs_in_the_bench_before_any_number(
+def test_the_terminal_says_what_differs_in_the_bench_behind_the_verdict(
     results: Path, tmp_path: Path, monkeypatch, capsys
 ):
     monkeypatch.setattr(command, "write_comparison", lambda found, output, *_: output)
     command.compare_archives(("before", "after"), results, tmp_path, (), open_it=False)
     out = capsys.readouterr().out
     change = "map: bench: friction.load.coulomb_torque: 16.12 N·m -> 17.732 N·m"
-    assert out.index(change) < out.index("numbers are found in both runs")
+    assert out.index("numbers are found in both runs") < out.index(change) < out.index("finding\t")

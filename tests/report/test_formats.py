@@ -28,7 +28,7 @@ from campaign.report.content.citation import citation_of
 from campaign.report.formats import chosen_formats, formats, pdf
 from campaign.report.formats.markdown import escaped, paragraph
 from campaign.report.formats.pdf import unfolded
-from campaign.report.latex_text import breakable, latex
+from campaign.report.latex_text import breakable, cell_numbers, column_head, latex
 from campaign.result import (
     Amount,
     Axis,
@@ -170,7 +170,7 @@ def test_markdown_has_the_page_s_numbers_and_files(folder: Path) -> None:
 
 def test_markdown_s_tables_have_the_page_s_cells(folder: Path) -> None:
     text = (folder / "report.md").read_text()
-    assert "| none | mrad | 0.4844 | 0.4884 | +0.83 % | differs | selected |" in text
+    assert "| none | 0.4844 | 0.4884 | +0.83 | differs | selected |" in text
     rows = [token for token in tokens(text) if token.type == "tr_open"]
     page = (folder / "report.html").read_text()
     tables = re.findall(r"<table.*?</table>", page, re.DOTALL)
@@ -266,8 +266,8 @@ def test_the_body_has_no_preamble_and_says_what_it_needs(folder: Path) -> None:
     assert r"\documentclass" not in commands
     assert r"\usepackage" not in commands
     needed = set(re.findall(r"\{([a-z,]+)\}", (folder / "main.tex").read_text()))
-    assert "array,booktabs,longtable,graphicx,textcomp" in needed
-    assert r"%   \usepackage{array,booktabs,longtable,graphicx,textcomp}" in text
+    assert "array,booktabs,longtable,graphicx,siunitx,textcomp" in needed
+    assert r"%   \usepackage{array,booktabs,longtable,graphicx,siunitx,textcomp}" in text
 
 
 @pytest.mark.parametrize(
@@ -300,6 +300,39 @@ def test_long_words_may_break() -> None:
 def commands(text: str) -> set[str]:
     """Every command of a LaTeX text, those in its comments apart."""
     return set(re.findall(r"\\([a-zA-Z]+)", re.sub(r"^%.*$", "", text, flags=re.MULTILINE)))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("3.87 ± 0.12", r"\num{3.87 \pm 0.12}"),
+        ("(4.01 ± 0.12) × 10⁻⁹ †", r"\num{4.01 \pm 0.12 e-9} \textdagger{}"),
+        ("−12 (−14 to −9)", r"\num{-12} (\num{-14} to \num{-9})"),
+        ("≥ 24.6", r"\ensuremath{\geq} \num{24.6}"),
+        ("1168 ± 31 (assumed)", r"\num{1168 \pm 31} (assumed)"),
+        ("4 × 10⁵", r"\num{4 e5}"),
+        ("v1.2.3 of x2 is 1.2.3", "v1.2.3 of x2 is 1.2.3"),
+        ("–", r"\textendash{}"),
+    ],
+)
+def test_numbers_of_a_cell_are_set_by_siunitx(text: str, expected: str) -> None:
+    assert cell_numbers(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Error (mrad)", r"Error (\unit{\milli\radian})"),
+        ("Stiffness (N·m/rad)", r"Stiffness (\unit{\newton\metre\per\radian})"),
+        ("Rise (10 to 90 %) (ms)", r"Rise (10 to 90 \%) (\unit{\milli\second})"),
+        ("J (kg·m²)", r"J (\unit{\kilo\gram\metre\squared})"),
+        ("Share (%)", r"Share (\unit{\percent})"),
+        ("Growth (1/s)", r"Growth (\unit{\per\second})"),
+        ("Fitted up to (share of Ts)", r"Fitted up to (share of \ensuremath{T_\mathrm{s}})"),
+    ],
+)
+def test_the_unit_of_a_head_is_set_by_siunitx(text: str, expected: str) -> None:
+    assert column_head(text) == expected
 
 
 def test_no_hostile_word_is_a_command_in_latex(folder: Path, hostile: Path) -> None:
@@ -460,4 +493,4 @@ def test_the_page_is_printed_whole(made_up: ModuleType, tmp_path: Path) -> None:
         done = subprocess.run(["pdftotext", str(made), "-"], capture_output=True)
         pages = done.stdout.decode().split("\f")[:-1]
         assert "the end of a folded text" in pages[-1]
-        assert all(re.search(rf"^{n} / {len(pages)}$", p, re.M) for n, p in enumerate(pages, 1))
+        assert all(re.search(rf"^{n} ?/ ?{len(pages)}$", p, re.M) for n, p in enumerate(pages, 1))

@@ -53,7 +53,7 @@ def test_a_slow_lugre_slides_as_its_steady_curve(tmp_path: Path) -> None:
         tmp_path, "lugre", "stribeck", "--frequency", "0.01 Hz", "--set", "static_torque=40 N m",
         "--output", "both.svg",
     )  # fmt: skip
-    fast = found["rate_rad_s"].abs() > 0.9 * found["rate_rad_s"].max()
+    fast = found["rate_rad_per_s"].abs() > 0.9 * found["rate_rad_per_s"].max()
     np.testing.assert_allclose(found["lugre_N_m"][fast], found["stribeck_N_m"][fast], rtol=2e-3)
     assert found["stribeck_N_m"].max() == pytest.approx(40.0, rel=2e-3)
 

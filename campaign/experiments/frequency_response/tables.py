@@ -162,11 +162,22 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         columns=(
             *named,
             Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column("bandwidth_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA()),
+            Column(
+                "bandwidth_standard_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA(), file_only=True
+            ),
             Column("gain_margin", "Gain margin", "dB"),
-            Column("gain_margin_error", "± (1σ)", "dB", reason=ONE_SIGMA()),
+            Column(
+                "gain_margin_standard_error", "± (1σ)", "dB", reason=ONE_SIGMA(), file_only=True
+            ),
             Column("phase_margin", "Phase margin", "rad", "deg"),
-            Column("phase_margin_error", "± (1σ)", "rad", "deg", reason=ONE_SIGMA()),
+            Column(
+                "phase_margin_standard_error",
+                "± (1σ)",
+                "rad",
+                "deg",
+                reason=ONE_SIGMA(),
+                file_only=True,
+            ),
             Column("gain_margin_bound", "Gain margin at least", "dB"),
         ),
         rows=tuple(rows),
@@ -181,7 +192,7 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
 
 def _servo_row(sweep: Sweep, found: ServoCharacteristics) -> dict[str, Cell]:
     values = _values(found)
-    errors = {f"{name}_error": value.standard_error for name, value in values.items()}
+    errors = {f"{name}_standard_error": value.standard_error for name, value in values.items()}
     return {**sweep.place, **values, **errors, "gain_margin_bound": found.gain_margin_bound}
 
 

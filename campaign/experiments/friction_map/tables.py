@@ -138,12 +138,12 @@ def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
         row: dict[str, Cell] = {"parameter": SYMBOLS[parameter], "unit": UNITS[parameter]}
         for name, found in free.items():
             row[name] = found[parameter]
-            row[f"{name}_2"] = fixed[name][parameter]
-            row[f"{name}_error"] = found[parameter].standard_error
+            row[f"{name}_exponent_2"] = fixed[name][parameter]
+            row[f"{name}_standard_error"] = found[parameter].standard_error
         rows.append(row)
     rms: dict[str, Cell] = {"parameter": "residual (rms)", "unit": "N m"}
     for name, fit in fits.fits.items():
-        rms |= {name: _rms(fit, "free"), f"{name}_2": _rms(fit, "2")}
+        rms |= {name: _rms(fit, "free"), f"{name}_exponent_2": _rms(fit, "2")}
     return Table(
         key=f"parameters{suffix}",
         title=f"Static friction parameters{f' ({where})' if where else ''}",
@@ -151,13 +151,13 @@ def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
             Column("parameter", "Parameter"),
             Column("unit", "Unit"),
             Column("positive", "Positive"),
-            Column("positive_error", "± (1σ)", reason=ERROR_OF()),
+            Column("positive_standard_error", "± (1σ)", reason=ERROR_OF(), file_only=True),
             Column("negative", "Negative"),
-            Column("negative_error", "± (1σ)", reason=ERROR_OF()),
+            Column("negative_standard_error", "± (1σ)", reason=ERROR_OF(), file_only=True),
             Column("nominal", "Nominal"),
-            Column("positive_2", "Positive, δ = 2"),
-            Column("negative_2", "Negative, δ = 2"),
-            Column("nominal_2", "Nominal, δ = 2"),
+            Column("positive_exponent_2", "Positive, δ = 2"),
+            Column("negative_exponent_2", "Negative, δ = 2"),
+            Column("nominal_exponent_2", "Nominal, δ = 2"),
         ),
         rows=(*rows, rms),
         thesis=("4.3",),

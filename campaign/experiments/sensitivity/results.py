@@ -157,9 +157,9 @@ def _row(one: Judged) -> dict[str, Cell]:
         "rank": one.rank,
         "unchanged": response.unchanged,
         "lowest_change": float(response.change[0]),
-        "low": response.errors[0],
+        "lowest_change_error": response.errors[0],
         "highest_change": float(response.change[-1]),
-        "high": response.errors[-1],
+        "highest_change_error": response.errors[-1],
         "said": "" if one.passed else f"none below {bound}",
     }
 
@@ -178,9 +178,9 @@ def sensitivity_table(judged: Sequence[Judged], limit: Threshold) -> Table:
             Column("rank", "Rank"),
             Column("unchanged", "Error, unchanged", "rad", "mrad"),
             Column("lowest_change", "Largest decrease", "", "percent", exact=True),
-            Column("low", "Error there", "rad", "mrad"),
+            Column("lowest_change_error", "Error there", "rad", "mrad"),
             Column("highest_change", "Largest increase", "", "percent", exact=True),
-            Column("high", "Error there", "rad", "mrad"),
+            Column("highest_change_error", "Error there", "rad", "mrad"),
         ),
         rows=tuple(_row(one) for one in sorted(judged, key=lambda one: one.rank.value)),
         thesis=("figure 5.14",),

@@ -7,7 +7,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import quote
 
 from campaign.axis_kind import in_axis_terms
@@ -23,6 +23,8 @@ from campaign.units import convert
 
 ROWS = 300
 """Most rows on the page; the CSV file has them all."""
+FIRST, LISTED = 12, 30
+"""Rows of a longer table that are cells on the page, and the rows from which on it is longer."""
 DAGGER = "†"
 MARKS = {Origin.MEASURED: "", Origin.CONTRADICTED: f" {DAGGER}"}
 """Behind a number, by its origin; of others the origin itself."""
@@ -30,6 +32,10 @@ REASONS = 6
 """Most reasons for a missing interval that stand below a table."""
 UNIT = "unit"
 """Name of a column that says the unit of its row."""
+CONDITIONS = "conditions"
+"""Name of a column that lists the conditions of its row."""
+FEWEST = 3
+"""Rows from which on what all of them say is said once."""
 PUBLISHED = "published"
 """Name of a column that the report puts beside those of an analysis: the last of the file."""
 ROUNDING = 1e-12
@@ -56,16 +62,81 @@ class ShownTable:
     left_out: int = 0
     notes: tuple[str, ...] = ()
 
+    @property
+    def in_cells(self) -> tuple[tuple[ShownCell, ...], ...]:
+        """The rows that a page shows as a table; the others of a long one are `as_text`."""
+        return self.rows if len(self.rows) <= LISTED else self.rows[:FIRST]
 
-def show(table: Table) -> ShownTable:
-    """The first `ROWS` rows, rounded to four significant digits, in display units."""
-    shown = [_shown_column(column, table.rows[:ROWS]) for column in table.columns]
-    rows = tuple(zip(*shown, strict=True))
+    @property
+    def as_text(self) -> str:
+        """The other rows as aligned lines with tabs between the cells; "" where there are none."""
+        rows = [[cell.text for cell in row] for row in self.rows[len(self.in_cells) :]]
+        wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        right = [cell.number for cell in self.rows[0]] if rows else []
+        lines = (
+            "\t".join(
+                cell.rjust(width) if number else cell.ljust(width)
+                for cell, width, number in zip(row, wide, right, strict=True)
+            )
+            for row in rows
+        )
+        return "\n".join((" | ".join(self.headers), *lines)) if rows else ""
+
+
+def show(table: Table, *, once: bool = True) -> ShownTable:
+    """The first `ROWS` rows, rounded, in display units; `once`: what all rows say, said once."""
+    rows: Sequence[Mapping[str, Cell]] = table.rows[:ROWS]
+    columns = [column for column in table.columns if not column.file_only]
+    told: list[str] = []
+    if once and len(rows) >= FEWEST:
+        told, columns, rows = _said_once(columns, rows)
+    shown = [_shown_column(column, rows) for column in columns]
     headers = tuple(
         f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
-        for column in table.columns
+        for column in columns
     )
-    return ShownTable(headers, rows, max(0, len(table.rows) - ROWS), tuple(remarks(table)))
+    notes = ([f"In all rows: {'; '.join(told)}."] if told else []) + list(remarks(table))
+    left_out = len(table.rows) - len(rows)
+    return ShownTable(headers, tuple(zip(*shown, strict=True)), left_out, tuple(notes))
+
+
+def _said_once(
+    columns: Sequence[Column], rows: Sequence[Mapping[str, Cell]]
+) -> tuple[list[str], list[Column], Sequence[Mapping[str, Cell]]]:
+    """What all rows have in common, and the columns and rows without it.
+
+    These are words and what was set, never what was found. A common unit goes to the heads of the
+    numbers.
+    """
+    told: list[str] = []
+    unit, kept = "", list(columns[:1])
+    for column in columns[1:]:
+        cells = [row.get(column.name) for row in rows]
+        words = [cell for cell in cells if isinstance(cell, str)]
+        if column.name == CONDITIONS and len(words) == len(cells):
+            common = set.intersection(*(set(text.split(", ")) for text in words)) - {""}
+            told += [part for part in words[0].split(", ") if part in common]
+            rest = [", ".join(p for p in text.split(", ") if p not in common) for text in words]
+            rows = [{**row, CONDITIONS: text} for row, text in zip(rows, rest, strict=True)]
+            kept += [column] if any(rest) else []
+        elif column.name == PUBLISHED or cells[0] in (None, "") or len(set(map(str, cells))) > 1:
+            kept.append(column)
+        elif column.name == UNIT:
+            unit = str(cells[0])
+        elif len(words) == len(cells) or (column.exact and not _takes_unit(column, rows)):
+            text = _shown_column(column, rows)[0].text
+            told.append(" ".join(filter(None, (column.label, text, pretty_unit(_unit(column))))))
+        else:
+            kept.append(column)
+    if unit:
+        kept = [replace(c, unit=unit) if _takes_unit(c, rows) else c for c in kept]
+    return told, kept, rows
+
+
+def _takes_unit(column: Column, rows: Sequence[Mapping[str, Cell]]) -> bool:
+    """Whether the unit of its row is that of a column's numbers: these are no counts."""
+    cells = [row.get(column.name) for row in rows]
+    return not _unit(column) and any(isinstance(cell, float | Estimate) for cell in cells)
 
 
 def table_csv(table: Table) -> str:

@@ -102,6 +102,16 @@ class TestUnits:
             columns.append(column)
         return replace(table, columns=tuple(columns))
 
+    def in_si(self, table: Table) -> Table:
+        """The same table, with the SI unit of what was swept, for its file."""
+        columns = (
+            replace(column, unit=unit.si)
+            if column.name in self._swept and not column.unit and (unit := self.of(column.name))
+            else column
+            for column in table.columns
+        )
+        return replace(table, columns=tuple(columns))
+
     @cached_property
     def _known(self) -> dict[str, Shown | None]:
         return {}

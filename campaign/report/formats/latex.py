@@ -28,7 +28,7 @@ SECTIONS = {1: "section", 2: "subsection", 3: "subsubsection"}
 HEAD = r"""% Made by campaign from the archive of a run; to be used by \input from another document.
 % It needs in the preamble:
 %   \usepackage[T1]{fontenc}
-%   \usepackage{array,booktabs,longtable,graphicx,textcomp}
+%   \usepackage{array,booktabs,longtable,graphicx,siunitx,textcomp}
 % and, where the document lies in another folder than this one, before the \input:
 %   \newcommand{\reportfolder}{path/to/this/folder}
 % Labels are fig:RUN:N and tab:RUN:N, with the numbers of the page. No figure or table leaves its
@@ -46,7 +46,7 @@ WRAPPER = r"""% Typesets report.tex alone: pdflatex main, twice. Write your own 
 \usepackage[T1]{fontenc}
 \IfFileExists{lmodern.sty}{\usepackage{lmodern}}{}
 \usepackage[margin=20mm]{geometry}
-\usepackage{array,booktabs,longtable,graphicx,textcomp}
+\usepackage{array,booktabs,longtable,graphicx,siunitx,textcomp}
 \IfFileExists{placeins.sty}{\usepackage{placeins}}{}
 \begin{document}
 \input{NAME.tex}

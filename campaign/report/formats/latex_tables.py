@@ -1,10 +1,10 @@
-"""LaTeX tables with booktabs: natural width, or wrapped to the line."""
+"""LaTeX tables with booktabs and siunitx: natural width, or wrapped to the line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.report.latex_text import LONGEST, breakable
+from campaign.report.latex_text import LONGEST, breakable, cell_numbers, column_head
 from campaign.report.page.pieces import Grid
 
 LONG = 30
@@ -23,7 +23,7 @@ def grid_lines(grid: Grid, label: str) -> Iterator[str]:
     """A table with its caption and, below it, its notes. `label`: for references to it."""
     caption = rf"\caption{{{breakable(grid.title)}}}\label{{{label}}}"
     letters = r"\scriptsize" if len(grid.headers) > MANY else r"\footnotesize"
-    letters += r"\setlength{\tabcolsep}{4pt}"
+    letters += r"\setlength{\tabcolsep}{4pt}\sisetup{separate-uncertainty,retain-explicit-plus}"
     notes = " ".join(map(breakable, filter(None, (*grid.notes, grid.file))))
     if len(grid.rows) > LONG:
         yield rf"\begingroup{letters}\setlength{{\LTcapwidth}}{{\linewidth}}"
@@ -39,22 +39,22 @@ def grid_lines(grid: Grid, label: str) -> Iterator[str]:
 
 def _short(grid: Grid) -> Iterator[str]:
     yield rf"\begin{{tabular}}{{{_columns(grid)}}}"
-    yield rf"\toprule {_row(grid.headers)} \midrule"
-    yield from map(_row, grid.rows)
+    yield rf"\toprule {_head(grid)} \midrule"
+    yield from _rows(grid)
     yield r"\bottomrule"
     yield r"\end{tabular}"
 
 
 def _long(grid: Grid, caption: str) -> Iterator[str]:
     """Over as many pages as it takes; the heads are repeated."""
-    head = rf"\toprule {_row(grid.headers)} \midrule"
+    top = rf"\toprule {_head(grid)} \midrule"
     if grid.number is None:
         yield rf"\noindent {_title(grid)}"
     yield rf"\begin{{longtable}}{{{_columns(grid)}}}"
-    yield rf"{caption} \\ {head} \endfirsthead" if grid.number is not None else ""
-    yield rf"{head} \endhead"
+    yield rf"{caption} \\ {top} \endfirsthead" if grid.number is not None else ""
+    yield rf"{top} \endhead"
     yield r"\bottomrule \endfoot"
-    yield from map(_row, grid.rows)
+    yield from _rows(grid)
     yield r"\end{longtable}"
     if grid.number is None:
         yield r"\addtocounter{table}{-1}"  # which every long table counts up
@@ -64,13 +64,26 @@ def _title(grid: Grid) -> str:
     return rf"\textbf{{{breakable(grid.title)}}}\par "
 
 
-def _row(cells: tuple[str, ...]) -> str:
-    return rf"{' & '.join(map(breakable, cells))} \\"
+def _head(grid: Grid) -> str:
+    return rf"{' & '.join(map(column_head, grid.headers))} \\"
+
+
+def _rows(grid: Grid) -> Iterator[str]:
+    right = _right(grid)
+    for row in grid.rows:
+        cells = (
+            cell_numbers(c) if each else breakable(c) for c, each in zip(row, right, strict=True)
+        )
+        yield rf"{' & '.join(cells)} \\"
+
+
+def _right(grid: Grid) -> tuple[bool, ...]:
+    return grid.right or (False,) * len(grid.headers)
 
 
 def _columns(grid: Grid) -> str:
     """The column specification; cells wrap where they are wider than a line together."""
-    right = grid.right or (False,) * len(grid.headers)
+    right = _right(grid)
     lines = [grid.headers, *grid.rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(grid.headers))]
     if sum(widths) + GAP * len(widths) <= ROOM:

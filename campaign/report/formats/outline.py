@@ -10,7 +10,7 @@ from campaign.report.content.document import Document
 from campaign.report.content.first_screen import Answer, Opening
 from campaign.report.content.lines import ShownLine
 from campaign.report.page.damage_notice import Notice
-from campaign.report.page.folder import Comparison, Section, ShownFigure
+from campaign.report.page.folder import FOUND, Comparison, Section, ShownFigure
 from campaign.report.page.layout import Layout
 from campaign.report.page.pieces import (
     Facts,
@@ -179,18 +179,19 @@ def _compared(shown: Comparison) -> Grid:
         shown.number,
         shown.anchor,
         f"Published {shown.heading} and what was reproduced. {shown.title}.",
-        ("Cell", "Unit", "Published", "Reproduced", "Deviation", "Verdict", "Status"),
-        (False, False, True, True, True, False, False),
-        tuple(map(_line, shown.lines)),
+        shown.heads,
+        tuple(head.startswith((*FOUND, "Deviation")) for head in shown.heads),
+        tuple(_line(line, () if shown.unit else (line.unit,)) for line in shown.lines),
         tuple(f"{', '.join(cells)}: {remark}." for remark, cells in remarks.items()),
         shown.download.file,
     )
 
 
-def _line(line: ShownLine) -> tuple[str, ...]:
+def _line(line: ShownLine, unit: tuple[str, ...]) -> tuple[str, ...]:
     found = f"{line.reproduced} ({line.place})" if line.place else line.reproduced
     verdict = f"{line.verdict} ✓" if line.good else line.verdict
-    return line.name, line.unit, line.published, found, line.deviation, verdict, line.status
+    share = line.deviation.removesuffix(" %")
+    return line.name, *unit, line.published, found, share, verdict, line.status
 
 
 def _contradictions(document: Document) -> Iterator[Piece]:

@@ -15,11 +15,13 @@ from campaign.report.drawing.drawing_files import Drawn
 from campaign.report.drawing.figures import inline
 from campaign.report.drawing.label_size import legible_width, view_box
 from campaign.report.drawing.pdf import taken
+from campaign.report.page.merged_marks import merged
 from campaign.report.page.names import Names
 from campaign.report.palette import Look
 from campaign.result import Figure, Table
 from campaign.text import of_trials
 
+FOUND = ("Published", "Reproduced")
 LINKED = 6_000
 """Characters of a CSV file up to which the page carries it; a longer one is only a file beside it.
 
@@ -99,6 +101,19 @@ class Comparison:
     source: str
     lines: tuple[ShownLine, ...]
     download: Download
+
+    @property
+    def unit(self) -> str:
+        """The unit of all its numbers, for their heads; "" where it is not one."""
+        units = {line.unit for line in self.lines}
+        return units.pop() if len(units) == 1 else ""
+
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Of the columns, without that of the unit where the heads say it."""
+        found = [f"{head} ({self.unit})" if self.unit else head for head in FOUND]
+        units = () if self.unit else ("Unit",)
+        return ("Cell", *units, *found, "Deviation (%)", "Verdict", "Status")
 
 
 @dataclass(frozen=True)
@@ -196,7 +211,7 @@ class Folder:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        markup = Markup(inline(merged(svg), anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
         shown = ShownFigure(self.figures, anchor, title, caption, markup, file)
         box, least = view_box(svg) or shown.box, math.ceil(legible_width(svg))
         return replace(shown, command=command, box=box, least=least)

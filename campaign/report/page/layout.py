@@ -129,6 +129,15 @@ class Layout:
         return {figure.anchor: title for title, figure in of}
 
     @property
+    def long_tables(self) -> tuple[ShownTable, ...]:
+        """The tables whose further rows stand in the appendix."""
+        of_tests = (item for section in self.sections for item in section.items)
+        found = (
+            each for each in (*of_tests, *self.incident_tables) if isinstance(each, ShownTable)
+        )
+        return tuple(each for each in found if each.content.as_text)
+
+    @property
     def telling(self) -> ShownFigure | None:
         """The figure on top of the page."""
         wanted = self.document.opening.telling
@@ -398,6 +407,7 @@ class _Maker:
         reproduced = [self.published[n] for n in self.test.reproduces if n in self.published]
         table = with_published(table, reproduced, self.test.evidence().known)
         page = self.units.table(as_compared(table))
+        table = self.units.in_si(table)
         return self.folder.shown_table(table, numbers, f"{self.test.name}-{table.key}", page=page)
 
 

@@ -89,7 +89,7 @@ def trial_pages(
         context = {
             "trial": account,
             "charts": charts(account),
-            "tables": [(table, tables.show(table)) for table in account.tables],
+            "tables": [(table, tables.show(table, once=False)) for table in account.tables],
             "damage": [in_words(damage) for damage in account.damaged],
             "run": run,
             "header": run.header,
