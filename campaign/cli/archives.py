@@ -7,7 +7,7 @@ from pathlib import Path
 
 from campaign.archive import RunSummary, list_runs
 from campaign.archive.writing.remnants import find_remnants
-from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
+from campaign.cli.output import bytes_text, print_json, print_note, print_table
 from campaign.cli.selection import Selection
 
 _HEADINGS = (

@@ -36,6 +36,7 @@ from campaign.report.drawing.curves import (
 from campaign.report.drawing.decimate import POINTS
 from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
+from campaign.report.drawing.math_type import in_svg
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
 from campaign.report.drawing.ticks import set_ticks
@@ -68,6 +69,7 @@ ROOM = 0.14
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "campaign",
+    "pdf.fonttype": 42,  # journals refuse Type 3
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
     "text.parse_math": False,  # a label is a name, whatever signs are in it
@@ -218,7 +220,7 @@ def to_svg(sheet: Canvas) -> str:
     keep_as_pdf(sheet)
     text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
     text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
-    return _SIGNS.sub(_styled_once, text)
+    return in_svg(_SIGNS.sub(_styled_once, text))
 
 
 def _place(sheet: Canvas) -> None:
@@ -400,6 +402,8 @@ def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
 def axis_label(axis: Axis) -> str:
     """`label (unit)` in the unit of the page; places with names of their own have none."""
     unit = "" if axis.places else axis.display or axis.unit
+    if unit and axis.label.endswith(")"):
+        return f"{axis.label[:-1]}, {pretty_unit(unit)})"
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label
 
 
