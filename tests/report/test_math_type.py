@@ -26,7 +26,7 @@ SHOWN = Figure(
     (
         Panel(
             Axis("σ0", "N m/rad", places=((-2.0, "T_c\nnot reached"), (2.0, "T_s"))),
-            Axis("Costs $5, v_s", "rad/s"),
+            Axis("Cost $5, v_s", "m/s"),
             [Curve(X, X, "δ = 2", "fit"), Curve(X, -X, "-1 by name-2", "measured")],
             "Over T_f",
             [Mark("at q̇_s", x=0.5)],
@@ -52,7 +52,7 @@ def test_an_svg_document_has_symbols_in_the_middle_of_its_texts() -> None:
     found = dict(spans(slim(draw(SHOWN))))
     assert found["σ0"] == "[σ]{0}"
     assert found["Ts"] == "[T]{s}"
-    assert found["Costs $5, vs (rad/s)"] == "Costs $5, [v]{s} (rad/s)"
+    assert found["Cost $5, vs (m/s)"] == "Cost $5, [v]{s} (m/s)"
     assert found["δ = 2"] == "[δ] = 2"
     assert found["Over Tf"] == "Over [T]{f}"
     assert found["at q̇s"] == "at [q̇]{s}"
