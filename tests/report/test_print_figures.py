@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 from campaign.archive import open_run
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.report.content.document import document_of
-from campaign.report.drawing.figures import Column
+from campaign.report.drawing.figures import Column, draw_sheet
 from campaign.report.page.drawings import drawings_of
 from campaign.report.palette import SERIES, looks
 from campaign.result import Axis, Curve, Figure, Finding, Mark, Panel
@@ -111,6 +112,29 @@ def test_colours_alone_do_not_tell_curves_apart() -> None:
     a, b, c = (Curve(X, X, name, name) for name in "abc")
     assert not told_apart(a, b, chosen)
     assert told_apart(a, c, chosen)
+
+
+def test_a_legend_shows_all_that_a_series_looks_like() -> None:
+    dots = replace(SINE, style="points")
+    panels = (of_panel(SINE).panels[0], of_panel(dots).panels[0])
+    (legend,) = draw_sheet(replace(several(1), panels=panels)).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["sine"]
+    signs = {(sign.get_linestyle(), sign.get_marker()) for sign in legend.findobj(Line2D)}
+    assert signs == {("-", "None"), ("None", "o")}
+
+
+def test_numbers_of_named_places_are_bars_where_their_axis_begins_at_zero() -> None:
+    places = Axis("Method", places=((0.0, "none"), (1.0, "static")))
+    dots = Curve(np.array([0.0, 1.0]), np.array([0.7, 0.4]), "", "none", "points")
+    for limits, heights in (((0.0, np.nan), [0.7, 0.4]), (None, [])):
+        y = Axis("Error", "rad", limits=limits)
+        (ax,) = draw_sheet(of_panel(dots, x=places, y=y)).axes
+        assert [bar.get_height() for bar in ax.patches] == heights
+
+
+def test_panels_one_below_the_other_name_a_common_axis_once() -> None:
+    labels = [ax.get_xlabel() for ax in draw_sheet(several(3)).axes]
+    assert labels == ["", "", "Time (s)"]
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ TALLEST = 230.0 / 25.4
 """That of a page of a journal, less a caption: rows of panels share it."""
 LOWEST = 1.4
 """Inches of a row; where a page has not room for so many, more panels stand side by side."""
-LETTER, BOLD_LETTER, NUMBER = 5.0, 5.7, 28.0
+LETTER, BOLD_LETTER, NUMBER = 5.0, 6.0, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
 LINE = 14.0
 """... and across it."""
@@ -165,13 +165,18 @@ def _drawn(
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
             title = f"({letter(place)}) {panel.title}" if len(figure.panels) > 1 else panel.title
-            ax.set_title(fill(title.rstrip(), max(12, int(wide / BOLD_LETTER))))
+            ax.set_title(
+                fill(title.rstrip(), max(12, int(wide / BOLD_LETTER)), break_long_words=False)
+            )
         for place, panel in enumerate(figure.panels):
             if place % across and panel.y.places and panel.y == figure.panels[place - 1].y:
                 axes[place].tick_params(labelleft=False)  # the panel on its left has the names
         if figure.one_scale:
             _share_scales(sets)
         marked = [_finish(each, chosen, (wide, high)) for each in sets]
+        for place, panel in enumerate(figure.panels[:-across]):
+            if panel.x == figure.panels[place + across].x:
+                axes[place].set_xlabel("")  # the panel below has it
         for ax in axes[len(figure.panels) :]:
             ax.set_axis_off()
         own = not _titles_say_it(figure)
@@ -329,10 +334,22 @@ def _size(figure: Figure) -> tuple[float, float]:
     width, each = WIDTH, {1: 3.3 if down == 1 else 2.4, 2: 2.7, 3: 2.2}[across]
     if _column.get() == "single":
         width, each = SINGLE, 2.9 if down == 1 else 1.9
-    if figure.panels and all(panel.x.places for panel in figure.panels):
+    if figure.panels and all(p.x.places and not p.y.places for p in figure.panels):
         each = min(each, LOW)
     each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
+    wide = 72.0 * width / across - 50.0
+    each += LETTER / 72 * max((_longest(p) for p in figure.panels if _turned(p, wide)), default=0)
     return width, 0.35 + each * max(down, 1)
+
+
+def _turned(panel: Panel, wide: float) -> bool:
+    """Whether names along x stand upright, since they have no room side by side."""
+    long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
+    return LETTER * max(map(sum, pairwise(long)), default=0) / 2 > wide / max(len(long), 1)
+
+
+def _longest(panel: Panel) -> int:
+    return max(len(name) for _, name in panel.x.places)
 
 
 def _room(figure: Figure) -> tuple[float, float]:
@@ -419,8 +436,7 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
     _label_axes(ax, panel, room)
     set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / NUMBER))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
-    long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
-    if LETTER * max(map(sum, pairwise(long)), default=0) / 2 > room[0] / max(len(long), 1):
+    if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
         ax.set_xticklabels(names, rotation=90)
     marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
@@ -432,8 +448,8 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
 
 def _label_axes(ax: Axes, panel: Panel, room: tuple[float, float]) -> None:
     """Names of the axes, in as many lines as they are short of them."""
-    ax.set_xlabel(fill(axis_label(panel.x), max(12, int(room[0] / LETTER))))
-    ax.set_ylabel(fill(axis_label(panel.y), max(12, int(room[1] / LETTER))))
+    for name, axis, long in ((ax.set_xlabel, panel.x, room[0]), (ax.set_ylabel, panel.y, room[1])):
+        name(fill(axis_label(axis), max(12, int(long / LETTER)), break_long_words=False))
 
 
 def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
