@@ -131,14 +131,15 @@ def looks_of_page(figures: Iterable[Iterable[str]]) -> dict[str, Look]:
 def _unlike(taken: Sequence[Look]) -> Look:
     """A look that cannot be mistaken for any of those beside it, by colour nor in grey.
 
-    Where no colour or dash is left, dash and marker together are unlike; past 64 series looks
-    repeat.
+    Where no colour is left, the dash is unlike; where no dash is, dash and marker together; past 64
+    series looks repeat.
     """
     colours, dashes = {look.light for look in taken}, {look.dash for look in taken}
     pairs = {(look.dash, look.marker) for look in taken}
     free = [look for look in OTHERS if (look.dash, look.marker) not in pairs]
     clear = [look for look in free if look.light not in colours and look.dash not in dashes]
-    return next(iter(clear or free), OTHERS[len(taken) % len(OTHERS)])
+    dashed = [look for look in free if look.dash not in dashes]
+    return next(iter(clear or dashed or free), OTHERS[len(taken) % len(OTHERS)])
 
 
 def variables() -> dict[str, tuple[str, str]]:

@@ -168,7 +168,7 @@ def test_side_by_side_they_know_what_they_are() -> None:
 
 
 def test_a_bound_beside_numbers_says_so() -> None:
-    (figure,) = servo_figure([sweep(14.0)])
+    (figure,) = servo_figure([sweep(14.0), sweep(200.0, "lugre", 0.9)])
     (panel,) = (panel for panel in figure.panels if panel.title == "Gain margin")
     (mark,) = panel.marks
     assert mark.label == "at least"
@@ -176,7 +176,7 @@ def test_a_bound_beside_numbers_says_so() -> None:
 
 
 def test_what_no_sweep_shows_has_no_panel_and_too_many_no_figure() -> None:
-    (figure,) = servo_figure([sweep(4.0)])
+    (figure,) = servo_figure([sweep(4.0)] * 2)
     assert [panel.title for panel in figure.panels] == ["Bandwidth"]
-    assert list(servo_figure([])) == []
+    assert list(servo_figure([])) == list(servo_figure([sweep(200.0)])) == [], "a table says it"
     assert list(servo_figure([sweep(4.0)] * (SIDE_BY_SIDE + 1))) == []

@@ -30,6 +30,7 @@ from campaign.report.palette import (
 )
 from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table
 from campaign.text import number, percent
+from tests.report.print_checks import DEFICIENCIES, lab
 
 TIME = Axis("Time", "s", "ms")
 
@@ -99,24 +100,6 @@ def test_lines_stand_out_on_light_and_dark(look) -> None:
 def test_text_is_readable_on_light_and_dark(look) -> None:
     assert contrast(look.light, PAPER.light) >= 4.5
     assert contrast(look.dark, PAPER.dark) >= 4.5
-
-
-# Machado, Oliveira and Fernandes (2009), severity 1, on linear RGB.
-DEFICIENCIES = {
-    "normal": np.eye(3),
-    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
-    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
-    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
-}
-
-
-def lab(colour: str, matrix: object) -> np.ndarray:
-    rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    seen = np.clip(np.array(matrix) @ linear, 0, 1)
-    xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]] @ seen
-    x, y, z = np.cbrt(xyz / [0.9505, 1.0, 1.089])
-    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)

@@ -102,13 +102,13 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         [(label, series, r, r.level, _turned(r)) for label, series, r in named],
         thesis=("4.5",),
         level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
-        phase_marks=tuple(Mark("", x=value) for value in found),
+        phase_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
     )
     inertia = Panel(
         FREQUENCY,
         Axis("Apparent inertia", "kg m^2", "kg m^2"),
         [Curve(r.frequency, _apparent_inertia(r), label, series) for label, series, r in named],
-        marks=tuple(Mark("", x=value) for value in found),
+        marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
     )
     return replace(bode, panels=(*bode.panels, inertia))
 

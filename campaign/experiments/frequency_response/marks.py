@@ -139,9 +139,12 @@ def _label(name: str, number: str, count: int) -> str:
 
 
 def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
-    """Bandwidth and margins of each closed loop beside each other, with their intervals."""
+    """Bandwidth and margins of each closed loop beside each other, with their intervals.
+
+    None of a single loop: its table says as much.
+    """
     read = [sweep for sweep in sweeps if sweep.found is not None]
-    if not 1 <= len(read) <= SIDE_BY_SIDE:
+    if not 2 <= len(read) <= SIDE_BY_SIDE:
         return
     names = place_names(read)
     axis = Axis(

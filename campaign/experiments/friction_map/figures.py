@@ -44,27 +44,24 @@ def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
         whole.append(_fitted(fits, name, name, sign=DIRECTIONS[name]))
         own[name] = [bars, _law(_fitted(fits, name, name), name)]
     marks = _least_marks(fits)
-    slow = float(np.median(np.concatenate([fit.speed for fit in fits.fits.values()])))
     return Figure(
         key=f"map{suffix}",
         title=f"Friction-velocity map{f' ({where})' if where else ''}",
-        caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b) the slow half of "
-        f"the runs, up to {amount(slow, 'rad/s', 'deg/s', 2)}, (c, d) each in its own sign over "
-        "the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
+        caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b, c) each in its "
+        "own sign over the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
         "free, with its 95 % band. Bars: 95 %, window and scatter between points.",
         alt="Friction torque over rate for both directions, one dot per constant-velocity run, and "
-        "the fitted curves; over all rates, over the slow ones, and for each direction over the "
+        "the fitted curves; over all rates, and for each direction over the "
         "logarithm of speed.",
         panels=(
             Panel(RATE, TORQUE, whole, "All rates"),
-            Panel(replace(RATE, limits=(-slow, slow)), TORQUE, whole, "Slow half"),
             *(
                 Panel(SPEED, OWN_TORQUE, curves, f"{name.capitalize()} direction", marks[name])
                 for name, curves in own.items()
             ),
         ),
         thesis=("4.9",),
-        across=2,
+        across=3,
         one_scale=True,
         trials=trials,
     )

@@ -18,7 +18,7 @@ from campaign.experiments.model_properties.rules import (
     Judged,
     Rule,
 )
-from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table
+from campaign.result import Axis, Column, Curve, Figure, Panel, Table
 
 ENDS = 1e-2, 1e2
 """Of a number over its threshold, as drawn: what lies beyond is drawn there."""
@@ -182,16 +182,19 @@ def _decisions(found: Sequence[Judged]) -> Figure:
     at = np.array([place for place, _ in places])
 
     def panel(rule: Rule) -> Panel:
-        curves = []
+        ends = (0.6 - len(found), 0.6)
+        curves = [
+            Curve(np.full(2, 1.0), np.array(ends), "met from here on", "reference"),
+            Curve(np.full(2, 0.5), np.array(ends), "partly met from here on", "alternative"),
+        ]
         for k, name in enumerate(found[0].numbers):
             over = [each.numbers[name][rule.shows] / rule.threshold for each in found]
             curves.append(Curve(np.clip(over, *ENDS), at - 0.25 + 0.25 * k, name, name, "points"))
         return Panel(
             Axis("Number over its threshold", scale="log", limits=(0.7 * ENDS[0], 1.4 * ENDS[1])),
-            Axis("", places=places, limits=(0.6 - len(found), 0.6)),
+            Axis("", places=places, limits=ends),
             curves,
             rule.name.capitalize(),
-            [Mark("", x=1.0), Mark("", x=0.5)],
         )
 
     return Figure(

@@ -27,7 +27,10 @@ def motion_figure(motion: Motion, suffix: str) -> Figure:
     recording = motion.data.recording()
     time = recording.time
     panels = []
-    marks = [Mark("", x=each.start, until=each.stop) for each in motion.sliding.points]
+    marks = [
+        Mark("" if k else "slides", x=each.start, until=each.stop)
+        for k, each in enumerate(motion.sliding.points)
+    ]
     if RELATIVE_ANGLE in recording.channels:
         angle = [Curve(time, recording[RELATIVE_ANGLE], "measured", "measured")]
         if REFERENCE in recording.channels:

@@ -234,7 +234,7 @@ def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]
                 Axis("Lag", "s", "ms"),
                 Axis("Autocorrelation"),
                 curves,
-                marks=(Mark("", y=chance), Mark("", y=-chance)),
+                marks=(Mark("95 %, white", y=chance), Mark("", y=-chance)),
             ),
             Panel(
                 Axis("Frequency", "Hz", "Hz", "log"),
@@ -284,7 +284,7 @@ def damping_figure(
         panels=(
             Panel(
                 Axis("Largest torque", "N m", "N m"),
-                Axis("Damping at rest", "N m s/rad", "N m s/rad"),
+                Axis("Damping at rest", "N m s/rad", "N m s/rad", scale="log"),
                 [*each, together],
                 marks=(Mark("assumed", y=rule),),
             ),

@@ -182,7 +182,7 @@ def coherence_figure(sources: Sequence[Source]) -> Figure:
         (
             Panel(
                 FREQUENCY,
-                Axis("Coherence", limits=(0.0, 1.02)),
+                Axis("Coherence"),
                 [Curve(each.frequency, each.coherence, name, name) for name, each in told],
             ),
         ),

@@ -128,7 +128,7 @@ def _marks(one: Judged, limit: Threshold) -> Iterator[Mark]:
     yield Mark("", x=sign * found.value, y=limit.value, point=True, series="fit")
     low, high = found.combined
     if low is not None and high is not None:
-        yield Mark("", x=sign * low, until=sign * high, series="fit")
+        yield Mark("passes here (95 %)", x=sign * low, until=sign * high, series="fit")
 
 
 def _milliradians(angle: float) -> str:

@@ -193,19 +193,29 @@ def _error_figure(place: Condition) -> Figure:
             own = largest_of(position)  # of all that is measured, as the table has it
             title += f": {amount(own, 'rad', 'mrad')}"
             largest = max(largest, own)
-        marks = [Mark("", x=time) for time in _reversals(item, window)]
+        marks = [
+            Mark("" if k else "hull turns", x=time)
+            for k, time in enumerate(_reversals(item, window))
+        ]
         turned = turned or bool(marks)
         panels.append(Panel(TIME, ERROR, [curve], title, marks))
+    limits = (-1.05 * largest, 1.05 * largest)
+    spans = [np.ptp(panel.curves[0].y) if panel.curves[0].y.size else np.nan for panel in panels]
+    small = [span < SMALL * np.ptp(limits) for span in spans]
     if largest > 0.0:  # one scale, which shows what each method gains
-        limits = (-1.05 * largest, 1.05 * largest)
-        panels = [replace(panel, y=replace(ERROR, limits=limits)) for panel in panels]
+        panels = [
+            panel if alone else replace(panel, y=replace(ERROR, limits=limits))
+            for panel, alone in zip(panels, small, strict=True)
+        ]
+    shared = "All panels have one scale"
+    shared += ", except those of errors that would be a line on it." if any(small) else "."
     lines = " Dashed lines: where the hull is to turn around." if turned else ""
     return Figure(
         key="position-error",
         title="Position error by compensation method",
         caption="The beginning of one trial of each method: position error less its mean over all "
         "that is measured. Titles say the largest of that trial, the table the mean of repeats. "
-        f"All panels have one scale.{lines}{place.words}",
+        f"{shared}{lines}{place.words}",
         alt="Position error over time, one panel per compensation method.",
         panels=tuple(panels),
         thesis=place.numbers.get("error", ()),
@@ -230,6 +240,8 @@ def _reversals(item: TrialData, window: Window) -> Array:
     return found if len(found) <= MOST_REVERSALS else np.empty(0)
 
 
+SMALL = 0.05
+"""Share of the common scale below which a curve has its own: nothing of it would be seen."""
 MOST_REVERSALS = 8
 """that are marked."""
 CHATTER = 3.0

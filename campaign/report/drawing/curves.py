@@ -34,6 +34,8 @@ ARROW = 17.0
 """Points that the arrow of a bound is long ..."""
 HEADROOM = 0.14
 """... and the share of a panel's height that is left for it."""
+BAR = 0.5
+"""Width of a bar, where named places are 1 apart."""
 PALE = 0.55
 """Opacity of published values that contradict themselves, or that nobody could reproduce."""
 ARROWS = (0.15, 0.4, 0.65, 0.9)
@@ -242,6 +244,11 @@ def draw_curve(
     if curve.style == "line+points":
         line |= {"marker": look.marker, "markersize": 4, "markeredgewidth": 0}
     ax.plot(x, y, **line)
+
+
+def draw_bar(ax: Axes, look: Look, x: Array, y: Array) -> None:
+    """A pale bar from zero to each number of a named place, behind its dot and interval."""
+    ax.bar(x, y, BAR, color=look.light, alpha=0.25, zorder=1.2)
 
 
 def _draw_arrows(ax: Axes, x: Array, y: Array, colour: str) -> None:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from campaign.report.drawing.cached_axes import settled
 from campaign.report.drawing.curves import (
+    draw_bar,
     draw_bounds,
     draw_curve,
     draw_interval,
@@ -36,6 +38,7 @@ from campaign.report.drawing.curves import (
 from campaign.report.drawing.decimate import POINTS
 from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
+from campaign.report.drawing.math_type import in_svg
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
 from campaign.report.drawing.ticks import set_ticks
@@ -54,8 +57,18 @@ WIDTH = 180.0 / 25.4
 """Inches: the width of both columns of a journal."""
 SINGLE = 88.0 / 25.4
 """Inches: that of one."""
-LONGEST_LABEL = 24
-"""Characters of a line of a y axis' label in one column, whose panels are low."""
+TALLEST = 230.0 / 25.4
+"""That of a page of a journal, less a caption: rows of panels share it."""
+LOWEST = 1.4
+"""Inches of a row; where a page has not room for so many, more panels stand side by side."""
+LETTER, BOLD_LETTER, NUMBER = 5.0, 6.0, 28.0
+"""Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
+LINE = 14.0
+"""... and across it."""
+NAME, AROUND = 0.134, 0.7
+"""Inches of a named place along y, and of the title and labels above and below all of them."""
+LOW = 2.0
+"""Inches of a row whose panels have nothing but named places along x."""
 Column = Literal["single", "double"]
 _column: ContextVar[Column] = ContextVar("_column", default="double")
 FIGURE_POINTS = 40_000
@@ -68,6 +81,7 @@ ROOM = 0.14
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "campaign",
+    "pdf.fonttype": 42,  # journals refuse Type 3
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
     "text.parse_math": False,  # a label is a name, whatever signs are in it
@@ -145,15 +159,24 @@ def _drawn(
         axes = sheet.subplots(down, across, squeeze=False).ravel()
         total = sum(len(panel.curves) for panel in figure.panels)
         points = max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
+        wide, high = _room(figure)
         sets = []
         for place, (panel, ax) in enumerate(zip(figure.panels, axes, strict=False)):
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
-            if len(figure.panels) > 1:
-                ax.set_title(f"({letter(place)}) {panel.title}".rstrip())
+            title = f"({letter(place)}) {panel.title}" if len(figure.panels) > 1 else panel.title
+            ax.set_title(
+                fill(title.rstrip(), max(12, int(wide / BOLD_LETTER)), break_long_words=False)
+            )
+        for place, panel in enumerate(figure.panels):
+            if place % across and panel.y.places and panel.y == figure.panels[place - 1].y:
+                axes[place].tick_params(labelleft=False)  # the panel on its left has the names
         if figure.one_scale:
             _share_scales(sets)
-        marked = [_finish(each, chosen) for each in sets]
+        marked = [_finish(each, chosen, (wide, high)) for each in sets]
+        for place, panel in enumerate(figure.panels[:-across]):
+            if panel.x == figure.panels[place + across].x:
+                axes[place].set_xlabel("")  # the panel below has it
         for ax in axes[len(figure.panels) :]:
             ax.set_axis_off()
         own = not _titles_say_it(figure)
@@ -218,7 +241,7 @@ def to_svg(sheet: Canvas) -> str:
     keep_as_pdf(sheet)
     text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
     text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
-    return _SIGNS.sub(_styled_once, text)
+    return in_svg(_SIGNS.sub(_styled_once, text))
 
 
 def _place(sheet: Canvas) -> None:
@@ -290,17 +313,50 @@ def in_column(column: Column) -> Iterator[None]:
 
 
 def _across(figure: Figure) -> int:
-    most = 1 if _column.get() == "single" else 3
-    return max(1, min(figure.across, len(figure.panels), most))
+    count, usual, most = len(figure.panels), 3, 3
+    if _column.get() == "single":
+        usual, most = 1, 3 if any(panel.y.places for panel in figure.panels) else 2
+    across = max(1, min(figure.across, count, usual))
+    while across < most and -(-count // across) * _lowest(figure) > TALLEST:
+        across += 1
+    return across
+
+
+def _lowest(figure: Figure) -> float:
+    """Inches of a row of panels that has room for its names and numbers."""
+    names = max((len(panel.y.places) for panel in figure.panels), default=0)
+    return max(LOWEST, NAME * names + AROUND if names else 0.0)
 
 
 def _size(figure: Figure) -> tuple[float, float]:
     across = _across(figure)
     down = -(-len(figure.panels) // across) if figure.panels else 1
+    width, each = WIDTH, {1: 3.3 if down == 1 else 2.4, 2: 2.7, 3: 2.2}[across]
     if _column.get() == "single":
-        return SINGLE, 0.35 + (2.9 if down == 1 else 1.9) * max(down, 1)
-    each = {1: 3.3 if down == 1 else 2.4, 2: 2.7, 3: 2.2}[across]
-    return WIDTH, 0.35 + each * max(down, 1)
+        width, each = SINGLE, 2.9 if down == 1 else 1.9
+    if figure.panels and all(p.x.places and not p.y.places for p in figure.panels):
+        each = min(each, LOW)
+    each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
+    wide = 72.0 * width / across - 50.0
+    each += LETTER / 72 * max((_longest(p) for p in figure.panels if _turned(p, wide)), default=0)
+    return width, 0.35 + each * max(down, 1)
+
+
+def _turned(panel: Panel, wide: float) -> bool:
+    """Whether names along x stand upright, since they have no room side by side."""
+    long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
+    return LETTER * max(map(sum, pairwise(long)), default=0) / 2 > wide / max(len(long), 1)
+
+
+def _longest(panel: Panel) -> int:
+    return max(len(name) for _, name in panel.x.places)
+
+
+def _room(figure: Figure) -> tuple[float, float]:
+    """Points of a panel's width and height beside the labels of its axes."""
+    (width, height), across = _size(figure), _across(figure)
+    down = -(-len(figure.panels) // across)
+    return 72.0 * width / across - 50.0, 72.0 * (height - 0.35) / max(down, 1) - 45.0
 
 
 @dataclass(frozen=True)
@@ -337,6 +393,8 @@ def _draw_panel(
         x = x + curve.aside * scale_x
         if ends is not None:
             draw_interval(ax, curve, ends, look, x, y, points)
+        if panel.x.places and panel.y.scale == "linear" and (panel.y.limits or (None,))[0] == 0.0:
+            draw_bar(ax, look, x, y)
         draw_curve(ax, curve, look, x, y, y_low, points)
         bounds.append(draw_bounds(ax, curve, look, x, y))
         marks = published.get(number, ())
@@ -352,7 +410,7 @@ def _draw_panel(
     limit_intervals(ax, np.concatenate([np.empty(0), *drawn]), ends_shown)
     if panel.y.scale == "linear":
         spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
-    _label_axes(ax, panel, scale_x, scale_y)
+    _limit_axes(ax, panel, scale_x, scale_y)
     if any(mark.point for mark in panel.marks) and panel.y.limits is None:
         ax.margins(y=ROOM)
     leave_room(ax, np.concatenate([np.empty(0), *bounds]))
@@ -371,12 +429,16 @@ def _share_scales(sets: Sequence[_Drawn]) -> None:
             ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
 
 
-def _finish(drawn: _Drawn, chosen: Mapping[str, Look]) -> Marked:
+def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]) -> Marked:
     """Ticks, marks, and what is said of an empty panel, once its limits are known."""
     ax, panel = drawn.ax, drawn.panel
     scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
-    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x)
-    set_ticks(ax.yaxis, panel.y, drawn.y, scale_y)
+    _label_axes(ax, panel, room)
+    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / NUMBER))
+    set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
+    if _turned(panel, room[0]):
+        names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
+        ax.set_xticklabels(names, rotation=90)
     marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
     draw_marks(marked)
     if not any(np.isfinite(y).any() for y in drawn.y[: len(panel.curves)]):
@@ -384,12 +446,13 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look]) -> Marked:
     return marked
 
 
-def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
-    ax.set_xlabel(axis_label(panel.x))
-    label = axis_label(panel.y)
-    ax.set_ylabel(fill(label, LONGEST_LABEL) if _column.get() == "single" else label)
-    if panel.title:
-        ax.set_title(panel.title)
+def _label_axes(ax: Axes, panel: Panel, room: tuple[float, float]) -> None:
+    """Names of the axes, in as many lines as they are short of them."""
+    for name, axis, long in ((ax.set_xlabel, panel.x, room[0]), (ax.set_ylabel, panel.y, room[1])):
+        name(fill(axis_label(axis), max(12, int(long / LETTER)), break_long_words=False))
+
+
+def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
     limits = ((ax.set_xlim, panel.x, scale_x), (ax.set_ylim, panel.y, scale_y))
     for set_limits, axis, scale in limits:
         if axis.limits is not None:
@@ -400,6 +463,8 @@ def _label_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
 def axis_label(axis: Axis) -> str:
     """`label (unit)` in the unit of the page; places with names of their own have none."""
     unit = "" if axis.places else axis.display or axis.unit
+    if unit and axis.label.endswith(")"):
+        return f"{axis.label[:-1]}, {pretty_unit(unit)})"
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label
 
 

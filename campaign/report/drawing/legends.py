@@ -27,10 +27,11 @@ def add_legend(sheet: Canvas, axes: Sequence[Axes], more: Mapping[str, Any] | No
     """
     from matplotlib.legend_handler import HandlerTuple
 
-    entries: dict[str, Any] = {}
+    signs: dict[str, dict[object, Any]] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            entries.setdefault(label, handle)
+            signs.setdefault(label, {}).setdefault(_sign(handle), handle)
+    entries: dict[str, Any] = {label: tuple(each.values()) for label, each in signs.items()}
     entries |= more or {}
     if not entries:
         return
@@ -45,6 +46,15 @@ def add_legend(sheet: Canvas, axes: Sequence[Axes], more: Mapping[str, Any] | No
         borderpad=0,
         handler_map={tuple: HandlerTuple(ndivide=None, pad=0.1)},
     )
+
+
+def _sign(handle: Any) -> object:
+    """What a curve looks like: one may be a line in one panel, and dots in another."""
+    from matplotlib.lines import Line2D
+
+    if not isinstance(handle, Line2D):
+        return type(handle)
+    return handle.get_color(), handle.get_linestyle() != "None", handle.get_marker()
 
 
 def _columns(lengths: Sequence[int], width: float) -> int:

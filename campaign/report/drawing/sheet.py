@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
+
+from campaign.report.drawing.math_type import math_type
 
 
 class Sheet(Figure):
     """A figure; notebooks show one of matplotlib's own only where pyplot was set up for it."""
+
+    def draw(self, renderer: Any) -> None:
+        """With symbols in math type, in whichever format; an SVG document gets them behind."""
+        with math_type(renderer):
+            super().draw(renderer)
 
     def _repr_svg_(self) -> str:
         """In a notebook: the drawing, with the bytes of the report's file."""

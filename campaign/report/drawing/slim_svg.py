@@ -259,16 +259,17 @@ def _written(element: Element) -> Iterator[str]:
     attributes = "".join(f" {_name(key)}={quoteattr(value)}" for key, value in element.items())
     if name == "svg":
         attributes += f' xmlns="{SVG}" xmlns:xlink="{XLINK}"'
-    text = element.text if element.text and element.text.strip() else ""
+    flowing = name in ("text", "tspan")  # where a line's end would be a space, and a space is one
+    text = element.text if element.text and (flowing or element.text.strip()) else ""
     if not len(element) and not text:
         yield f"<{name}{attributes}/>"
         return
     yield f"<{name}{attributes}>{escape(text)}"
     for child in element:
-        yield "" if text else "\n"
+        yield "" if flowing or text else "\n"
         yield from _written(child)
-        yield escape(child.tail) if child.tail and child.tail.strip() else ""
-    yield f"</{name}>" if text else f"\n</{name}>"
+        yield escape(child.tail) if child.tail and (flowing or child.tail.strip()) else ""
+    yield f"</{name}>" if flowing or text else f"\n</{name}>"
 
 
 def _name(tag: str) -> str:

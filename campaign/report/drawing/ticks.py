@@ -28,11 +28,18 @@ WIDE_ANGLE = 20.0
 """deg; a shorter axis has plain steps, since nobody thinks of 0.45 deg as of a part of a turn."""
 
 
-def set_ticks(drawn: DrawnAxis, axis: Axis, values: Sequence[Array], scale: float) -> None:
+def set_ticks(
+    drawn: DrawnAxis,
+    axis: Axis,
+    values: Sequence[Array],
+    scale: float,
+    decades: int = MOST_DECADES,
+) -> None:
     """Ticks for what is in view; to be called once its limits are set.
 
     values: all that is drawn along this axis, in display units.
     scale: display units in one of the axis' own.
+    decades: as many labels as a logarithmic axis has room for.
     """
     from matplotlib.ticker import (
         AutoMinorLocator,
@@ -49,7 +56,7 @@ def set_ticks(drawn: DrawnAxis, axis: Axis, values: Sequence[Array], scale: floa
         return
     low, high = sorted(float(end) for end in drawn.get_view_interval())
     if drawn.get_scale() == "log":
-        places = logarithmic(low, high)
+        places = logarithmic(low, high, min(decades, MOST_DECADES))
         drawn.set_major_locator(FixedLocator(places))
         drawn.set_major_formatter(FuncFormatter(_plain))
         drawn.set_minor_locator(FixedLocator(_nines(low, high)))
@@ -63,7 +70,7 @@ def set_ticks(drawn: DrawnAxis, axis: Axis, values: Sequence[Array], scale: floa
         drawn.set_major_locator(MultipleLocator(steps[0]) if steps else MaxNLocator(nbins=8))
 
 
-def logarithmic(low: float, high: float) -> list[float]:
+def logarithmic(low: float, high: float, most: int = MOST_DECADES) -> list[float]:
     """Labelled places of a logarithmic axis from `low` to `high`, both positive.
 
     Decades where there are enough of them, else 1-2-5, else equal steps.
@@ -73,15 +80,15 @@ def logarithmic(low: float, high: float) -> list[float]:
     if not 0 < low < high or not math.isfinite(high):
         return []
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    every = range(first, last + 1, max(1, math.ceil((last - first) / MOST_DECADES)))
+    every = range(first, last + 1)
 
     def within(shares: Sequence[int], exponents: Sequence[int]) -> list[float]:
         places = [share * 10.0**e for e in exponents for share in shares]
         return [place for place in places if low * (1 - 1e-9) <= place <= high * (1 + 1e-9)]
 
-    for places in (within((1,), every), within((1, 2, 5), range(first, last + 1))):
+    for places in (within((1,), every), within((1, 2, 5), every)):
         if len(places) >= FEWEST:
-            return places
+            return places[:: math.ceil(len(places) / max(2, most))]
     steps = MaxNLocator(nbins=5).tick_values(low, high)
     return [float(place) for place in steps if low <= place <= high and place > 0]
 

@@ -262,7 +262,7 @@ def _residuals(key: str, each: FrequencyFit, side: str, own: Sequence[Model]) ->
         lag, np.full(len(lag), widest), "white", "reference", "band",
         y_low=np.full(len(lag), -widest),
     )  # fmt: skip
-    marks = (Mark("", y=1.96), Mark("", y=-1.96))
+    marks = (Mark("95 %", y=1.96), Mark("", y=-1.96))
     parts = "Residual over its deviation"
     return Figure(
         key,
