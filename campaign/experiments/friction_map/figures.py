@@ -47,22 +47,22 @@ def map_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
     return Figure(
         key=f"map{suffix}",
         title=f"Friction-velocity map{f' ({where})' if where else ''}",
-        caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b, c) each in its "
-        "own sign over the logarithm of speed, on one scale. Lines: Equation 4.6 fitted with δ "
+        caption=f"{_what_shows(fits)} (a) Both directions with their signs, (b) each in its "
+        "own sign over the logarithm of speed. Lines: Equation 4.6 fitted with δ "
         "free, with its 95 % band. Bars: 95 %, window and scatter between points.",
         alt="Friction torque over rate for both directions, one dot per constant-velocity run, and "
-        "the fitted curves; over all rates, and for each direction over the "
-        "logarithm of speed.",
+        "the fitted curves; over all rates, and over the logarithm of speed.",
         panels=(
             Panel(RATE, TORQUE, whole, "All rates"),
-            *(
-                Panel(SPEED, OWN_TORQUE, curves, f"{name.capitalize()} direction", marks[name])
-                for name, curves in own.items()
+            Panel(
+                SPEED,
+                OWN_TORQUE,
+                [curve for curves in own.values() for curve in curves],
+                "Each direction",
+                [mark for name in own for mark in marks[name]],
             ),
         ),
         thesis=("4.9",),
-        across=3,
-        one_scale=True,
         trials=trials,
     )
 

@@ -17,6 +17,11 @@ _LINE = re.compile(rf"m{NUMBER} ?{NUMBER} ?(?:[hv]{NUMBER}|{NUMBER} ?{NUMBER})")
 _SMALL = re.compile(rf"{_LINE.pattern}|m[^m]{{1,40}}z")
 _ATTRIBUTE = re.compile(r'([\w:-]+)="([^"]*)"')
 _OF_ONE = re.compile(r"<g( [^>]*)>\n(<title>.*</title>\n)?<(path|use)( [^>]*)/>\n</g>")
+_PLAIN = re.compile(
+    r'<g style="((?:(?:stroke-width|text-anchor):[\w.]+;?)+)">\n'
+    r"((?:<(?:path|use|text)[^\n]*\n)+)</g>\n"
+)
+_ITEM = re.compile(r"^<(path|use|text)((?: [\w:-]+=\"[^\"]*\")*)", re.M)
 Attributes = dict[str, str]
 
 
@@ -26,11 +31,26 @@ def merged(svg: str) -> str:
     if not body:
         return svg
     signs = {a["id"]: a for a in map(_attributes, head.split("\n")) if "id" in a and "d" in a}
+    body = _PLAIN.sub(_dissolved, body)
     body = _OF_ONE.sub(_alone, "\n".join(_merged(body.split("\n"), signs)))
     used = set(re.findall(r"#(\w+)", body))
     gone = signs.keys() - used
     kept = (line for line in head.split("\n") if _attributes(line).get("id") not in gone)
     return f"{chr(10).join(kept)}</defs>{body}"
+
+
+def _dissolved(group: re.Match[str]) -> str:
+    """What a group's lines and texts have in common, said by each: marks of two can be merged."""
+    common = _style({"style": group[1]})
+
+    def own(item: re.Match[str]) -> str:
+        name, attributes = item[1], _attributes(item[2])
+        wanted = "text-anchor" if name == "text" else "stroke-width"
+        if wanted in common:
+            attributes["style"] = _css({wanted: common[wanted]} | _style(attributes))
+        return f"<{name}{_told(attributes)}"
+
+    return _ITEM.sub(own, group[2])
 
 
 def _alone(group: re.Match[str]) -> str:
