@@ -148,8 +148,9 @@ LABELS = """() => [...document.querySelectorAll("figure svg text")]
   .filter((e) => e.textContent.trim() && e.getClientRects().length && e.checkVisibility())
   .map((e) => {
     const { a, b } = e.getScreenCTM();
-    const parts = [e, ...e.querySelectorAll("tspan")];
-    const size = Math.min(...parts.map((p) => parseFloat(getComputedStyle(p).fontSize)));
+    const pixels = (p) => parseFloat(getComputedStyle(p).fontSize);
+    const indices = [...e.querySelectorAll("tspan")].map((p) => pixels(p) / 0.75);
+    const size = Math.min(pixels(e), ...indices);  // an index has three quarters
     return { text: e.textContent.trim(), size: size * Math.hypot(a, b),
              figure: e.closest("figure").id };
   })"""

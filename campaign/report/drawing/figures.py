@@ -61,7 +61,7 @@ TALLEST = 230.0 / 25.4
 """That of a page of a journal, less a caption: rows of panels share it."""
 LOWEST = 1.4
 """Inches of a row; where a page has not room for so many, more panels stand side by side."""
-LETTER, BOLD_LETTER, NUMBER = 5.0, 6.0, 28.0
+LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
 LINE = 14.0
 """... and across it."""
