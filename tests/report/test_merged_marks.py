@@ -49,6 +49,26 @@ def test_ticks_and_grid_lines_are_one_path_each_past_their_words() -> None:
     ]
 
 
+def test_a_group_for_its_texts_alone_does_not_part_ticks() -> None:
+    lines = [
+        line
+        for x in (10, 20)
+        for line in (
+            '<g style="stroke-width:0.6;text-anchor:end">',
+            f'<path d="m{x} 5v-3.5" style="stroke:#d9dde1"/>',
+            f'<text style="fill:#1c1f23" x="{x}" y="9">{x}</text>',
+            '<text style="text-anchor:start" x="0" y="9">label</text>',
+            "</g>",
+        )
+    ]
+    found = drawn(*lines)
+    tick = '<path d="M10 5v-3.5M20 5v-3.5" style="stroke:#d9dde1;stroke-width:0.6"/>'
+    assert found.split("\n")[1] == tick
+    assert found.count('style="fill:#1c1f23;text-anchor:end"') == 2
+    assert found.count('style="text-anchor:start"') == 2
+    assert found.count("<g") == 1
+
+
 CURVE = '<path d="m1 2 3 4 5 6" style="stroke:#000000"/>'
 
 
