@@ -90,7 +90,7 @@ def _facts(side: Side) -> Iterator[tuple[str, str]]:
     header = side.run.header
     yield "Run", side.run.name
     yield "Title", side.title
-    yield "Started", header.created
+    yield "Started", header.created[:16].replace("T", " ")
     yield "Status", str(side.run.status)
     yield "Samples from", header.source or header.backend or "not stated"
     yield "Program", header.versions.get("campaign", "not stated")
