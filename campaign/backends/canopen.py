@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import threading
 import time
@@ -102,7 +101,7 @@ class CanopenBackend:
         self._proved: set[str] = set()
         self._found = (0, 0)  # boots and 1016h, once its reactions were set
         self._busy = threading.RLock()
-        self._urgent = threading.Event()  # set: the drive is being made safe, everything else ends
+        self._urgent = threading.Event()  # set: the drive was made safe, a trial before ends
 
     def __enter__(self) -> CanopenBackend:
         try:
@@ -121,10 +120,12 @@ class CanopenBackend:
         client = self._client
         # A trial that hangs keeps its limits.
         if client is not None and self._busy.acquire(blocking=False):
-            with contextlib.suppress(DriveError):
-                for item, value in self._own.items():
+            for item, value in {**self._own, od.CONSUMER: 0}.items():  # the heartbeat ends last
+                try:
                     client.write(item, value)
-                client.write(od.CONSUMER, 0)  # the heartbeat ends in order
+                except DriveError as error:  # one that cannot be written keeps none of the others
+                    if error.silent:
+                        break
             self._busy.release()
         self._disconnect()
 
@@ -219,6 +220,7 @@ class CanopenBackend:
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Set limits and ramps, prove the drive once, play the targets."""
         with self._busy:
+            self._urgent.clear()
             try:
                 client = self._still_set() or self._connect()
                 recorder.start(channels(trial.task.mode))
@@ -336,16 +338,13 @@ class CanopenBackend:
 
     def make_safe(self) -> SafeState:
         """Rest with the drive off, over a new connection when there is none."""
-        self._urgent.set()  # a trial in another thread ends
+        self._urgent.set()  # a trial in another thread ends, also where it is between two motions
         deadline = time.monotonic() + self._options.safe_time
-        try:
+        seen = self._seen_safe(deadline)
+        while not seen and time.monotonic() < deadline:
+            self._disconnect()
+            time.sleep(RETRY)
             seen = self._seen_safe(deadline)
-            while not seen and time.monotonic() < deadline:
-                self._disconnect()
-                time.sleep(RETRY)
-                seen = self._seen_safe(deadline)
-        finally:
-            self._urgent.clear()
         return _safe(seen=seen)
 
     def _seen_safe(self, deadline: float) -> bool:

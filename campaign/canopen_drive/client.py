@@ -140,7 +140,9 @@ class Client:
                 if "opened" in answer:
                     self._opened.put(answer)
                 elif "id" in answer:
-                    self._answers.get(answer["id"], self.played).put(answer)
+                    # An answer that is late, and awaited no more, is dropped.
+                    if (asked := self._answers.pop(answer["id"], None)) is not None:
+                        asked.put(answer)
                 else:
                     self.played.put(answer)
         self._lost = True

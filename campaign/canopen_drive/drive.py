@@ -95,7 +95,7 @@ class Drive:
 
     def read(self, item: Item) -> int:
         """Raises DriveError."""
-        return item.unpack(self._access(item, lambda: self._sdo.upload(item.index, item.sub)))
+        return int(self._access(item, lambda: item.unpack(self._sdo.upload(item.index, item.sub))))
 
     def write(self, item: Item, value: int) -> None:
         """Raises DriveError."""

@@ -45,16 +45,19 @@ class Latch:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._kept: dict[str, Any] = {}  # a stop that may not be in the file
+        self._changing = threading.Lock()  # who clears a stop must not lose the next one
 
     def stop(self, by: str) -> None:
         """Keep the drive off from now on: in this process at once, then in the file."""
-        count = int(self._tree().get("count", 0)) + 1
-        self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
+        with self._changing:
+            count = int(self._tree().get("count", 0)) + 1
+            self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
 
     def write(self) -> None:
         """Remember the stop beyond this process. Raises OSError."""
-        if self._kept:
-            write_whole(self._path, self._kept)
+        with self._changing:
+            if self._kept:
+                write_whole(self._path, self._kept)
 
     def now(self) -> tuple[int, str, float | None] | None:
         """Count, who it was, and the time since (s); None when nothing was stopped."""
@@ -67,12 +70,13 @@ class Latch:
 
     def clear(self, count: int) -> bool:
         """Let the drive move again; False when this is not the latest stop."""
-        found = self.now()
-        if found is None or found[0] != count:
-            return False
-        write_whole(self._path, {"latched": False, "count": count})
-        self._kept = {}
-        return True
+        with self._changing:
+            found = self.now()
+            if found is None or found[0] != count:
+                return False
+            write_whole(self._path, {"latched": False, "count": count})
+            self._kept = {}
+            return True
 
     def _tree(self) -> dict[str, Any]:
         try:
@@ -134,6 +138,11 @@ class Desk:
             work.start()
         self._latch.write()  # last: a full disk must not keep the drive moving
 
+    def wait(self) -> None:
+        """Until the attempt to bring the drive to rest has ended."""
+        if self._at_work is not None:
+            self._at_work.join()
+
     def _status(self) -> Status:
         running, state, at_rest = self._running(), None, False
         if not running:
@@ -188,7 +197,8 @@ class DirectLine:
         self._answers += self._desk.feed(data)
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Let go of the bus, once the drive was stopped: a full disk may end the line before."""
+        self._desk.wait()
         self._drive.close()
 
 

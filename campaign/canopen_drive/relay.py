@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import queue
 import signal
 import sys
 import threading
@@ -49,6 +51,8 @@ REST = 8.0
 """s to come to rest after a trial."""
 LAST_WORDS = 3.0
 """s to come to rest when nobody is left to command."""
+TICK = 0.02
+"""s between two looks at whether the host is silent."""
 LEAD = 0.02
 """s from the last preparation to the first SYNC."""
 Why = tuple[End, str]
@@ -65,14 +69,13 @@ class Relay:
 
     def __init__(self, drive: Drive, out: BinaryIO) -> None:
         self.drive, self._out = drive, out
+        self._unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self.latch = Latch(drive.address.latch_file)
-        self._telling, self._commanding = threading.Lock(), threading.RLock()
-        self._halted: Why | None = (
-            End.STOPPED,
-            "",
-        )  # nothing may enable the drive; None in a trial
+        self._commanding = threading.RLock()
+        # Nothing may enable the drive; None in a trial.
+        self._halted: Why | None = (End.STOPPED, "")
         self._armed = False
-        self._cancelled = -1  # the last request that a stop came after
+        self._cancelled = -1.0  # the last request that a stop came after
         self._alive = time.monotonic()
         self._beat = 0.0  # s between two heartbeats; 0: none
         self._silence = 1.0
@@ -85,7 +88,7 @@ class Relay:
     def serve(self, commands: BinaryIO) -> bool:
         """Until the host has gone; whether the drive was then seen at rest and off."""
         self.counter = Counter(self.drive.address, self._desk)
-        for work in (self._heartbeats, self._work):
+        for work in (self._heartbeats, self._work, self._send):
             threading.Thread(target=work, daemon=True).start()
         self._tell({"opened": True})
         with contextlib.suppress(OSError, ValueError):
@@ -97,6 +100,7 @@ class Relay:
     def leave(self) -> bool:
         """Nobody is left to command. Heartbeat and SYNC end once the drive is at rest, or later."""
         enabled = self._armed
+        self._cancelled = float("inf")  # a trial that still waits does not begin
         self.halt(End.HOST_GONE)
         used = enabled or self.drive.mapped
         safe = self.drive.bring_to_rest(LAST_WORDS) if used else True
@@ -113,6 +117,11 @@ class Relay:
             if self._armed:
                 with contextlib.suppress(DriveError):
                     self.drive.command(QUICK_STOP)
+
+    def _halt_if_latched(self) -> None:
+        """Also by another process of this computer, which stopped the drive while this one hung."""
+        if (latched := self.latch.now()) is not None:
+            self.halt(End.PANIC_STOP, f"panic stop by {latched[1]}")
 
     def _is_halted_by(self, end: End) -> bool:
         return self._halted is not None and self._halted[0] is end
@@ -149,7 +158,6 @@ class Relay:
             "hello": self._hello,
             "read": lambda job: self.drive.read(_item(job)),
             "write": self._write,
-            "nmt": lambda job: self.drive.nmt(job["command"]),
             "boots": lambda job: self.drive.boots,
             "reset": self._reset,
             "jitter": self._jitter,
@@ -172,9 +180,14 @@ class Relay:
             self._tell({"id": job["id"], "error": f"{type(error).__name__}: {error}"})
 
     def _tell(self, answer: dict[str, Any]) -> None:
-        with self._telling, contextlib.suppress(OSError, ValueError):
-            self._out.write(json.dumps(answer).encode() + b"\n")
-            self._out.flush()
+        self._unsent.put(json.dumps(answer).encode() + b"\n")
+
+    def _send(self) -> None:
+        """A thread of its own: a host that reads no more must not hold up a trial or its stop."""
+        with contextlib.suppress(OSError, ValueError):
+            while True:
+                self._out.write(self._unsent.get())
+                self._out.flush()
 
     def _hello(self, job: dict[str, Any]) -> None:
         self._beat = job["heartbeat"] / BEATS
@@ -211,14 +224,16 @@ class Relay:
     # Heartbeat
 
     def _heartbeats(self) -> None:
-        host = self.drive.address.host
+        host, due = self.drive.address.host, 0.0
         while not self._closed:
-            if self._armed and time.monotonic() - self._alive > self._silence:
+            now = time.monotonic()
+            if self._armed and now - self._alive > self._silence:
                 self.halt(End.HOST_SILENT)
-            if self._beat and not self._quiet and not self._muted:
+            if self._beat and now >= due and not self._quiet and not self._muted:
+                due = now + self._beat
                 with contextlib.suppress(DriveError):
                     self.drive.send(0x700 + host, b"\x05")
-            time.sleep(self._beat or 0.02)
+            time.sleep(min(self._beat or TICK, TICK))
 
     # A trial
 
@@ -227,12 +242,12 @@ class Relay:
         drive, fault = self.drive, 0
         why: Why = (End.DRIVE, "a bug of the relay")
         with self._commanding:
-            latched = self.latch.now()
-            if latched is not None or job["id"] <= self._cancelled:
-                end = End.PANIC_STOP if latched else End.STOPPED
-                text = f"panic stop by {latched[1]}" if latched else ""
+            self._halted = (End.STOPPED, "") if job["id"] <= self._cancelled else None
+            self._halt_if_latched()
+            if self._halted:
+                end, text = self._halted
                 return {"end": end, "why": text, "safe": False, "error": 0, "emcy": []}
-            self._halted, self._armed, self._quiet = None, True, False
+            self._armed, self._quiet = True, False
             self._alive = time.monotonic()
             drive.mapped = True
         drive.emergencies.clear()
@@ -243,7 +258,7 @@ class Relay:
         except Halted:
             why = self._halted or why
         except DriveError as error:
-            why = (End.SILENT if error.silent else End.DRIVE, str(error))
+            why = self._halted or (End.SILENT if error.silent else End.DRIVE, str(error))
         finally:
             self.halt(*why)
             self._muted = False
@@ -271,10 +286,13 @@ class Relay:
         drive.write(target, 0)
         drive.write(od.MODE, job["mode"])
         self._until(lambda: drive.read(od.MODE_DISPLAY) == job["mode"], f"mode {job['mode']}")
+        way = list(ENABLING)
         while (state := state_of(drive.read(od.STATUSWORD))) is not State.ENABLED:
-            if state not in ENABLING:
+            if state not in way:  # also one that it fell back to: something else stops it
                 raise DriveError(f"the state is {state.text if state else 'unknown'}")
+            way = way[way.index(state) + 1 :]
             with self._commanding:
+                self._halt_if_latched()
                 if self._halted:
                     raise Halted
                 drive.command(ENABLING[state])
@@ -379,16 +397,13 @@ def main(text: str) -> int:
         drive = Drive(address)
     except UsageError as error:
         sys.stdout.buffer.write(json.dumps({"opened": False, "error": str(error)}).encode() + b"\n")
+        sys.stdout.flush()
         return 2
     relay = Relay(drive, sys.stdout.buffer)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0 if relay.leave() else 5))
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0 if relay.leave() else 5))
     return 0 if relay.serve(sys.stdin.buffer) else 5
 
 
 if __name__ == "__main__":
-    import os
-
-    code = main(sys.argv[1])
-    sys.stdout.flush()
     # Not sys.exit: a thread that waits for a bus or a pipe must not keep the process.
-    os._exit(code)
+    os._exit(main(sys.argv[1]))

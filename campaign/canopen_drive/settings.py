@@ -181,6 +181,8 @@ def _limited(drive: Objects, item: Item, most: float, own: dict[Item, int]) -> b
     # 607Dh: both 0 is no limit. 0 of any other would let nothing move: it is unset.
     if had and abs(had) < abs(wanted):
         wanted = had
+    if not wanted:  # less than one unit of the drive, and to some drives 0 is no limit
+        return False
     try:
         written(drive, item, wanted)
     except DriveError as error:
