@@ -18,6 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, BinaryIO
 
 from campaign.canopen_drive import objects as od
@@ -44,15 +45,13 @@ from campaign.canopen_drive.state import (
 from campaign.errors import UsageError
 
 BEATS = 4
-"""Heartbeats in the time after which the drive stops without one."""
+"""Heartbeats in the time after which the drive stops without one, and looks for a silent host."""
 ENABLE = 3.0
 """s from one state to the next, and to another mode."""
 REST = 8.0
 """s to come to rest after a trial."""
 LAST_WORDS = 3.0
 """s to come to rest when nobody is left to command."""
-TICK = 0.02
-"""s between two looks at whether the host is silent."""
 LEAD = 0.02
 """s from the last preparation to the first SYNC."""
 Why = tuple[End, str]
@@ -70,7 +69,7 @@ class Relay:
     def __init__(self, drive: Drive, out: BinaryIO) -> None:
         self.drive, self._out = drive, out
         self._unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        self.latch = Latch(drive.address.latch_file)
+        self.latch = Latch(drive.address.file("latch"))
         self._commanding = threading.RLock()
         # Nothing may enable the drive; None in a trial.
         self._halted: Why | None = (End.STOPPED, "")
@@ -81,8 +80,7 @@ class Relay:
         self._silence = 1.0
         self._quiet = self._muted = self._closed = False
         self._who = ""
-        self._jobs: list[dict[str, Any]] = []
-        self._more = threading.Condition()
+        self._jobs: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self.counter: Counter | None = None
 
     def serve(self, commands: BinaryIO) -> bool:
@@ -90,7 +88,7 @@ class Relay:
         self.counter = Counter(self.drive.address, self._desk)
         for work in (self._heartbeats, self._work, self._send):
             threading.Thread(target=work, daemon=True).start()
-        self._tell({"opened": True})
+        self._tell({"id": 0, "is": "open"})
         with contextlib.suppress(OSError, ValueError):
             for line in commands:
                 self._alive = time.monotonic()
@@ -119,18 +117,15 @@ class Relay:
                     self.drive.command(QUICK_STOP)
 
     def _halt_if_latched(self) -> None:
-        """Also by another process of this computer, which stopped the drive while this one hung."""
+        """By `campaign stop`; also by another process, which stopped it while this one hung."""
         if (latched := self.latch.now()) is not None:
-            self.halt(End.PANIC_STOP, f"panic stop by {latched[1]}")
-
-    def _is_halted_by(self, end: End) -> bool:
-        return self._halted is not None and self._halted[0] is end
+            self._panic_stop(latched[1])
 
     def _desk(self) -> Desk:
-        def stop(by: str) -> None:
-            self.halt(End.PANIC_STOP, f"panic stop by {by}")
+        return Desk(self.drive, self.latch, lambda: self._armed, self._panic_stop, self._who)
 
-        return Desk(self.drive, self.latch, lambda: self._armed, stop, self._who)
+    def _panic_stop(self, by: str) -> None:
+        self.halt(End.PANIC_STOP, f"panic stop by {by}")
 
     # Requests
 
@@ -139,24 +134,21 @@ class Relay:
         match job["do"]:
             case "alive":
                 return
-            case "halt":
+            case "halt" | "rest" as what:
                 self._cancelled = job["id"]
                 self.halt(End.STOPPED)
-            case "rest":
-                self._cancelled = job["id"]
-                self.halt(End.STOPPED)
-                threading.Thread(target=self._do, args=(job, self._rest), daemon=True).start()
+                rest = partial(self._do, job, lambda job: self.drive.bring_to_rest(job["patience"]))
+                if what == "rest":
+                    threading.Thread(target=rest, daemon=True).start()
             case "latch":
                 self._do(job, lambda job: self.latch.now())
             case _:
-                with self._more:
-                    self._jobs.append(job)
-                    self._more.notify_all()
+                self._jobs.put(job)
 
     def _work(self) -> None:
         tasks: dict[str, Callable[[dict[str, Any]], Any]] = {
             "hello": self._hello,
-            "read": lambda job: self.drive.read(_item(job)),
+            "read": lambda job: self.drive.read(Item(*job["item"])),
             "write": self._write,
             "boots": lambda job: self.drive.boots,
             "reset": self._reset,
@@ -165,10 +157,7 @@ class Relay:
             "clear": lambda job: self.latch.clear(job["count"]),
         }
         while True:
-            with self._more:
-                while not self._jobs:
-                    self._more.wait()
-                job = self._jobs.pop(0)
+            job = self._jobs.get()
             self._do(job, tasks[job["do"]])
 
     def _do(self, job: dict[str, Any], task: Callable[[dict[str, Any]], Any]) -> None:
@@ -194,13 +183,10 @@ class Relay:
         self._silence, self._who = job["silence"], job["who"]
 
     def _write(self, job: dict[str, Any]) -> None:
-        item = _item(job)
+        item = Item(*job["item"])
         if item.index == od.CONTROLWORD.index:
             raise DriveError("the controlword is sent by the relay alone")
         self.drive.write(item, job["value"])
-
-    def _rest(self, job: dict[str, Any]) -> bool:
-        return self.drive.bring_to_rest(job["patience"])
 
     def _reset(self, job: dict[str, Any]) -> str:
         """Clear a fault; the state afterwards."""
@@ -233,7 +219,7 @@ class Relay:
                 due = now + self._beat
                 with contextlib.suppress(DriveError):
                     self.drive.send(0x700 + host, b"\x05")
-            time.sleep(min(self._beat or TICK, TICK))
+            time.sleep(min(self._beat or LEAD, self._silence / BEATS))
 
     # A trial
 
@@ -262,7 +248,7 @@ class Relay:
         finally:
             self.halt(*why)
             self._muted = False
-            silent = self._is_halted_by(End.HOST_SILENT)
+            silent = (self._halted or why)[0] is End.HOST_SILENT
             safe = drive.bring_to_rest(LAST_WORDS if silent else REST)
             self._quiet = silent  # from now on without a heartbeat, at rest
             self._armed = False
@@ -270,20 +256,13 @@ class Relay:
             fault = drive.read(od.ERROR_CODE)
         if drive.boots != boots:
             why = (End.RESET, "the drive has started anew")
-        return {
-            "end": why[0],
-            "why": why[1],
-            "safe": safe,
-            "error": fault,
-            "emcy": drive.emergencies[:],
-            **seen,
-        }
+        told = {"safe": safe, "error": fault, "emcy": drive.emergencies[:]}
+        return {"end": why[0], "why": why[1], **told, **seen}
 
     def _enable(self, job: dict[str, Any]) -> None:
         drive = self.drive
-        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
         drive.nmt(OPERATIONAL)
-        drive.write(target, 0)
+        drive.write(od.TARGETS[job["mode"]][0], 0)
         drive.write(od.MODE, job["mode"])
         self._until(lambda: drive.read(od.MODE_DISPLAY) == job["mode"], f"mode {job['mode']}")
         way = list(ENABLING)
@@ -310,8 +289,7 @@ class Relay:
 
     def _run(self, job: dict[str, Any], seen: dict[str, Any]) -> Why:
         drive, period, patience = self.drive, job["period"], job["patience"]
-        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
-        cob = (0x300 if target is od.TARGET_VELOCITY else 0x400) + drive.address.node
+        target, cob = od.TARGETS[job["mode"]]
         start = time.monotonic() + LEAD
         for number, value in enumerate(job["targets"]):
             due = start + number * period
@@ -319,7 +297,7 @@ class Relay:
             with self._commanding:
                 if self._halted:
                     raise Halted
-                drive.send(cob, target.pack(value))
+                drive.send(cob + drive.address.node, target.pack(value))
                 single = drive.sync(number % od.COUNTED + 1 if job["counted"] else None)
             late = time.monotonic() - due
             seen["late"] = max(seen["late"], late)
@@ -329,10 +307,10 @@ class Relay:
             if self._halted:
                 raise Halted
             if sample is None or not single:
-                self._tell({"lost": number})
+                self._tell({"id": job["id"], "lost": number})
                 return End.LOST, "an answer to SYNC is " + ("missing" if single else "doubled")
             seen["samples"] += 1
-            self._tell({"sample": [number, *sample]})
+            self._tell({"id": job["id"], "sample": [number, *sample]})
             if late > patience:
                 return End.LATE, f"SYNC {number} was {late * 1e3:.1f} ms late"
             if why := self._judged(sample, job, seen):
@@ -355,13 +333,13 @@ class Relay:
             return End.STATE, "emergency message"
         if mode != job["mode"]:
             return End.STATE, f"the drive changed its mode to {mode}"
-        low, high = job["positions"]
-        if not low <= position <= high:
-            return End.POSITION_LIMIT, f"position {position} is outside {low} to {high}"
-        if abs(velocity) > job["fastest"]:
-            return End.RATE_LIMIT, f"velocity {velocity} is above {job['fastest']}"
-        if abs(torque) > job["strongest"]:
-            return End.TORQUE_LIMIT, f"torque {torque} is above {job['strongest']}"
+        for end, name, value, most in (
+            (End.POSITION_LIMIT, "position", position, job["farthest"]),
+            (End.RATE_LIMIT, "velocity", velocity, job["fastest"]),
+            (End.TORQUE_LIMIT, "torque", torque, job["strongest"]),
+        ):
+            if abs(value) > most:
+                return end, f"{name} {value} is outside {-most:.0f} to {most:.0f}"
         if status & INTERNAL_LIMIT and job["mode"] == od.PROFILE_VELOCITY:
             return End.DRIVE_LIMIT, "the drive reports that an internal limit acts"
         return PLAYED if abs(velocity) >= job.get("stop", 2**31) else None
@@ -380,10 +358,6 @@ class Relay:
         return False
 
 
-def _item(job: dict[str, Any]) -> Item:
-    return Item(job["index"], job["sub"], job["code"], job["name"])
-
-
 def main(text: str) -> int:
     """Serve one host until it goes; 0 when the drive was then seen safe, else 5 (2: no bus)."""
     # Ctrl-C and a closing terminal are the host's business: it stops in order, with our help.
@@ -392,11 +366,11 @@ def main(text: str) -> int:
             signal.signal(getattr(signal, stop), signal.SIG_IGN)
     try:
         address = address_of(text)
-        if address.is_served():
+        if address.served_at() is not None:
             raise UsageError(f"port {text!r}: another process of this computer has the drive")
         drive = Drive(address)
     except UsageError as error:
-        sys.stdout.buffer.write(json.dumps({"opened": False, "error": str(error)}).encode() + b"\n")
+        sys.stdout.buffer.write(json.dumps({"id": 0, "error": str(error)}).encode() + b"\n")
         sys.stdout.flush()
         return 2
     relay = Relay(drive, sys.stdout.buffer)

@@ -17,7 +17,7 @@ import pytest
 from campaign.canopen_drive import line
 from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.address import address_of
-from campaign.canopen_drive.client import Client
+from campaign.canopen_drive.client import Answers, Client
 from campaign.canopen_drive.drive import Drive, DriveError
 from campaign.canopen_drive.ends import End
 from campaign.canopen_drive.line import DirectLine, Latch
@@ -31,7 +31,7 @@ from tests.canopen_drive.simulated import SimulatedDrive
 Make = Callable[..., tuple[str, SimulatedDrive]]
 JOB: dict[str, Any] = {
     "do": "play", "mode": od.PROFILE_VELOCITY, "targets": [3000] * 3000, "period": 0.01,
-    "positions": [-(2**31), 2**31 - 1], "fastest": 1e9, "strongest": 1e9, "counted": False,
+    "farthest": 2**31, "fastest": 1e9, "strongest": 1e9, "counted": False,
     "patience": 60.0,
 }  # fmt: skip
 
@@ -111,7 +111,7 @@ def test_what_something_else_stops_while_it_is_enabled_stays_stopped() -> None:
 
 def test_a_latch_of_another_process_is_seen_before_each_word_that_enables() -> None:
     with relay() as (made, drive):
-        other = Latch(made.drive.address.latch_file)
+        other = Latch(made.drive.address.file("latch"))
 
         def read(index: int) -> None:
             if index == 0x6041 and drive.state == "ready" and other.now() is None:
@@ -145,7 +145,7 @@ def test_silence_is_noticed_between_two_heartbeats() -> None:
         made._armed, made._halted = True, None
         threading.Thread(target=made._heartbeats, daemon=True).start()
         drive.wait(lambda: made._halted is not None, 2.0)
-        assert made._is_halted_by(End.HOST_SILENT)
+        assert made._halted == (End.HOST_SILENT, "")
         made._closed = True
 
 
@@ -197,14 +197,15 @@ def test_a_full_disk_does_not_keep_the_drive_moving(monkeypatch: pytest.MonkeyPa
 
 def test_an_answer_that_comes_too_late_ends_no_trial() -> None:
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    lines.put(b'{"opened": true}\n')
+    lines.put(b'{"id": 0, "is": "open"}\n')
     client = Client("x", lambda text: (io.BytesIO(), iter(lines.get, b""), lambda patience: None))  # type: ignore[arg-type, return-value]
     with pytest.raises(DriveError, match="no answer"):
         client.ask("rest", 0.0)
-    client.play({})
+    answers = Answers()
+    client.tell("play", answers)
     lines.put(b'{"id": 1, "is": true}\n')
     lines.put(json.dumps({"id": 2, "is": {"end": "played"}}).encode() + b"\n")
-    assert client.played.get(timeout=5) == {"id": 2, "is": {"end": "played"}}
+    assert answers.get(timeout=5) == {"id": 2, "is": {"end": "played"}}
     assert not client._answers
     lines.put(b"")
 
