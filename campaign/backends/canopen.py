@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import threading
 import time
@@ -15,16 +14,23 @@ from pydantic import Field
 from campaign.axis_kind import AxisKind, sides_in
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.canopen_drive import objects as od
-from campaign.canopen_drive.address import address_of
-from campaign.canopen_drive.bus_load import LARGEST, PROMISED, bus_load
+from campaign.canopen_drive.address import BITRATE, address_of
+from campaign.canopen_drive.bus_load import PROMISED, beyond_bus, bus_load
 from campaign.canopen_drive.client import Client, Start, start_process
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.ends import End
-from campaign.canopen_drive.player import HEARTBEAT_LOST, EndedError, Player, channels, ending_of
+from campaign.canopen_drive.player import (
+    HEARTBEAT_LOST,
+    EndedError,
+    Player,
+    channels,
+    ending_of,
+    safe_state,
+)
 from campaign.canopen_drive.proof import RATE as PROOF_RATE
 from campaign.canopen_drive.proof import Proof
 from campaign.canopen_drive.settings import (
-    cycle,
+    compare_eds,
     present,
     set_limits,
     set_pdos,
@@ -40,15 +46,7 @@ from campaign.link.identity import identity
 from campaign.link.refusal import Refusal
 from campaign.options import Options
 from campaign.physics.bench import LimitsOptions
-from campaign.recording import (
-    Ending,
-    Event,
-    Fault,
-    Outcome,
-    PanicStop,
-    Recorder,
-    SafeState,
-)
+from campaign.recording import Ending, Event, Fault, Outcome, PanicStop, Recorder, SafeState
 from campaign.trial import Trial
 from campaign.units import Current, Time, Torque
 
@@ -97,23 +95,21 @@ class CanopenBackend:
         self._refusal = self._new_refusal()
         self._host = identity("campaign")
         self._client: Client | None = None
-        self._scale: tuple[float, Scale] | None = None  # with the ratio that it is for
         self._own: dict[od.Item, int] = {}  # limits that the drive had
-        self._proved: set[str] = set()
+        self._proved: set[tuple[str, Scale]] = set()  # by the motion and the scale that it showed
         self._found = (0, 0)  # boots and 1016h, once its reactions were set
         self._busy = threading.RLock()
-        self._urgent = threading.Event()  # set: the drive is being made safe, everything else ends
+        self._urgent = threading.Event()  # set: the drive was made safe, a trial before ends
 
     def __enter__(self) -> CanopenBackend:
         try:
             self._connect()
-        except DriveError as error:
+        except BaseException as error:
             self._disconnect()
+            if not isinstance(error, DriveError):
+                raise
             told = "no drive answers" if error.silent else "the drive cannot be used"
             raise BackendError(f"{self._options.port}: {told}: {error}") from None
-        except BaseException:
-            self._disconnect()
-            raise
         self._refusal = self._new_refusal()  # all trials are asked again, from the first on
         return self
 
@@ -121,10 +117,12 @@ class CanopenBackend:
         client = self._client
         # A trial that hangs keeps its limits.
         if client is not None and self._busy.acquire(blocking=False):
-            with contextlib.suppress(DriveError):
-                for item, value in self._own.items():
+            for item, value in {**self._own, od.CONSUMER: 0}.items():  # the heartbeat ends last
+                try:
                     client.write(item, value)
-                client.write(od.CONSUMER, 0)  # the heartbeat ends in order
+                except DriveError as error:  # one that cannot be written keeps none of the others
+                    if error.silent:
+                        break
             self._busy.release()
         self._disconnect()
 
@@ -143,7 +141,7 @@ class CanopenBackend:
             found = self._client.ask("latch") if self._client is not None else None
         except DriveError:
             return None  # the next trial is told
-        return None if found is None else PanicStop(found[0], found[1], found[2])
+        return None if found is None else PanicStop(*found)
 
     def clear_stop(self, count: int) -> None:
         """Let the drive move again after the stop that a person has seen."""
@@ -180,21 +178,10 @@ class CanopenBackend:
         return None
 
     def _beyond_bus(self, trial: Trial) -> str | None:
-        rate, bitrate = trial.task.sample_rate, 1_000_000
-        if self._options.port:
-            bitrate = address_of(self._options.port).bitrate
-        try:
-            cycle(1 / rate)
-        except ValueError as error:
-            return f"task.sample_rate = {rate:g} Hz: {error}; take 100 Hz"
-        load = bus_load(rate, bitrate, self._options.heartbeat)
-        if load > LARGEST:
-            return (
-                f"task.sample_rate = {rate:g} Hz takes {load:.0%} of a bus of {bitrate:g} bit/s; "
-                f"at most {LARGEST:.0%} is used: sample_rate = \"{PROMISED:g} Hz\""
-            )  # fmt: skip
-        if rate <= PROMISED or self._client is None:
-            return None
+        rate = trial.task.sample_rate
+        told = beyond_bus(rate, self._bitrate, self._options.heartbeat)
+        if told is not None or rate <= PROMISED or self._client is None:
+            return told
         try:
             count = round(JITTER_TIME * rate)
             counted = present(self._client, od.COUNTER) is not None
@@ -208,6 +195,10 @@ class CanopenBackend:
             )
         return None
 
+    @property
+    def _bitrate(self) -> int:
+        return address_of(self._options.port).bitrate if self._options.port else BITRATE
+
     def _late(self, period: float) -> float:
         return self._options.late or 0.5 * period
 
@@ -219,6 +210,7 @@ class CanopenBackend:
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Set limits and ramps, prove the drive once, play the targets."""
         with self._busy:
+            self._urgent.clear()
             try:
                 client = self._still_set() or self._connect()
                 recorder.start(channels(trial.task.mode))
@@ -231,7 +223,7 @@ class CanopenBackend:
             safe = self._seen_safe(time.monotonic() + RETRY)
             if fault is Fault.LOST_CONNECTION:
                 self._disconnect()
-            return Ending(Outcome.FAULT, reason, _safe(seen=safe), fault)
+            return Ending(Outcome.FAULT, reason, safe_state(seen=safe), fault)
 
     def _execute(self, client: Client, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         task = trial.task
@@ -249,9 +241,8 @@ class CanopenBackend:
         angle = here / scale.position
         if abs(angle) > limits.angle:
             raise DriveError(f"the load stands at {angle:.4g} rad, beyond limits.angle; set zero")
-        farthest = int(min(limits.angle * abs(scale.position), 2**31 - 1))
         base = {
-            "positions": [-farthest, farthest],
+            "farthest": limits.angle * abs(scale.position),
             "fastest": OVERSHOOT * limits.rate * abs(scale.rate),
             "strongest": limits.torque * abs(scale.torque) + 1,
             "counted": counted,
@@ -280,15 +271,13 @@ class CanopenBackend:
             job["stop"] = task.stop_rate * abs(scale.rate)
         command = task.command.sample(np.arange(len(job["targets"])) / task.sample_rate)
         end = player.record(job, recorder, command, scale)
-        return ending_of(end, self._telemetry(task.sample_rate, end))
-
-    def _telemetry(self, rate: float, end: Mapping[str, Any]) -> dict[str, Any]:
-        address = address_of(self._options.port)
-        return {
+        load = bus_load(task.sample_rate, self._bitrate, self._options.heartbeat)
+        telemetry = {
             "sync_late_ms_max": round(end.get("late", 0.0) * 1e3, 3),
-            "bus_load": round(bus_load(rate, address.bitrate, self._options.heartbeat), 4),
-            "emergencies": [f"{code:04X}h" for code, _ in end["emcy"]],
+            "bus_load": round(load, 4),
+            "emergencies": [f"{code:04X}h" for code in end["emcy"]],
         }
+        return ending_of(end, telemetry)
 
     def _in_fault(self, client: Client) -> Ending | None:
         """How a trial ends on a drive in fault. A lost heartbeat of this program's is cleared."""
@@ -297,56 +286,44 @@ class CanopenBackend:
         code = present(client, od.ERROR_CODE) or 0
         if code == HEARTBEAT_LOST and client.ask("reset") != State.FAULT.text:
             return None
-        return ending_of(
-            {
-                "end": End.STATE,
-                "why": "before the trial; see backend.clear_fault",
-                "emcy": [(code, 0)],
-                "safe": True,
-            },
-            {},
-        )
+        why = "before the trial; see backend.clear_fault"
+        return ending_of({"end": End.STATE, "why": why, "emcy": [code], "safe": True}, {})
 
     def _scale_for(self, client: Client, trial: Trial) -> Scale:
         gear = trial.bench.get("gear")
         ratio = float(gear["ratio"]) if isinstance(gear, Mapping) else 1.0  # type: ignore[arg-type]
-        if self._scale is None or self._scale[0] != ratio:
-            given = self._options.model_dump(
-                include={"reverse", "units_per_turn", "rate_units", "rated_torque", "rated_current"}
-            )
-            self._scale = ratio, scale_of(lambda item: present(client, item), ratio=ratio, **given)
-        return self._scale[1]
+        given = self._options.model_dump(
+            include={"reverse", "units_per_turn", "rate_units", "rated_torque", "rated_current"}
+        )
+        return scale_of(lambda item: present(client, item), ratio=ratio, **given)
 
     def _prove(self, client: Client, trial: Trial, proof: Proof) -> None:
-        """Once per connection, before the first motion of its kind. Raises DriveError."""
+        """Once per connection and scale, before the first motion of its kind. Raises DriveError."""
         ramp = max(1, round(proof.limits.acceleration * abs(proof.scale.rate)))
         for item in (od.ACCELERATION, od.DECELERATION):
             written(client, item, ramp)
-        if "moves" not in self._proved:
+        if ("moves", proof.scale) not in self._proved:
             proof.moves_as_commanded()
             proof.stops_in_silence(self._options.heartbeat)
             self._in_fault(client)  # its own, which is cleared
-            self._proved.add("moves")
-        if trial.task.mode == "torque" and "speed limit" not in self._proved:
+            self._proved.add(("moves", proof.scale))
+        if trial.task.mode == "torque" and ("speed limit", proof.scale) not in self._proved:
             peak = float(np.max(np.abs(targets_of(trial.task).values)))
             proof.keeps_speed_limit(min(peak, proof.limits.torque))
-            self._proved.add("speed limit")
+            self._proved.add(("speed limit", proof.scale))
 
     # Rest
 
     def make_safe(self) -> SafeState:
         """Rest with the drive off, over a new connection when there is none."""
-        self._urgent.set()  # a trial in another thread ends
+        self._urgent.set()  # a trial in another thread ends, also where it is between two motions
         deadline = time.monotonic() + self._options.safe_time
-        try:
+        seen = self._seen_safe(deadline)
+        while not seen and time.monotonic() < deadline:
+            self._disconnect()
+            time.sleep(RETRY)
             seen = self._seen_safe(deadline)
-            while not seen and time.monotonic() < deadline:
-                self._disconnect()
-                time.sleep(RETRY)
-                seen = self._seen_safe(deadline)
-        finally:
-            self._urgent.clear()
-        return _safe(seen=seen)
+        return safe_state(seen=seen)
 
     def _seen_safe(self, deadline: float) -> bool:
         try:
@@ -363,26 +340,25 @@ class CanopenBackend:
             raise UsageError(
                 "the backend 'canopen' needs a drive: --port can://socketcan/can0?node=5"
             )
-        address_of(self._options.port)
-        client = Client(self._options.port, self._start)
-        options = self._options
+        client, options = Client(self._options.port, self._start), self._options
         client.ask("hello", heartbeat=options.heartbeat, silence=options.silence, who=self._host)
         self._client = client
         return client
 
     def _connect(self) -> Client:
         """Open the bus, know the drive, set its reactions. Raises DriveError, UsageError."""
-        client = self._client or self._opened()
-        address = address_of(self._options.port)
+        client, options = self._client or self._opened(), self._options
+        address = address_of(options.port)
         self._proved.clear()
-        self._scale, self._found = None, (-1, -1)
-        self._identify(client)
+        self._found = (-1, -1)
+        if options.eds:
+            compare_eds(client, options.eds)
         if state_of(client.read(od.STATUSWORD)) is State.ENABLED:
             raise DriveError("it is enabled: another program moves it")
-        if self._options.clear_fault:
+        if options.clear_fault:
             client.ask("reset")
         set_pdos(client, address.node)
-        set_reactions(client, address.host, self._options.heartbeat)
+        set_reactions(client, address.host, options.heartbeat)
         self._found = client.ask("boots"), client.read(od.CONSUMER)
         return client
 
@@ -393,36 +369,10 @@ class CanopenBackend:
             self._disconnect()
         return self._client
 
-    def _identify(self, client: Client) -> None:
-        """Compare the EDS with the drive, which may be another one."""
-        vendor, product = client.read(od.VENDOR), present(client, od.PRODUCT) or 0
-        if not self._options.eds:
-            return
-        import canopen
-
-        try:
-            described = canopen.import_od(self._options.eds)
-        except Exception as error:  # noqa: BLE001 - of a parser of texts
-            raise UsageError(f"eds = {self._options.eds!r} cannot be read: {error}") from None
-        told = described.device_information
-        if (told.vendor_number, told.product_number) != (vendor, product):
-            raise DriveError(
-                f"wrong EDS: {self._options.eds} is of vendor {told.vendor_number}, product "
-                f"{told.product_number}; the drive says {vendor:#x}, {product:#x}"
-            )
-        for item in vars(od).values():
-            variable = isinstance(item, od.Item) and described.get_variable(item.index, item.sub)
-            if variable and len(variable) != item.bits:
-                raise DriveError(f"{item} has {len(variable)} bits in the EDS, not {item.bits}")
-
     def _disconnect(self) -> None:
         client, self._client = self._client, None
         if client is not None:
             client.close()
-
-
-def _safe(*, seen: bool) -> SafeState:
-    return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
 
 
 def _open(options: Options) -> CanopenBackend:

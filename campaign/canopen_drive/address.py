@@ -49,12 +49,13 @@ class Address:
         try:
             import can
             import canopen  # noqa: F401 - said here, once, for both
+            from can.util import cast_from_string
         except ImportError:
             raise UsageError(
                 f"port {self.text!r} needs canopen and python-can; "
                 "`pip install 'campaign[canopen]'` brings them"
             ) from None
-        extra: dict[str, Any] = {name: _number(value) for name, value in self.others}
+        extra: dict[str, Any] = {name: cast_from_string(value) for name, value in self.others}
         try:
             return can.Bus(
                 interface=self.interface, channel=self.channel, bitrate=self.bitrate, **extra
@@ -65,50 +66,30 @@ class Address:
                 "interface up, and does no other program own it?"
             ) from None
 
-    @property
-    def _file(self) -> Path:
-        """One for each drive: the node on its channel, however its address is spelled."""
+    def file(self, kind: str) -> Path:
+        """Where this computer keeps the `latch` and the `port` of the drive.
+
+        One for each drive: the node on its channel, however its address is spelled.
+        """
         key = f"{self.interface}/{self.channel}/{self.node}"
         name = hashlib.sha256(key.encode()).hexdigest()[:16]
-        return user_state_path("campaign") / "canopen" / name
-
-    @property
-    def latch_file(self) -> Path:
-        """Where this computer remembers a stop."""
-        return self._file.with_suffix(".latch.json")
-
-    def serve(self, port: int | None) -> None:
-        """Say at which local TCP port `campaign stop` reaches the drive; None: at none more."""
-        path = self._file.with_suffix(".port.json")
-        if port is None:
-            path.unlink(missing_ok=True)
-        else:
-            write_whole(path, {"port": port, "pid": os.getpid()})
-
-    def is_served(self) -> bool:
-        """Whether that process lives."""
-        try:
-            socket.create_connection(("127.0.0.1", self.served_at() or 0), 1.0).close()
-        except OSError:
-            return False
-        return True
+        return user_state_path("campaign") / "canopen" / f"{name}.{kind}.json"
 
     def served_at(self) -> int | None:
-        """The local TCP port of the process that owns the bus, if one says so."""
+        """The local TCP port of the process that owns the bus; None where none lives."""
         try:
-            tree = read_tree(self._file.with_suffix(".port.json")) or {}
-        except (OSError, ValueError):
+            port = int((read_tree(self.file("port")) or {})["port"])
+            socket.create_connection(("127.0.0.1", port), 1.0).close()
+        except (OSError, ValueError, KeyError, TypeError, OverflowError):
             return None
-        port = tree.get("port")
-        return port if isinstance(port, int) and 0 < port < 65536 else None
+        return port
 
 
 def address_of(text: str) -> Address:
     """Raises UsageError with the form that is expected."""
     parts = urlsplit(text)
-    query = parse_qsl(parts.query)
     values, others = dict[str, int](), []
-    for name, value in query:
+    for name, value in parse_qsl(parts.query):
         if name not in OWN:
             others.append((name, value))
             continue
@@ -122,15 +103,6 @@ def address_of(text: str) -> Address:
     if values["node"] == values.get("host", 127):
         raise UsageError(f"port {text!r}: node and host are two different numbers")
     return Address(text, parts.netloc, channel, others=tuple(others), **values)
-
-
-def _number(text: str) -> str | int | float:
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
 
 
 def read_tree(path: Path) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from campaign.canopen_drive.objects import MAPPED, TARGET_VELOCITY
+from campaign.canopen_drive.settings import cycle
 
 LARGEST = 0.5
 """Of the bus. The rest is for SDO, emergency messages, and other nodes."""
@@ -29,3 +30,18 @@ def bus_load(sample_rate: float, bitrate: int, heartbeat: float) -> float:
     each = frame_bits(1) + frame_bits(TARGET_VELOCITY.bits // 8) + answers
     beats = 2 * frame_bits(1) * 4 / heartbeat
     return (each * sample_rate + beats) / bitrate
+
+
+def beyond_bus(sample_rate: float, bitrate: int, heartbeat: float) -> str | None:
+    """Why a bus cannot carry a trial; arguments as of `bus_load`."""
+    try:
+        cycle(1 / sample_rate)
+    except ValueError as error:
+        return f"task.sample_rate = {sample_rate:g} Hz: {error}; take {PROMISED:g} Hz"
+    load = bus_load(sample_rate, bitrate, heartbeat)
+    if load <= LARGEST:
+        return None
+    return (
+        f"task.sample_rate = {sample_rate:g} Hz takes {load:.0%} of a bus of {bitrate:g} bit/s; "
+        f"at most {LARGEST:.0%} is used: sample_rate = \"{PROMISED:g} Hz\""
+    )  # fmt: skip

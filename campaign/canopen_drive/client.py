@@ -8,8 +8,8 @@ import queue
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
+from dataclasses import astuple
 from typing import Any, BinaryIO, cast
 
 from campaign.canopen_drive.drive import DriveError
@@ -24,6 +24,7 @@ ANSWER = 10.0
 """s for an answer to a request; the relay asks the drive twice."""
 GONE = "the process that owns the bus has ended"
 
+Answers = queue.SimpleQueue[dict[str, Any]]
 Start = Callable[[str], tuple[BinaryIO, BinaryIO, Callable[[float], None]]]
 """Starts a relay for an address: its input, its output, and what waits for its end (s)."""
 
@@ -50,67 +51,56 @@ def start_process(address: str) -> tuple[BinaryIO, BinaryIO, Callable[[float], N
 
 
 class Client:
-    """An open relay. Any thread may ask; one trial at a time is played.
-
-    Attributes:
-        played: what comes during a trial: samples, lost samples, and its end (None: no relay).
-    """
+    """An open relay. Any thread may ask."""
 
     def __init__(self, address: str, start: Start = start_process) -> None:
         """Raises UsageError when the bus cannot be opened."""
         self._out, self._in, self._wait = start(address)
-        self._sending, self._number = threading.Lock(), 0
-        self._answers: dict[int, queue.SimpleQueue[dict[str, Any]]] = {}
-        self._lost = False
-        self.played: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
-        opened: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-        self._opened = opened
+        self._sending, self._number, self._lost = threading.Lock(), 0, False
+        opened: Answers = queue.SimpleQueue()
+        self._answers = {0: opened}
         self._reader = threading.Thread(target=self._read, name="can", daemon=True)
         self._reader.start()
         try:
             first = opened.get(timeout=OPENING)
         except queue.Empty:
             first = {"error": f"port {address!r} did not open in time"}
-        if not first.get("opened"):
+        if "error" in first:
             self.close()
-            raise UsageError(str(first.get("error") or GONE))
+            raise UsageError(first["error"])
 
     def read(self, item: Item) -> int:
         """An object of the drive. Raises DriveError."""
-        return int(self.ask("read", **_told(item)))
+        return int(self.ask("read", item=astuple(item)))
 
     def write(self, item: Item, value: int) -> None:
         """Raises DriveError."""
-        self.ask("write", value=value, **_told(item))
+        self.ask("write", value=value, item=astuple(item))
 
     def ask(self, what: str, wait: float = ANSWER, **arguments: Any) -> Any:
         """The answer to a request within `wait` (s). Raises DriveError."""
-        answers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        answers: Answers = queue.SimpleQueue()
         number = self.tell(what, answers, **arguments)
-        deadline = time.monotonic() + wait
         try:
-            while True:
-                with contextlib.suppress(queue.Empty):
-                    answer = answers.get(timeout=0.1)
-                    break
-                if self._lost or time.monotonic() > deadline:
-                    raise DriveError(GONE if self._lost else f"no answer to {what}", silent=True)
+            return checked(answers.get(timeout=wait))["is"]
+        except queue.Empty:
+            raise DriveError(f"no answer to {what}", silent=True) from None
         finally:
             self._answers.pop(number, None)
-        if "error" in answer:
-            raise DriveError(answer["error"], silent=bool(answer.get("silent")))
-        return answer["is"]
 
-    def tell(
-        self, what: str, answers: queue.SimpleQueue[Any] | None = None, **arguments: Any
-    ) -> int:
-        """Send a request; its answer goes to `answers`. Raises DriveError."""
+    def tell(self, what: str, answers: Answers | None = None, **arguments: Any) -> int:
+        """Send a request; what the relay says of it goes to `answers`. Raises DriveError.
+
+        The last has the key `is` or `error`; samples of a trial come before it.
+        """
         with self._sending:
             self._number += 1
             number = self._number
             if answers is not None:
                 self._answers[number] = answers
             try:
+                if self._lost:
+                    raise OSError
                 self._out.write(json.dumps({"id": number, "do": what, **arguments}).encode())
                 self._out.write(b"\n")
                 self._out.flush()
@@ -118,11 +108,6 @@ class Client:
                 self._lost = True
                 raise DriveError(GONE, silent=True) from None
         return number
-
-    def play(self, job: dict[str, Any]) -> None:
-        """Begin a trial; `played` has what comes of it. Raises DriveError."""
-        self.played = queue.SimpleQueue()
-        self.tell("play", self.played, **job)
 
     def close(self) -> None:
         """Let the relay go; it brings the drive to rest."""
@@ -137,16 +122,18 @@ class Client:
         with contextlib.suppress(OSError, ValueError):
             for line in self._in:
                 answer = json.loads(line)
-                if "opened" in answer:
-                    self._opened.put(answer)
-                elif "id" in answer:
-                    self._answers.get(answer["id"], self.played).put(answer)
-                else:
-                    self.played.put(answer)
+                asked = self._answers.get(answer["id"])
+                if asked is not None:  # None: late, and awaited no more
+                    asked.put(answer)
+                if "is" in answer or "error" in answer:
+                    self._answers.pop(answer["id"], None)
         self._lost = True
-        self._opened.put({"error": GONE})
-        self.played.put(None)
+        for asked in list(self._answers.values()):
+            asked.put({"error": GONE, "silent": True})
 
 
-def _told(item: Item) -> dict[str, Any]:
-    return {"index": item.index, "sub": item.sub, "code": item.code, "name": item.name}
+def checked(answer: dict[str, Any]) -> dict[str, Any]:
+    """What the relay says, unless it is an error. Raises DriveError."""
+    if "error" in answer:
+        raise DriveError(answer["error"], silent=bool(answer.get("silent")))
+    return answer

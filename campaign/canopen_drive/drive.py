@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -22,6 +23,9 @@ REST_TIME = 0.1
 READINGS = 5
 """In a row, of a drive that is off."""
 SYNC = 0x80
+TPDOS = (0x180, 0x280)
+"""COB-ID of each of `MAPPED` for node 0."""
+FORMATS = tuple("<" + "".join(item.code for item in items) for items in MAPPED)
 OPERATIONAL, PREOPERATIONAL = 0x01, 0x80
 """Commands of NMT."""
 
@@ -57,7 +61,7 @@ class Drive:
 
     Attributes:
         mapped: whether RPDO 1 carries the controlword, so that a stop needs no answer.
-        emergencies: error codes and registers of EMCY messages that came since they were cleared.
+        emergencies: error codes of EMCY messages that came since they were cleared.
         boots: how often the node has said that it started.
     """
 
@@ -70,7 +74,7 @@ class Drive:
         for name in ("canopen", "can"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self.address, self.mapped, self.boots = address, False, 0
-        self.emergencies: list[tuple[int, int]] = []
+        self.emergencies: list[int] = []
         self._asking = threading.Lock()
         self._arrived = threading.Condition()
         self._answers: tuple[list[bytes], ...] = ([], [])
@@ -81,7 +85,7 @@ class Drive:
         self._sdo: Any = node.sdo
         self._sdo.RESPONSE_TIMEOUT, self._sdo.MAX_RETRIES = SDO_TIMEOUT, 2
         for cob, take in (
-            (0x180, self._take_first), (0x280, self._take_second), (0x80, self._take_emergency),
+            (TPDOS[0], self._take), (TPDOS[1], self._take), (0x80, self._take_emergency),
             (0x700, self._take_heartbeat),
         ):  # fmt: skip
             self._network.subscribe(cob + address.node, take)
@@ -95,7 +99,7 @@ class Drive:
 
     def read(self, item: Item) -> int:
         """Raises DriveError."""
-        return item.unpack(self._access(item, lambda: self._sdo.upload(item.index, item.sub)))
+        return int(self._access(item, lambda: item.unpack(self._sdo.upload(item.index, item.sub))))
 
     def write(self, item: Item, value: int) -> None:
         """Raises DriveError."""
@@ -145,30 +149,21 @@ class Drive:
             if not self._arrived.wait_for(lambda: all(self._answers), patience):
                 return None
             frames = [each[0] for each in self._answers]
-        values: list[int] = []
-        for items, data in zip(MAPPED, frames, strict=True):
-            if len(data) != sum(item.bits for item in items) // 8:
-                return None
-            for item in items:
-                values.append(item.unpack(data))
-                data = data[item.bits // 8 :]
-        return tuple(values)
+        try:
+            parts = [struct.unpack(f, data) for f, data in zip(FORMATS, frames, strict=True)]
+        except struct.error:  # of another length
+            return None
+        return tuple(value for part in parts for value in part)
 
-    def _take_first(self, cob: int, data: bytearray, timestamp: float) -> None:
-        self._take(0, data)
-
-    def _take_second(self, cob: int, data: bytearray, timestamp: float) -> None:
-        self._take(1, data)
-
-    def _take(self, which: int, data: bytearray) -> None:
+    def _take(self, cob: int, data: bytearray, timestamp: float) -> None:
         with self._arrived:
-            self._answers[which].append(bytes(data))
+            self._answers[TPDOS.index(cob - self.address.node)].append(bytes(data))
             self._arrived.notify_all()
 
     def _take_emergency(self, cob: int, data: bytearray, timestamp: float) -> None:
         code = int.from_bytes(data[:2], "little")
         if code:  # 0: an error has gone
-            self.emergencies.append((code, data[2] if len(data) > 2 else 0))
+            self.emergencies.append(code)
 
     def _take_heartbeat(self, cob: int, data: bytearray, timestamp: float) -> None:
         self.boots += data[:1] == b"\0"

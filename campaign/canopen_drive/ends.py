@@ -1,10 +1,10 @@
-"""How a trial of the relay ended, and what fault of the run that is."""
+"""How a trial of the relay ended, and what outcome of the run that is."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 
-from campaign.recording import Fault
+from campaign.recording import Fault, Outcome
 
 
 class End(StrEnum):
@@ -29,14 +29,20 @@ class End(StrEnum):
 
 STOPPED = {End.STOPPED, End.PANIC_STOP, End.HOST_GONE, End.HOST_SILENT}
 """By somebody, whatever the drive says of itself."""
-LIMITS = {End.POSITION_LIMIT, End.RATE_LIMIT, End.TORQUE_LIMIT, End.DRIVE_LIMIT}
-FAULTS = {
-    End.LOST: Fault.LOST_SAMPLES,
-    End.LATE: Fault.RECORDING,
-    End.SILENT: Fault.LOST_CONNECTION,
-    End.HOST_GONE: Fault.HEARTBEAT,
-    End.HOST_SILENT: Fault.HEARTBEAT,
-    End.RESET: Fault.RESET,
-    End.DRIVE: Fault.REFUSED,
-    End.STATE: Fault.DRIVE,
+RESULTS = {
+    End.PLAYED: (Outcome.COMPLETED, None),
+    End.STOPPED: (Outcome.INTERRUPTED, None),
+    End.PANIC_STOP: (Outcome.INTERRUPTED, None),
+    End.HOST_GONE: (Outcome.FAULT, Fault.HEARTBEAT),
+    End.HOST_SILENT: (Outcome.FAULT, Fault.HEARTBEAT),
+    End.POSITION_LIMIT: (Outcome.LIMIT, None),
+    End.RATE_LIMIT: (Outcome.LIMIT, None),
+    End.TORQUE_LIMIT: (Outcome.LIMIT, None),
+    End.DRIVE_LIMIT: (Outcome.LIMIT, None),
+    End.STATE: (Outcome.FAULT, Fault.DRIVE),
+    End.DRIVE: (Outcome.FAULT, Fault.REFUSED),
+    End.SILENT: (Outcome.FAULT, Fault.LOST_CONNECTION),
+    End.LOST: (Outcome.FAULT, Fault.LOST_SAMPLES),
+    End.LATE: (Outcome.FAULT, Fault.RECORDING),
+    End.RESET: (Outcome.FAULT, Fault.RESET),
 }

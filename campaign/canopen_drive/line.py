@@ -7,10 +7,12 @@ process that owns the bus, at a local TCP port, or, without one, by the command 
 from __future__ import annotations
 
 import contextlib
-import socket
+import os
+import socketserver
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +22,7 @@ from campaign.canopen_drive.state import State as DriveState
 from campaign.plain_text import printable
 from campaign.wire.codes import Fault, Kind, LatchCause, State, WireError
 from campaign.wire.frames import FrameDecoder, encode_frame
-from campaign.wire.messages import (
-    Ack,
-    Holder,
-    Message,
-    Query,
-    Safe,
-    Status,
-    decode,
-    encode,
-)
+from campaign.wire.messages import Ack, Holder, Message, Query, Safe, Status, decode, encode
 from campaign.wire.messages import Latch as LatchMessage
 
 POLL = 0.05
@@ -45,16 +38,19 @@ class Latch:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._kept: dict[str, Any] = {}  # a stop that may not be in the file
+        self._changing = threading.Lock()  # who clears a stop must not lose the next one
 
     def stop(self, by: str) -> None:
         """Keep the drive off from now on: in this process at once, then in the file."""
-        count = int(self._tree().get("count", 0)) + 1
-        self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
+        with self._changing:
+            count = int(self._tree().get("count", 0)) + 1
+            self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
 
     def write(self) -> None:
         """Remember the stop beyond this process. Raises OSError."""
-        if self._kept:
-            write_whole(self._path, self._kept)
+        with self._changing:
+            if self._kept:
+                write_whole(self._path, self._kept)
 
     def now(self) -> tuple[int, str, float | None] | None:
         """Count, who it was, and the time since (s); None when nothing was stopped."""
@@ -67,12 +63,13 @@ class Latch:
 
     def clear(self, count: int) -> bool:
         """Let the drive move again; False when this is not the latest stop."""
-        found = self.now()
-        if found is None or found[0] != count:
-            return False
-        write_whole(self._path, {"latched": False, "count": count})
-        self._kept = {}
-        return True
+        with self._changing:
+            found = self.now()
+            if found is None or found[0] != count:
+                return False
+            write_whole(self._path, {"latched": False, "count": count})
+            self._kept = {}
+            return True
 
     def _tree(self) -> dict[str, Any]:
         try:
@@ -84,25 +81,23 @@ class Latch:
         return self._kept if newer else tree
 
 
+@dataclass
 class Desk:
     """Answers QUERY and SAFE for one drive. One thread at a time.
 
-    Args:
+    Attributes:
         running: whether a trial moves the drive now.
-        stop: told to end that trial at once.
+        stop: ends that trial at once, whoever says so.
         host: who runs trials, or empty.
     """
 
-    def __init__(
-        self,
-        drive: Drive,
-        latch: Latch,
-        running: Callable[[], bool] = lambda: False,
-        stop: Callable[[str], None] = lambda by: None,
-        host: str = "",
-    ) -> None:
-        self._drive, self._latch, self._running, self._stop = drive, latch, running, stop
-        self._host = host
+    drive: Drive
+    latch: Latch
+    running: Callable[[], bool] = lambda: False
+    stop: Callable[[str], None] = lambda by: None
+    host: str = ""
+
+    def __post_init__(self) -> None:
         self._decoder = FrameDecoder()
         self._stopped = 0  # the session whose SAFE has been latched
         self._at_work: threading.Thread | None = None
@@ -119,43 +114,45 @@ class Desk:
                 self._safe(message)
                 told += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
             elif isinstance(message, Query):
-                told += _frame(Holder(bool(self._host), 0.0 if self._host else None, self._host))
+                told += _frame(Holder(bool(self.host), 0.0 if self.host else None, self.host))
         return told + _frame(self._status()) + _frame(self._latched()) if told else b""
 
     def _safe(self, message: Safe) -> None:
         by = printable(message.host) or "somebody who did not say who"
         if not self._stopped or message.session != self._stopped:
             self._stopped = message.session
-            self._latch.stop(by)
-            self._stop(by)
+            self.latch.stop(by)
+            self.stop(by)
         if self._at_work is None or not self._at_work.is_alive():
-            work = threading.Thread(target=self._drive.bring_to_rest, args=(STOPPING,), daemon=True)
+            work = threading.Thread(target=self.drive.bring_to_rest, args=(STOPPING,), daemon=True)
             self._at_work = work
             work.start()
-        self._latch.write()  # last: a full disk must not keep the drive moving
+        self.latch.write()  # last: a full disk must not keep the drive moving
+
+    def wait(self) -> None:
+        """Until the attempt to bring the drive to rest has ended."""
+        if self._at_work is not None:
+            self._at_work.join()
 
     def _status(self) -> Status:
-        running, state, at_rest = self._running(), None, False
+        running, state, at_rest = self.running(), None, False
         if not running:
             with contextlib.suppress(DriveError):
-                watch = RestWatch(self._drive.address.rest)
-                watch.seen(self._drive.look()[1])
+                watch = RestWatch(self.drive.address.rest)
+                watch.seen(self.drive.look()[1])
                 time.sleep(REST_TIME)
-                state, position = self._drive.look()
+                state, position = self.drive.look()
                 at_rest = watch.seen(position)
         on = running or state is None or not state.off
-        said = State.IDLE
-        if running or on:
-            said = State.RUNNING
-        elif state is DriveState.FAULT:
-            said = State.FAULT
-        elif self._latch.now() is not None:
+        said, fault = State.RUNNING if on else State.IDLE, Fault.NONE
+        if state is DriveState.FAULT:
+            said, fault = State.FAULT, Fault.DRIVE
+        elif not on and self.latch.now() is not None:
             said = State.SAFE
-        fault = Fault.DRIVE if state is DriveState.FAULT else Fault.NONE
         return Status(said, fault, at_rest, on, 1, time.monotonic(), 0, 0.0, 0, 0, 0, 0)
 
     def _latched(self) -> LatchMessage:
-        found = self._latch.now()
+        found = self.latch.now()
         if found is None:
             return LatchMessage(latched=False, count=0, cause=LatchCause.NONE, age=None)
         count, by, age = found
@@ -173,7 +170,7 @@ class DirectLine:
     def __init__(self, address: Address) -> None:
         """Raises UsageError."""
         self._drive = Drive(address)
-        self._desk = Desk(self._drive, Latch(address.latch_file))
+        self._desk = Desk(self._drive, Latch(address.file("latch")))
         self._answers = b""
 
     def read(self) -> bytes:
@@ -188,32 +185,31 @@ class DirectLine:
         self._answers += self._desk.feed(data)
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Let go of the bus, once the drive was stopped: a full disk may end the line before."""
+        self._desk.wait()
         self._drive.close()
 
 
-class Counter:
-    """Serves a desk at a local TCP port, for as long as the process lives."""
+class Counter(socketserver.ThreadingTCPServer):
+    """Serves a desk at a local TCP port, which a file tells to `campaign stop`."""
+
+    daemon_threads = True
 
     def __init__(self, address: Address, make: Callable[[], Desk]) -> None:
-        self._address, self._make = address, make
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        address.serve(self._listener.getsockname()[1])
-        threading.Thread(target=self._accept, daemon=True).start()
+        class Answering(socketserver.BaseRequestHandler):
+            def handle(self) -> None:
+                desk = make()
+                with contextlib.suppress(OSError):
+                    while data := self.request.recv(65536):
+                        self.request.sendall(desk.feed(data))
+
+        super().__init__(("127.0.0.1", 0), Answering)
+        self._file = address.file("port")
+        write_whole(self._file, {"port": self.server_address[1], "pid": os.getpid()})
+        threading.Thread(target=self.serve_forever, args=(POLL,), daemon=True).start()
 
     def close(self) -> None:
         """No more."""
-        self._address.serve(None)
-        self._listener.close()
-
-    def _accept(self) -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                near, _ = self._listener.accept()
-                threading.Thread(target=self._answer, args=(near,), daemon=True).start()
-
-    def _answer(self, near: socket.socket) -> None:
-        desk = self._make()
-        with near, contextlib.suppress(OSError):
-            while data := near.recv(65536):
-                near.sendall(desk.feed(data))
+        self._file.unlink(missing_ok=True)
+        self.shutdown()
+        self.server_close()

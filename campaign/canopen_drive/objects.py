@@ -110,6 +110,8 @@ COUNTED = 240
 """Largest count of a SYNC (1019h)."""
 PROFILE_VELOCITY, PROFILE_TORQUE = 3, 4
 """Of `MODE`."""
+TARGETS = {PROFILE_VELOCITY: (TARGET_VELOCITY, 0x300), PROFILE_TORQUE: (TARGET_TORQUE, 0x400)}
+"""The target of each mode, and the COB-ID of its RPDO for node 0."""
 
 
 def mapping(item: Item) -> int:

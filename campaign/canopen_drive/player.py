@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -11,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from campaign.canopen_drive.client import GONE, Client
+from campaign.canopen_drive.client import GONE, Answers, Client, checked
 from campaign.canopen_drive.drive import DriveError
-from campaign.canopen_drive.ends import FAULTS as END_FAULTS
-from campaign.canopen_drive.ends import LIMITS, STOPPED, End
+from campaign.canopen_drive.ends import RESULTS, STOPPED, End
 from campaign.canopen_drive.units import Scale
 from campaign.channels import info
 from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome, Recorder, SafeState
@@ -65,13 +63,11 @@ class Player:
 
         Raises EndedError unless it was played to its end, or ended as `expected`.
         """
-        rows, end = [], None
+        rows = []
         for item in self._items(job):
             if "sample" in item:
                 rows.append(item["sample"][1:])
-            end = item.get("is", end)
-        if end is None:
-            raise DriveError(GONE, silent=True)
+        end = item["is"]
         if end["end"] not in (End.PLAYED, expected):
             raise EndedError(end)
         return np.array(rows, dtype=float).reshape(-1, 6), end
@@ -82,7 +78,6 @@ class Player:
         """How it ended. `command`: shape (n,), rad/s or N m, of each SYNC."""
         period = job["period"]
         rows: list[list[int]] = []
-        end: Mapping[str, Any] | None = None
 
         def flush() -> None:
             if rows:
@@ -103,19 +98,17 @@ class Player:
                 flush()
             if "lost" in item:
                 recorder.lost(np.array([item["lost"] * period]))
-            end = item.get("is", end)
-        if end is None:
-            raise DriveError(GONE, silent=True)
+        end: Mapping[str, Any] = item["is"]
         return end
 
     def _items(self, job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-        """What the relay says, until it has said how the job ended.
+        """What the relay says; the last is how the job ended, as `is`. Raises DriveError.
 
         Signs of life are sent from here alone: who hangs with a sample in hand sends none.
         """
-        client, alive = self._client, 0.0
+        client, answers, alive = self._client, Answers(), 0.0
         self._halted = False
-        client.play({**self._base, **job})
+        client.tell("play", answers, **{**self._base, **job})
         heard = time.monotonic()
         while True:
             now = time.monotonic()
@@ -125,16 +118,14 @@ class Player:
             if not self._halted and self._stop():
                 client.tell("halt")
                 self._halted = True
-            item: dict[str, Any] | None = {}
-            with contextlib.suppress(queue.Empty):
-                item = client.played.get(timeout=KEEP_ALIVE)
-                heard = now
-            if item is None or now - heard > ENDING:
-                raise DriveError(GONE, silent=True)
-            if "error" in item:
-                raise DriveError(item["error"], silent=bool(item.get("silent")))
-            if item:
-                yield item
+            try:
+                item = checked(answers.get(timeout=KEEP_ALIVE))
+            except queue.Empty:
+                if now - heard > ENDING:
+                    raise DriveError(GONE, silent=True) from None
+                continue
+            heard = now
+            yield item
             if "is" in item:
                 return
 
@@ -142,32 +133,29 @@ class Player:
 def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
     """The ending of a trial, from what the relay says of it."""
     how, why = End(end["end"]), str(end["why"])
-    safe = SafeState.CONFIRMED if end["safe"] else SafeState.NOT_CONFIRMED
-    codes = [code for code, _ in end["emcy"]]
-    if not codes and end.get("error") and how is End.STATE:
-        codes = [end["error"]]
-    outcome, fault = Outcome.FAULT, None
+    codes = end["emcy"] or ([end["error"]] if how is End.STATE and end["error"] else [])
+    outcome, fault = RESULTS[how]
     if codes and how not in STOPPED:
-        fault, shown = fault_of(codes[0]), ", ".join(f"{code:04X}h" for code in codes)
+        outcome, fault = Outcome.FAULT, fault_of(codes[0])
+        shown = ", ".join(f"{code:04X}h" for code in codes)
         why = f"the drive reports error {shown}; its manual says what it is ({why or how})"
-    elif how is End.PLAYED:
-        outcome = Outcome.COMPLETED
-    elif how in (End.STOPPED, End.PANIC_STOP):
-        outcome, why = Outcome.INTERRUPTED, why or "stopped by the operator"
-    elif how in LIMITS:
-        outcome, why = Outcome.LIMIT, f"{how}: {why} (in numbers of the drive)"
+    elif outcome is Outcome.INTERRUPTED:
+        why = why or "stopped by the operator"
+    elif outcome is Outcome.LIMIT:
+        why = f"{how}: {why} (in numbers of the drive)"
     elif how is End.LOST and not end["safe"]:
         fault, why = Fault.LOST_CONNECTION, f"the drive does not answer any more ({why})"
-    else:
-        fault = END_FAULTS[how]
-        if fault is Fault.HEARTBEAT:
-            why = "this program gave no sign of life; the drive was stopped"
-    return Ending(outcome, why, safe, fault, dict(telemetry))
+    elif fault is Fault.HEARTBEAT:
+        why = "this program gave no sign of life; the drive was stopped"
+    return Ending(outcome, why, safe_state(seen=end["safe"]), fault, dict(telemetry))
+
+
+def safe_state(*, seen: bool) -> SafeState:
+    """Of a drive that was seen at rest and off, or not."""
+    return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
 
 
 def fault_of(code: int) -> Fault:
     """The fault that an error code of a drive tells of."""
-    for digits in (0, 8, 12):
-        if (found := ERRORS.get(code >> digits)) is not None:
-            return found
-    return Fault.DRIVE
+    found = (ERRORS[code >> digits] for digits in (0, 8, 12) if code >> digits in ERRORS)
+    return next(found, Fault.DRIVE)

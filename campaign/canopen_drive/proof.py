@@ -12,7 +12,7 @@ import numpy as np
 from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.ends import End
-from campaign.canopen_drive.settings import Objects, written
+from campaign.canopen_drive.settings import Objects, present, written
 from campaign.canopen_drive.units import Scale
 from campaign.physics.bench import LimitsOptions
 
@@ -57,8 +57,7 @@ class Proof:
 
     def moves_as_commanded(self) -> None:
         """There and back: commanded rate against position and velocity. Raises DriveError."""
-        raw, count = round(self.slow * self.scale.rate), round(LEG * RATE)
-        way = raw if self.drive.read(od.POSITION) * self.scale.position <= 0 else -raw
+        way, count = round(self._inward() * self.slow * self.scale.rate), round(LEG * RATE)
         rows = self._rate([way] * count + [-way] * count + [0] * (count // 10))
         for leg, target in ((rows[:count], way), (rows[count : 2 * count], -way)):
             settled = leg[3 * count // 4 :]
@@ -77,9 +76,7 @@ class Proof:
 
     def stops_in_silence(self, heartbeat: float) -> None:
         """Moves slowly while the heartbeat (s) falls silent. Raises DriveError if it goes on."""
-        raw = round(self.slow * self.scale.rate)
-        way = raw if self.drive.read(od.POSITION) * self.scale.position <= 0 else -raw
-        count = round(LEG / 4 * RATE)
+        way, count = round(self._inward() * self.slow * self.scale.rate), round(LEG / 4 * RATE)
         mute = {"mute": count - 1, "mute_patience": 3 * heartbeat + REACTION}
         _, end = self.play(self._job([way] * count, od.PROFILE_VELOCITY) | mute)
         if not end["reacted"]:
@@ -89,9 +86,9 @@ class Proof:
 
     def keeps_speed_limit(self, peak: float) -> None:
         """Torque up to `peak` (N m) against a low limit of speed. Raises DriveError."""
-        slow, here = self.slow, self.drive.read(od.POSITION)
-        had = {item: self.drive.read(item) for item in self._speed_limits()}
-        way = 1.0 if here * self.scale.position <= 0 else -1.0
+        slow, way = self.slow, self._inward()
+        both = (od.MAX_PROFILE_VELOCITY, od.MAX_MOTOR_SPEED)
+        had = {item: value for item in both if (value := present(self.drive, item)) is not None}
         ramp = np.append(
             np.linspace(0, peak, round(LEG / 2 * RATE)), np.full(round(HOLD * RATE), peak)
         )
@@ -131,17 +128,9 @@ class Proof:
             if count > CLOSE:
                 self._rate([round(raw)] * count + [0] * round(LEG / 10 * RATE))
 
-    def _speed_limits(self) -> list[od.Item]:
-        found = []
-        for item in (od.MAX_PROFILE_VELOCITY, od.MAX_MOTOR_SPEED):
-            try:
-                self.drive.read(item)
-            except DriveError as error:
-                if error.silent:
-                    raise
-            else:
-                found.append(item)
-        return found
+    def _inward(self) -> int:
+        """The sign of a motion toward zero."""
+        return 1 if self.drive.read(od.POSITION) * self.scale.position <= 0 else -1
 
     def _rate(self, targets: list[int]) -> np.ndarray:
         return self.play(self._job(targets, od.PROFILE_VELOCITY))[0]

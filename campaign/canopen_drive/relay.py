@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import queue
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, BinaryIO
 
 from campaign.canopen_drive import objects as od
@@ -42,7 +45,7 @@ from campaign.canopen_drive.state import (
 from campaign.errors import UsageError
 
 BEATS = 4
-"""Heartbeats in the time after which the drive stops without one."""
+"""Heartbeats in the time after which the drive stops without one, and looks for a silent host."""
 ENABLE = 3.0
 """s from one state to the next, and to another mode."""
 REST = 8.0
@@ -65,29 +68,27 @@ class Relay:
 
     def __init__(self, drive: Drive, out: BinaryIO) -> None:
         self.drive, self._out = drive, out
-        self.latch = Latch(drive.address.latch_file)
-        self._telling, self._commanding = threading.Lock(), threading.RLock()
-        self._halted: Why | None = (
-            End.STOPPED,
-            "",
-        )  # nothing may enable the drive; None in a trial
+        self._unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self.latch = Latch(drive.address.file("latch"))
+        self._commanding = threading.RLock()
+        # Nothing may enable the drive; None in a trial.
+        self._halted: Why | None = (End.STOPPED, "")
         self._armed = False
-        self._cancelled = -1  # the last request that a stop came after
+        self._cancelled = -1.0  # the last request that a stop came after
         self._alive = time.monotonic()
         self._beat = 0.0  # s between two heartbeats; 0: none
         self._silence = 1.0
         self._quiet = self._muted = self._closed = False
         self._who = ""
-        self._jobs: list[dict[str, Any]] = []
-        self._more = threading.Condition()
+        self._jobs: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self.counter: Counter | None = None
 
     def serve(self, commands: BinaryIO) -> bool:
         """Until the host has gone; whether the drive was then seen at rest and off."""
         self.counter = Counter(self.drive.address, self._desk)
-        for work in (self._heartbeats, self._work):
+        for work in (self._heartbeats, self._work, self._send):
             threading.Thread(target=work, daemon=True).start()
-        self._tell({"opened": True})
+        self._tell({"id": 0, "is": "open"})
         with contextlib.suppress(OSError, ValueError):
             for line in commands:
                 self._alive = time.monotonic()
@@ -97,6 +98,7 @@ class Relay:
     def leave(self) -> bool:
         """Nobody is left to command. Heartbeat and SYNC end once the drive is at rest, or later."""
         enabled = self._armed
+        self._cancelled = float("inf")  # a trial that still waits does not begin
         self.halt(End.HOST_GONE)
         used = enabled or self.drive.mapped
         safe = self.drive.bring_to_rest(LAST_WORDS) if used else True
@@ -114,14 +116,16 @@ class Relay:
                 with contextlib.suppress(DriveError):
                     self.drive.command(QUICK_STOP)
 
-    def _is_halted_by(self, end: End) -> bool:
-        return self._halted is not None and self._halted[0] is end
+    def _halt_if_latched(self) -> None:
+        """By `campaign stop`; also by another process, which stopped it while this one hung."""
+        if (latched := self.latch.now()) is not None:
+            self._panic_stop(latched[1])
 
     def _desk(self) -> Desk:
-        def stop(by: str) -> None:
-            self.halt(End.PANIC_STOP, f"panic stop by {by}")
+        return Desk(self.drive, self.latch, lambda: self._armed, self._panic_stop, self._who)
 
-        return Desk(self.drive, self.latch, lambda: self._armed, stop, self._who)
+    def _panic_stop(self, by: str) -> None:
+        self.halt(End.PANIC_STOP, f"panic stop by {by}")
 
     # Requests
 
@@ -130,26 +134,22 @@ class Relay:
         match job["do"]:
             case "alive":
                 return
-            case "halt":
+            case "halt" | "rest" as what:
                 self._cancelled = job["id"]
                 self.halt(End.STOPPED)
-            case "rest":
-                self._cancelled = job["id"]
-                self.halt(End.STOPPED)
-                threading.Thread(target=self._do, args=(job, self._rest), daemon=True).start()
+                rest = partial(self._do, job, lambda job: self.drive.bring_to_rest(job["patience"]))
+                if what == "rest":
+                    threading.Thread(target=rest, daemon=True).start()
             case "latch":
                 self._do(job, lambda job: self.latch.now())
             case _:
-                with self._more:
-                    self._jobs.append(job)
-                    self._more.notify_all()
+                self._jobs.put(job)
 
     def _work(self) -> None:
         tasks: dict[str, Callable[[dict[str, Any]], Any]] = {
             "hello": self._hello,
-            "read": lambda job: self.drive.read(_item(job)),
+            "read": lambda job: self.drive.read(Item(*job["item"])),
             "write": self._write,
-            "nmt": lambda job: self.drive.nmt(job["command"]),
             "boots": lambda job: self.drive.boots,
             "reset": self._reset,
             "jitter": self._jitter,
@@ -157,10 +157,7 @@ class Relay:
             "clear": lambda job: self.latch.clear(job["count"]),
         }
         while True:
-            with self._more:
-                while not self._jobs:
-                    self._more.wait()
-                job = self._jobs.pop(0)
+            job = self._jobs.get()
             self._do(job, tasks[job["do"]])
 
     def _do(self, job: dict[str, Any], task: Callable[[dict[str, Any]], Any]) -> None:
@@ -172,22 +169,24 @@ class Relay:
             self._tell({"id": job["id"], "error": f"{type(error).__name__}: {error}"})
 
     def _tell(self, answer: dict[str, Any]) -> None:
-        with self._telling, contextlib.suppress(OSError, ValueError):
-            self._out.write(json.dumps(answer).encode() + b"\n")
-            self._out.flush()
+        self._unsent.put(json.dumps(answer).encode() + b"\n")
+
+    def _send(self) -> None:
+        """A thread of its own: a host that reads no more must not hold up a trial or its stop."""
+        with contextlib.suppress(OSError, ValueError):
+            while True:
+                self._out.write(self._unsent.get())
+                self._out.flush()
 
     def _hello(self, job: dict[str, Any]) -> None:
         self._beat = job["heartbeat"] / BEATS
         self._silence, self._who = job["silence"], job["who"]
 
     def _write(self, job: dict[str, Any]) -> None:
-        item = _item(job)
+        item = Item(*job["item"])
         if item.index == od.CONTROLWORD.index:
             raise DriveError("the controlword is sent by the relay alone")
         self.drive.write(item, job["value"])
-
-    def _rest(self, job: dict[str, Any]) -> bool:
-        return self.drive.bring_to_rest(job["patience"])
 
     def _reset(self, job: dict[str, Any]) -> str:
         """Clear a fault; the state afterwards."""
@@ -211,14 +210,16 @@ class Relay:
     # Heartbeat
 
     def _heartbeats(self) -> None:
-        host = self.drive.address.host
+        host, due = self.drive.address.host, 0.0
         while not self._closed:
-            if self._armed and time.monotonic() - self._alive > self._silence:
+            now = time.monotonic()
+            if self._armed and now - self._alive > self._silence:
                 self.halt(End.HOST_SILENT)
-            if self._beat and not self._quiet and not self._muted:
+            if self._beat and now >= due and not self._quiet and not self._muted:
+                due = now + self._beat
                 with contextlib.suppress(DriveError):
                     self.drive.send(0x700 + host, b"\x05")
-            time.sleep(self._beat or 0.02)
+            time.sleep(min(self._beat or LEAD, self._silence / BEATS))
 
     # A trial
 
@@ -227,12 +228,12 @@ class Relay:
         drive, fault = self.drive, 0
         why: Why = (End.DRIVE, "a bug of the relay")
         with self._commanding:
-            latched = self.latch.now()
-            if latched is not None or job["id"] <= self._cancelled:
-                end = End.PANIC_STOP if latched else End.STOPPED
-                text = f"panic stop by {latched[1]}" if latched else ""
+            self._halted = (End.STOPPED, "") if job["id"] <= self._cancelled else None
+            self._halt_if_latched()
+            if self._halted:
+                end, text = self._halted
                 return {"end": end, "why": text, "safe": False, "error": 0, "emcy": []}
-            self._halted, self._armed, self._quiet = None, True, False
+            self._armed, self._quiet = True, False
             self._alive = time.monotonic()
             drive.mapped = True
         drive.emergencies.clear()
@@ -243,11 +244,11 @@ class Relay:
         except Halted:
             why = self._halted or why
         except DriveError as error:
-            why = (End.SILENT if error.silent else End.DRIVE, str(error))
+            why = self._halted or (End.SILENT if error.silent else End.DRIVE, str(error))
         finally:
             self.halt(*why)
             self._muted = False
-            silent = self._is_halted_by(End.HOST_SILENT)
+            silent = (self._halted or why)[0] is End.HOST_SILENT
             safe = drive.bring_to_rest(LAST_WORDS if silent else REST)
             self._quiet = silent  # from now on without a heartbeat, at rest
             self._armed = False
@@ -255,26 +256,22 @@ class Relay:
             fault = drive.read(od.ERROR_CODE)
         if drive.boots != boots:
             why = (End.RESET, "the drive has started anew")
-        return {
-            "end": why[0],
-            "why": why[1],
-            "safe": safe,
-            "error": fault,
-            "emcy": drive.emergencies[:],
-            **seen,
-        }
+        told = {"safe": safe, "error": fault, "emcy": drive.emergencies[:]}
+        return {"end": why[0], "why": why[1], **told, **seen}
 
     def _enable(self, job: dict[str, Any]) -> None:
         drive = self.drive
-        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
         drive.nmt(OPERATIONAL)
-        drive.write(target, 0)
+        drive.write(od.TARGETS[job["mode"]][0], 0)
         drive.write(od.MODE, job["mode"])
         self._until(lambda: drive.read(od.MODE_DISPLAY) == job["mode"], f"mode {job['mode']}")
+        way = list(ENABLING)
         while (state := state_of(drive.read(od.STATUSWORD))) is not State.ENABLED:
-            if state not in ENABLING:
+            if state not in way:  # also one that it fell back to: something else stops it
                 raise DriveError(f"the state is {state.text if state else 'unknown'}")
+            way = way[way.index(state) + 1 :]
             with self._commanding:
+                self._halt_if_latched()
                 if self._halted:
                     raise Halted
                 drive.command(ENABLING[state])
@@ -292,8 +289,7 @@ class Relay:
 
     def _run(self, job: dict[str, Any], seen: dict[str, Any]) -> Why:
         drive, period, patience = self.drive, job["period"], job["patience"]
-        target = od.TARGET_VELOCITY if job["mode"] == od.PROFILE_VELOCITY else od.TARGET_TORQUE
-        cob = (0x300 if target is od.TARGET_VELOCITY else 0x400) + drive.address.node
+        target, cob = od.TARGETS[job["mode"]]
         start = time.monotonic() + LEAD
         for number, value in enumerate(job["targets"]):
             due = start + number * period
@@ -301,7 +297,7 @@ class Relay:
             with self._commanding:
                 if self._halted:
                     raise Halted
-                drive.send(cob, target.pack(value))
+                drive.send(cob + drive.address.node, target.pack(value))
                 single = drive.sync(number % od.COUNTED + 1 if job["counted"] else None)
             late = time.monotonic() - due
             seen["late"] = max(seen["late"], late)
@@ -311,10 +307,10 @@ class Relay:
             if self._halted:
                 raise Halted
             if sample is None or not single:
-                self._tell({"lost": number})
+                self._tell({"id": job["id"], "lost": number})
                 return End.LOST, "an answer to SYNC is " + ("missing" if single else "doubled")
             seen["samples"] += 1
-            self._tell({"sample": [number, *sample]})
+            self._tell({"id": job["id"], "sample": [number, *sample]})
             if late > patience:
                 return End.LATE, f"SYNC {number} was {late * 1e3:.1f} ms late"
             if why := self._judged(sample, job, seen):
@@ -337,13 +333,13 @@ class Relay:
             return End.STATE, "emergency message"
         if mode != job["mode"]:
             return End.STATE, f"the drive changed its mode to {mode}"
-        low, high = job["positions"]
-        if not low <= position <= high:
-            return End.POSITION_LIMIT, f"position {position} is outside {low} to {high}"
-        if abs(velocity) > job["fastest"]:
-            return End.RATE_LIMIT, f"velocity {velocity} is above {job['fastest']}"
-        if abs(torque) > job["strongest"]:
-            return End.TORQUE_LIMIT, f"torque {torque} is above {job['strongest']}"
+        for end, name, value, most in (
+            (End.POSITION_LIMIT, "position", position, job["farthest"]),
+            (End.RATE_LIMIT, "velocity", velocity, job["fastest"]),
+            (End.TORQUE_LIMIT, "torque", torque, job["strongest"]),
+        ):
+            if abs(value) > most:
+                return end, f"{name} {value} is outside {-most:.0f} to {most:.0f}"
         if status & INTERNAL_LIMIT and job["mode"] == od.PROFILE_VELOCITY:
             return End.DRIVE_LIMIT, "the drive reports that an internal limit acts"
         return PLAYED if abs(velocity) >= job.get("stop", 2**31) else None
@@ -362,10 +358,6 @@ class Relay:
         return False
 
 
-def _item(job: dict[str, Any]) -> Item:
-    return Item(job["index"], job["sub"], job["code"], job["name"])
-
-
 def main(text: str) -> int:
     """Serve one host until it goes; 0 when the drive was then seen safe, else 5 (2: no bus)."""
     # Ctrl-C and a closing terminal are the host's business: it stops in order, with our help.
@@ -374,21 +366,18 @@ def main(text: str) -> int:
             signal.signal(getattr(signal, stop), signal.SIG_IGN)
     try:
         address = address_of(text)
-        if address.is_served():
+        if address.served_at() is not None:
             raise UsageError(f"port {text!r}: another process of this computer has the drive")
         drive = Drive(address)
     except UsageError as error:
-        sys.stdout.buffer.write(json.dumps({"opened": False, "error": str(error)}).encode() + b"\n")
+        sys.stdout.buffer.write(json.dumps({"id": 0, "error": str(error)}).encode() + b"\n")
+        sys.stdout.flush()
         return 2
     relay = Relay(drive, sys.stdout.buffer)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0 if relay.leave() else 5))
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0 if relay.leave() else 5))
     return 0 if relay.serve(sys.stdin.buffer) else 5
 
 
 if __name__ == "__main__":
-    import os
-
-    code = main(sys.argv[1])
-    sys.stdout.flush()
     # Not sys.exit: a thread that waits for a bus or a pipe must not keep the process.
-    os._exit(code)
+    os._exit(main(sys.argv[1]))

@@ -10,6 +10,7 @@ from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.objects import Item, mapping
 from campaign.canopen_drive.units import Scale
+from campaign.errors import UsageError
 from campaign.physics.bench import LimitsOptions
 
 ABORTS = (3, 1, 2)
@@ -46,6 +47,27 @@ def written(drive: Objects, item: Item, value: int) -> None:
         raise DriveError(f"{item} is {found} after {value} was written")
 
 
+def compare_eds(drive: Objects, path: str) -> None:
+    """Refuse an EDS of another drive. Raises DriveError, and UsageError where it cannot be read."""
+    import canopen
+
+    try:
+        described = canopen.import_od(path)
+    except Exception as error:  # noqa: BLE001 - of a parser of texts
+        raise UsageError(f"eds = {path!r} cannot be read: {error}") from None
+    told = described.device_information
+    vendor, product = drive.read(od.VENDOR), present(drive, od.PRODUCT) or 0
+    if (told.vendor_number, told.product_number) != (vendor, product):
+        raise DriveError(
+            f"wrong EDS: {path} is of vendor {told.vendor_number}, product "
+            f"{told.product_number}; the drive says {vendor:#x}, {product:#x}"
+        )
+    for item in vars(od).values():
+        variable = isinstance(item, Item) and described.get_variable(item.index, item.sub)
+        if variable and len(variable) != item.bits:
+            raise DriveError(f"{item} has {len(variable)} bits in the EDS, not {item.bits}")
+
+
 def set_reactions(drive: Objects, host: int, heartbeat: float) -> None:
     """What the drive does when it no longer hears the host for `heartbeat` (s).
 
@@ -59,25 +81,29 @@ def set_reactions(drive: Objects, host: int, heartbeat: float) -> None:
         (od.FAULT_OPTION, (2, 1)),  # along the ramp of the quick stop, else of its own
     )
     for item, values in wanted:
-        for number, value in enumerate(values, start=1):
-            try:
-                written(drive, item, value)
-                break
-            except DriveError as error:
-                if error.silent:
-                    raise
-                if number == len(values):
-                    raise DriveError(
-                        f"the drive lacks a reaction that a motion needs: {error}"
-                    ) from None
+        _set_reaction(drive, item, values)
+
+
+def _set_reaction(drive: Objects, item: Item, values: Sequence[int]) -> None:
+    """The first of `values` that the drive keeps. Raises DriveError when it keeps none."""
+    lacks: DriveError | None = None
+    for value in values:
+        try:
+            written(drive, item, value)
+        except DriveError as error:
+            if error.silent:
+                raise
+            lacks = error
+        else:
+            return
+    raise DriveError(f"the drive lacks a reaction that a motion needs: {lacks}")
 
 
 def set_pdos(drive: Objects, node: int) -> None:
     """RPDO 1 the controlword, 2 the target velocity, 3 the target torque; TPDO 1 and 2 samples."""
-    received = ((od.CONTROLWORD,), (od.TARGET_VELOCITY,), (od.TARGET_TORQUE,))
-    for number, entries in enumerate(received):
-        kind = AT_ONCE if number == 0 else SYNCHRONOUS
-        _map(drive, 0x1400 + number, 0x200 + 0x100 * number + node, entries, kind)
+    for number, (item, cob) in enumerate(((od.CONTROLWORD, 0x200), *od.TARGETS.values())):
+        kind = AT_ONCE if item is od.CONTROLWORD else SYNCHRONOUS
+        _map(drive, 0x1400 + number, cob + node, (item,), kind)
     for number, items in enumerate(od.MAPPED):
         _map(drive, 0x1800 + number, 0x180 + 0x100 * number + node, items, SYNCHRONOUS)
 
@@ -101,19 +127,17 @@ def _map(drive: Objects, index: int, cob: int, items: Sequence[Item], kind: int)
 
 def set_times(drive: Objects, period: float) -> bool:
     """Period of SYNC (s), in 1006h and 60C2h where there are such; whether SYNC is counted."""
-    counted = present(drive, od.COUNTER) is not None
-    if present(drive, od.CYCLE) is not None:
-        written(drive, od.CYCLE, 0)  # 1019h may change only while it is 0
-        if counted:
-            written(drive, od.COUNTER, od.COUNTED)
-        written(drive, od.CYCLE, round(period * 1e6))
-    elif counted:
-        written(drive, od.COUNTER, od.COUNTED)
-    if present(drive, od.CYCLE_VALUE) is not None:
-        value, exponent = cycle(period)
-        written(drive, od.CYCLE_EXPONENT, exponent)
-        written(drive, od.CYCLE_VALUE, value)
-    return counted
+    value, exponent = cycle(period)
+    for item, wanted in (
+        (od.CYCLE, 0),  # 1019h may change only while it is 0
+        (od.COUNTER, od.COUNTED),
+        (od.CYCLE, round(period * 1e6)),
+        (od.CYCLE_EXPONENT, exponent),
+        (od.CYCLE_VALUE, value),
+    ):
+        if present(drive, item) is not None:
+            written(drive, item, wanted)
+    return present(drive, od.COUNTER) is not None
 
 
 def cycle(period: float) -> tuple[int, int]:
@@ -158,13 +182,7 @@ def set_limits(drive: Objects, limits: LimitsOptions, scale: Scale, own: dict[It
         raise DriveError(
             f"the drive limits no speed: {od.MAX_PROFILE_VELOCITY}, or {od.MAX_MOTOR_SPEED}"
         )
-    ramp = max(1, round(limits.acceleration * rate))
-    try:
-        written(drive, od.QUICK_STOP_DECELERATION, ramp)
-    except DriveError as error:
-        if error.silent:
-            raise
-        raise DriveError(f"the drive lacks a reaction that a motion needs: {error}") from None
+    _set_reaction(drive, od.QUICK_STOP_DECELERATION, (max(1, round(limits.acceleration * rate)),))
     return ", ".join(str(item) for item in lacking)
 
 
@@ -181,6 +199,8 @@ def _limited(drive: Objects, item: Item, most: float, own: dict[Item, int]) -> b
     # 607Dh: both 0 is no limit. 0 of any other would let nothing move: it is unset.
     if had and abs(had) < abs(wanted):
         wanted = had
+    if not wanted:  # less than one unit of the drive, and to some drives 0 is no limit
+        return False
     try:
         written(drive, item, wanted)
     except DriveError as error:

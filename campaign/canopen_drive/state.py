@@ -39,11 +39,7 @@ QUICK_STOP = 0x0002
 DISABLE_VOLTAGE = 0x0000
 FAULT_RESET = 0x0080
 """All other bits 0: in a state that is no fault it disables the voltage."""
-ENABLING = {
-    State.SWITCH_ON_DISABLED: 0x0006,
-    State.READY: 0x0007,
-    State.SWITCHED_ON: 0x000F,
-}
+ENABLING = {State.SWITCH_ON_DISABLED: 0x0006, State.READY: 0x0007, State.SWITCHED_ON: 0x000F}
 """What leads nearer to `ENABLED`. From `QUICK_STOP` and from a fault nothing does."""
 INTERNAL_LIMIT = 0x0800
 """Bit 11 of the statusword."""

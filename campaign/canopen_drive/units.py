@@ -12,7 +12,9 @@ from campaign.canopen_drive.objects import Item
 
 INCREMENTS, TURNS, RADIANS, DEGREES = 0xB5, 0xB4, 0x10, 0x41
 """Codes of units in 60A8h and 60A9h (CiA 303-2 and its use in CiA 402)."""
-PER_SECOND, PER_MINUTE = 0x03, 0x47
+PER_TURN = {TURNS: 1.0, RADIANS: 2 * math.pi, DEGREES: 360.0}
+SECONDS = {0x03: 1.0, 0x47: 60.0}
+"""Codes of 1/s and 1/min, as the time in s."""
 PER_MILLE = 1e-3
 
 Read = Callable[[Item], int | None]
@@ -89,8 +91,7 @@ def _shaft_turns(read: Read, ratio: float) -> float:
 def _units_per_turn(read: Read, ratio: float) -> float:
     unit = read(od.POSITION_UNIT)
     kind = INCREMENTS if not unit else unit >> 16 & 0xFF
-    each = {TURNS: 1.0, RADIANS: 2 * math.pi, DEGREES: 360.0}.get(kind)
-    shaft = _shaft_turns(read, ratio)
+    each, shaft = PER_TURN.get(kind), _shaft_turns(read, ratio)
     if each is not None and unit:
         return each / _prefix(unit) * shaft
     if feed := _quotient(read, od.FEED, od.FEED_TURNS):
@@ -110,9 +111,8 @@ def _rate_units(read: Read, turn: float, ratio: float) -> float:
     if not unit:
         factor = _quotient(read, od.VELOCITY_NUMERATOR, od.VELOCITY_DIVISOR)
         return turn * (factor or 1.0)
-    kind, time = unit >> 16 & 0xFF, unit >> 8 & 0xFF
-    each = {TURNS: 1.0, RADIANS: 2 * math.pi, DEGREES: 360.0}.get(kind)
-    seconds = {PER_SECOND: 1.0, PER_MINUTE: 60.0}.get(time)
+    kind = unit >> 16 & 0xFF
+    each, seconds = PER_TURN.get(kind), SECONDS.get(unit >> 8 & 0xFF)
     if seconds is None or (each is None and kind != INCREMENTS):
         raise DriveError(
             f"{od.VELOCITY_UNIT} is {unit:08X}h, which is not known; state --set "

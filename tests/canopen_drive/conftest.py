@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from campaign.canopen_drive import relay
+from campaign.canopen_drive import proof, relay
 from tests.canopen_drive.rig import FastClock, channel
 from tests.canopen_drive.simulated import SimulatedDrive
 
@@ -26,6 +26,7 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def fast(monkeypatch: pytest.MonkeyPatch) -> float:
     """The relay's clock; a simulated drive with this `speed` counts heartbeats as fast."""
     monkeypatch.setattr(relay, "time", FastClock(SPEED))
+    monkeypatch.setattr(proof, "REACTION", SPEED * proof.REACTION)  # a busy machine is not as fast
     return SPEED
 
 

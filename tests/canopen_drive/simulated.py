@@ -341,7 +341,7 @@ class SimulatedDrive:
         if "no reaction" in self.quirks:
             return
         self.operational = self.operational and self.get(0x1029, 1) == 1
-        if self.get(0x6007):
+        if 0x6007 in self.node.object_dictionary and self.get(0x6007):
             self.fail(0x8130)
 
     # The axis

@@ -210,6 +210,16 @@ def test_a_slow_move_shows_a_wrong_scale_or_sign(quirk: dict[str, int], drives: 
     refused(name, drive, "scale or sign")
 
 
+def test_another_gear_of_the_bench_is_another_scale_to_confirm(drives: Make) -> None:
+    name, drive = drives()
+    with backend(name) as connected:
+        assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
+        drive.quirks["sign"] = -1
+        geared = {**BENCH, "gear": {"ratio": 2.0}}
+        ending, _ = execute(connected, trial(bench=geared))
+    assert "scale or sign" in ending.reason
+
+
 def test_a_drive_that_goes_on_without_a_heartbeat_is_refused(drives: Make) -> None:
     name, drive = drives(**{"no reaction": True})
     refused(name, drive, "heartbeat fell silent")
@@ -443,10 +453,11 @@ def test_a_latch_that_cannot_be_read_holds(tmp_path: Path) -> None:
 
 def test_a_second_program_is_refused_the_drive(drives: Make) -> None:
     name, _ = drives()
-    assert not address_of(f"can://virtual/{name}?node=5").is_served()
+    address = address_of(f"can://virtual/{name}?node=5")
+    assert address.served_at() is None
     with backend(name):
-        assert address_of(f"can://virtual/{name}?node=5").is_served()
-    assert not address_of(f"can://virtual/{name}?node=5").is_served()
+        assert address.served_at() is not None
+    assert address.served_at() is None
 
 
 def test_it_is_known_as_a_live_backend_that_can_be_stopped() -> None:
