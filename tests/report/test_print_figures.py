@@ -139,7 +139,15 @@ def test_panels_one_below_the_other_name_a_common_axis_once() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "protocol", ["quickstart", "linear", "friction_behaviour", "ship_motion", "excitation"]
+    "protocol",
+    [
+        "quickstart",
+        "friction_behaviour",
+        *(
+            pytest.param(each, marks=pytest.mark.statistics)
+            for each in ("excitation", "linear", "ship_motion")
+        ),
+    ],
 )
 def test_every_figure_of_a_shipped_protocol_can_be_printed(protocol: str, tmp_path: Path) -> None:
     subprocess.run(

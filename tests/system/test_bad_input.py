@@ -62,7 +62,7 @@ def test_a_measured_limit_ends_the_trial_and_the_others_go_on(tmp_path: Path):
         (("run", "quickstrat"), "did you mean 'quickstart'"),
         (
             ("run", "quickstart", "--backend", "moon"),
-            "there are files, import, replay, serial, sim",
+            "there are canopen, files, import, replay, serial, sim",
         ),
         (("run", "quickstart", "--only", "nix"), "velocity-map"),
         (("run", "quickstart", "--set", "nonsense"), "--set"),
