@@ -210,6 +210,24 @@ def test_a_slow_move_shows_a_wrong_scale_or_sign(quirk: dict[str, int], drives: 
     refused(name, drive, "scale or sign")
 
 
+@pytest.mark.parametrize("angle", [0.3, -0.3])
+def test_a_trial_begins_at_its_start_angle(angle: float, drives: Make) -> None:
+    name, _ = drives()
+    with backend(name) as connected:
+        ending, samples = execute(connected, trial(start_angle=angle))
+    assert ending.outcome is Outcome.COMPLETED, ending.reason
+    assert samples["relative_angle"][0] == pytest.approx(angle, abs=0.03)
+
+
+def test_a_start_angle_that_is_far_away_is_refused_before_its_samples_are_late(
+    drives: Make,
+) -> None:
+    """20 rad at 0.5 rad/s."""
+    name, drive = drives()
+    bench = {**BENCH, "limits": {**LIMITS, "angle": 30.0}}
+    refused(name, drive, "turn the load nearer", bench=bench, start_angle=20.0)
+
+
 def test_another_gear_of_the_bench_is_another_scale_to_confirm(drives: Make) -> None:
     name, drive = drives()
     with backend(name) as connected:
