@@ -39,12 +39,26 @@ class Latch:
         self._path = path
         self._kept: dict[str, Any] = {}  # a stop that may not be in the file
         self._changing = threading.Lock()  # who clears a stop must not lose the next one
+        self._at_work: threading.Thread | None = None
 
     def stop(self, by: str) -> None:
         """Keep the drive off from now on: in this process at once, then in the file."""
         with self._changing:
             count = int(self._tree().get("count", 0)) + 1
             self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
+
+    def hold(self, bring_to_rest: Callable[[float], object]) -> None:
+        """Bring the drive to rest beside the caller, unless that goes on or the stop was cleared."""
+        with self._changing:
+            if self.now() and (self._at_work is None or not self._at_work.is_alive()):
+                work = threading.Thread(target=bring_to_rest, args=(STOPPING,), daemon=True)
+                self._at_work = work
+                work.start()
+
+    def wait(self) -> None:
+        """Until the attempt to bring the drive to rest has ended."""
+        if self._at_work is not None:
+            self._at_work.join()
 
     def write(self) -> None:
         """Remember the stop beyond this process. Raises OSError."""
@@ -69,7 +83,8 @@ class Latch:
                 return False
             write_whole(self._path, {"latched": False, "count": count})
             self._kept = {}
-            return True
+        self.wait()  # a quick stop that is still sent would end the next trial
+        return True
 
     def _tree(self) -> dict[str, Any]:
         try:
@@ -100,7 +115,6 @@ class Desk:
     def __post_init__(self) -> None:
         self._decoder = FrameDecoder()
         self._stopped = 0  # the session whose SAFE has been latched
-        self._at_work: threading.Thread | None = None
 
     def feed(self, data: bytes) -> bytes:
         """The answers to what has come: one for all of a kind."""
@@ -123,16 +137,8 @@ class Desk:
             self._stopped = message.session
             self.latch.stop(by)
             self.stop(by)
-        if self._at_work is None or not self._at_work.is_alive():
-            work = threading.Thread(target=self.drive.bring_to_rest, args=(STOPPING,), daemon=True)
-            self._at_work = work
-            work.start()
+        self.latch.hold(self.drive.bring_to_rest)
         self.latch.write()  # last: a full disk must not keep the drive moving
-
-    def wait(self) -> None:
-        """Until the attempt to bring the drive to rest has ended."""
-        if self._at_work is not None:
-            self._at_work.join()
 
     def _status(self) -> Status:
         running, state, at_rest = self.running(), None, False
@@ -170,7 +176,8 @@ class DirectLine:
     def __init__(self, address: Address) -> None:
         """Raises UsageError."""
         self._drive = Drive(address)
-        self._desk = Desk(self._drive, Latch(address.file("latch")))
+        self._latch = Latch(address.file("latch"))
+        self._desk = Desk(self._drive, self._latch)
         self._answers = b""
 
     def read(self) -> bytes:
@@ -186,7 +193,7 @@ class DirectLine:
 
     def close(self) -> None:
         """Let go of the bus, once the drive was stopped: a full disk may end the line before."""
-        self._desk.wait()
+        self._latch.wait()
         self._drive.close()
 
 

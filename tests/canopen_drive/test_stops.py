@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,7 +21,7 @@ from campaign.canopen_drive.address import address_of
 from campaign.canopen_drive.client import Answers, Client
 from campaign.canopen_drive.drive import Drive, DriveError
 from campaign.canopen_drive.ends import End
-from campaign.canopen_drive.line import DirectLine, Latch
+from campaign.canopen_drive.line import Desk, DirectLine, Latch
 from campaign.canopen_drive.relay import Relay
 from campaign.canopen_drive.settings import set_pdos
 from campaign.link.safe import safe_frame
@@ -170,6 +171,37 @@ def test_who_clears_a_stop_does_not_lose_the_next(
     found = Latch(tmp_path / "latch.json").now()
     assert found is not None
     assert found[:2] == (2, "bob")
+
+
+def test_no_quick_stop_follows_a_stop_that_was_cleared(tmp_path: Path) -> None:
+    """It would end the next trial, as a fault of the drive."""
+    latch, begun, go_on = Latch(tmp_path / "latch.json"), threading.Event(), threading.Event()
+    told = []
+
+    class Resting:
+        address = SimpleNamespace(rest=1)
+
+        def bring_to_rest(self, patience: float) -> bool:
+            begun.set()
+            go_on.wait(60.0)
+            told.append("quick stop")
+            return True
+
+        def look(self) -> Any:
+            raise DriveError("nothing")
+
+    desk = Desk(Resting(), latch)  # type: ignore[arg-type]
+    desk.feed(safe_frame(1, "ada", 1))
+    assert begun.wait(60.0)
+    threading.Timer(0.3, go_on.set).start()
+    assert latch.clear(1)
+    assert told == ["quick stop"]
+    desk.feed(safe_frame(1, "ada", 2))  # sent before the stop was cleared
+    latch.wait()
+    assert told == ["quick stop"]
+    desk.feed(safe_frame(2, "bob", 1))
+    latch.wait()
+    assert len(told) == 2
 
 
 def test_a_full_disk_does_not_keep_the_drive_moving(monkeypatch: pytest.MonkeyPatch) -> None:
