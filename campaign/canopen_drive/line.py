@@ -48,7 +48,7 @@ class Latch:
             self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
 
     def hold(self, bring_to_rest: Callable[[float], object]) -> None:
-        """Bring the drive to rest beside the caller, unless that goes on or the stop was cleared."""
+        """Bring the drive to rest beside the caller, while the stop is not cleared."""
         with self._changing:
             if self.now() and (self._at_work is None or not self._at_work.is_alive()):
                 work = threading.Thread(target=bring_to_rest, args=(STOPPING,), daemon=True)
