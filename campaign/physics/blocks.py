@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.vector import (
     CACHE_LINE,
     by_lanes,
@@ -145,7 +145,7 @@ def by_lane(rows: Sequence[Any]) -> Array:
     return array
 
 
-@inlined
+@pasted
 def system_of(lanes: int, its: System) -> System:
     """A system, for the inside of the engine."""
     return System(
@@ -164,7 +164,7 @@ def system_of(lanes: int, its: System) -> System:
     )
 
 
-@inlined
+@pasted
 def elements_of(lanes: int, its: Elements) -> Elements:
     """Friction models, for the inside of the engine."""
     return Elements(
@@ -186,7 +186,7 @@ def elements_of(lanes: int, its: Elements) -> Elements:
     )
 
 
-@inlined
+@pasted
 def dry_of(lanes: int, its: Dry) -> Dry:
     """Dry friction, for the inside of the engine: each lane decides for itself what it does."""
     return Dry(
@@ -207,7 +207,7 @@ def dry_of(lanes: int, its: Dry) -> Dry:
     )
 
 
-@inlined
+@pasted
 def controller_of(lanes: int, its: Controller) -> Controller:
     """A controller, for the inside of the engine."""
     return Controller(
@@ -234,7 +234,7 @@ def controller_of(lanes: int, its: Controller) -> Controller:
     )
 
 
-@inlined
+@pasted
 def memory_of(lanes: int, its: Memory) -> Memory:
     """A memory, for the inside of the engine."""
     return Memory(

@@ -33,7 +33,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.vector import Vector, call_llvm, splat, vector_among
 
 _TO_INTEGER = 1.5 * 2.0**52
@@ -225,13 +225,13 @@ def polynomial(typingctx: Any, x: Any, coefficients: Any) -> Any:
     return number(number, coefficients), codegen
 
 
-@inlined
+@pasted
 def exp(x: float) -> float:
     """e^x; 0 below -707 (1e-307: smaller doubles begin to lose digits), inf above 709.78."""
     return _exp_of_sum(x, 0.0)
 
 
-@inlined
+@pasted
 def expm1(x: float) -> float:
     """e^x - 1, with a small relative error where x is nearly 0 too."""
     half_scale, r, curve = _reduced_exp(x, 0.0)
@@ -242,7 +242,7 @@ def expm1(x: float) -> float:
     return last
 
 
-@inlined
+@pasted
 def log(x: float) -> float:
     """Natural logarithm; -inf for x = 0, NaN for x < 0."""
     high, _ = _log_in_two(x)
@@ -252,7 +252,7 @@ def log(x: float) -> float:
     return last
 
 
-@inlined
+@pasted
 def power(x: float, y: float) -> float:
     """x^y for x >= 0 and y > 0: the double x for y = 1, and the double x * x for y = 2.
 
@@ -272,7 +272,7 @@ def power(x: float, y: float) -> float:
     return last
 
 
-@inlined
+@pasted
 def sin(x: float) -> float:
     """Sine of x (rad): to 1.5 ulp for |x| <= 1e6, also where it is nearly 0.
 
@@ -282,13 +282,13 @@ def sin(x: float) -> float:
     return result
 
 
-@inlined
+@pasted
 def cos(x: float) -> float:
     """Cosine of x (rad); range and errors are those of `sin`."""
     return _sine_from_quarter(x, 1)
 
 
-@inlined
+@pasted
 def tanh(x: float) -> float:
     """Hyperbolic tangent; exactly odd; exactly 1 or -1 beyond 20."""
     within = where(abs(x) > _TANH_IS_ONE, _TANH_IS_ONE, abs(x))
@@ -298,7 +298,7 @@ def tanh(x: float) -> float:
     return result
 
 
-@inlined
+@pasted
 def _exp_of_sum(x: float, low: float) -> float:
     """e^(x + low), |low| being no more than some ulp of x."""
     half_scale, r, curve = _reduced_exp(x, low)
@@ -307,7 +307,7 @@ def _exp_of_sum(x: float, low: float) -> float:
     return last
 
 
-@inlined
+@pasted
 def _reduced_exp(x: float, low: float) -> tuple[float, float, float]:
     """2^(k-1), r and e^r - 1 - r, where x + low = k ln 2 + r, |r| <= ln(2)/2 and -707 <= x <= 710.
 
@@ -323,7 +323,7 @@ def _reduced_exp(x: float, low: float) -> tuple[float, float, float]:
     return half_scale, r, fma(r * r, polynomial(r, _EXP), lost)
 
 
-@inlined
+@pasted
 def _log_in_two(x: float) -> tuple[float, float]:
     """Natural logarithm, 0 < x < inf, as a sum of two doubles that is good to 2^-56 of it.
 
@@ -349,7 +349,7 @@ def _log_in_two(x: float) -> tuple[float, float]:
     return high, rest - (high - main)
 
 
-@inlined
+@pasted
 def _sine_from_quarter(x: float, quarter: int) -> float:
     """sin(x + quarter pi/2): x = k pi/2 + r, |r| <= pi/4, and sin or cos of r as k says.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from campaign.physics.blocks import Array, Controller, Elements, Memory
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.elementary import nearest, where
 from campaign.physics.friction_lines import ask
 from campaign.physics.rows import (
@@ -37,7 +37,7 @@ from campaign.physics.step_function import AN_INSTANT
 from campaign.physics.vector import rows_on_the_stack
 
 
-@inlined
+@pasted
 def sample(
     lanes: int,
     controller: Controller,
@@ -72,7 +72,7 @@ def sample(
     _command(controller, memory, number, command, gyro, torque)
 
 
-@inlined
+@pasted
 def _read_sensors(
     controller: Controller, readings: Array, place: int, x: Array, noise: Array, reading: int
 ) -> None:
@@ -91,7 +91,7 @@ def _read_sensors(
         readings[s, place] = value
 
 
-@inlined
+@pasted
 def _stand_still(readings: Array) -> None:
     """Before the first sample everything stood as it does then."""
     for s in range(4):
@@ -99,14 +99,14 @@ def _stand_still(readings: Array) -> None:
             readings[s, before] = readings[s, 0]
 
 
-@inlined
+@pasted
 def _reading(controller: Controller, readings: Array, sensor: int, place: int) -> Any:
     """What the controller has of a sensor by now."""
     delayed = place - controller.delay[sensor]
     return readings[sensor, delayed if delayed >= 0 else delayed + readings.shape[1]]
 
 
-@inlined
+@pasted
 def _rates(
     controller: Controller,
     kept: Array,
@@ -134,7 +134,7 @@ def _rates(
     return rate
 
 
-@inlined
+@pasted
 def _compensate(
     lanes: int,
     controller: Controller,
@@ -158,7 +158,7 @@ def _compensate(
     return torque
 
 
-@inlined
+@pasted
 def _meet(compensation: Elements, kept: Array) -> None:
     """Give the friction models the newest filtered rates and the newest angle.
 
@@ -170,7 +170,7 @@ def _meet(compensation: Elements, kept: Array) -> None:
     load[MEETS_POSITION], motor[MEETS_POSITION] = kept[KEPT_ENCODER], kept[KEPT_ENCODER]
 
 
-@inlined
+@pasted
 def _ask_over(compensation: Elements, duration: Array | float) -> None:
     """Ask the friction models over `duration` (s).
 
@@ -183,7 +183,7 @@ def _ask_over(compensation: Elements, duration: Array | float) -> None:
     ask(compensation)
 
 
-@inlined
+@pasted
 def _command(
     controller: Controller,
     memory: Memory,
@@ -206,7 +206,7 @@ def _command(
     memory.held[0] = outputs[place + 1 if place + 1 < outputs.shape[0] else 0]
 
 
-@inlined
+@pasted
 def _linear(
     lanes: int,
     controller: Controller,

@@ -33,7 +33,7 @@ from numba.core.errors import NumbaError
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from campaign.physics.compilation import compiled_callback, inlined
+from campaign.physics.compilation import compiled_callback, pasted
 from campaign.physics.elementary import where
 from campaign.physics.rows import (
     ANSWERS,
@@ -226,7 +226,7 @@ def own_name(function: Any, *sizes: int) -> str:
     return re.sub(r"\W", "_", name)
 
 
-@inlined
+@pasted
 def _motion(own: int, common: int, has: Any, keeps: Any, meets: Any) -> Motion:
     """What interfaces meet, in their own units.
 
@@ -249,7 +249,7 @@ def _motion(own: int, common: int, has: Any, keeps: Any, meets: Any) -> Motion:
     )
 
 
-@inlined
+@pasted
 def _take(
     own: int, common: int, mean: Any, change: Any, has: Any, keeps: Any, meets: Any, answer: Any
 ) -> None:

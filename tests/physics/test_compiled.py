@@ -15,7 +15,13 @@ import campaign.physics
 from campaign.cli.compile_engine import compiling_meanwhile
 from campaign.execution import first_start
 from campaign.physics import compilation as compiled_module
-from campaign.physics.compilation import cache_folder, compiled, digest_of_sources, distrust
+from campaign.physics.compilation import (
+    cache_folder,
+    compiled,
+    digest_of_sources,
+    distrust,
+    inlined,
+)
 from tests.packages import FILM, Packages
 
 PHYSICS = Path(campaign.physics.__file__).parent
@@ -131,6 +137,22 @@ os.utime(film, (_IMPORTED_AT - 0.01, _IMPORTED_AT - 0.01))
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == [3.0, 0]
     assert torque(packages) == (6.0, 0)
+
+
+def test_what_compiled_code_alone_calls_refuses_python() -> None:
+    """It has no code for Python: a call would end the process."""
+
+    @inlined
+    def half(x: float) -> float:
+        return 0.5 * x
+
+    @compiled
+    def quarter(x: float) -> float:
+        return half(half(x))
+
+    assert quarter(1.0) == 0.25
+    with pytest.raises(TypeError, match="half is called by compiled code alone"):
+        half(1.0)
 
 
 def test_a_function_without_a_file_is_compiled_and_not_kept() -> None:

@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.compilation import called, inlined
+from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import (
     Array,
@@ -127,7 +127,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return mean + viscous * speed, state[TORQUE] - before + viscous * rise
 
 
-@inlined
+@pasted
 def _delayed(lag: float, state: Any, motion: Motion) -> Any:
     """|v| of a lag ago when the step ends; a sampled controller asks for instants, too."""
     lasts, count = motion.step > 2.0 * AN_INSTANT, state.shape[0] - OWN
@@ -181,7 +181,7 @@ def _slid(
     return where(still, torque, direction * mean)
 
 
-@inlined
+@pasted
 def _curve(parameters: Any, direction: float) -> tuple[float, float, float]:
     """Tc, Ts - Tc (N m) and 1 / vs in a direction."""
     forwards = direction >= 0.0
@@ -190,7 +190,7 @@ def _curve(parameters: Any, direction: float) -> tuple[float, float, float]:
     return coulomb, excess, where(forwards, parameters[2], parameters[5])
 
 
-@inlined
+@pasted
 def _fallen(ratio: float) -> float:
     """1 / (1 + (v / vs)^2)."""
     return 1.0 / (1.0 + ratio * ratio)

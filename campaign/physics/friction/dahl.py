@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import called, inlined
+from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import exp, expm1, power, where
 from campaign.physics.friction.coulomb import CURVE, NegativeDirection
 from campaign.physics.friction.coulomb import steady_state as coulomb_steady_state
@@ -75,7 +75,7 @@ def _exponential_step(parameters: Any, state: Any, motion: Motion) -> tuple[floa
     return _line(parameters, before, turned, state[0], parts.share, motion)
 
 
-@inlined
+@pasted
 def relaxed(
     torque: float, moved: float, forwards: float, backwards: float, stiffness: float
 ) -> Any:
@@ -104,7 +104,7 @@ def _general(parameters: Any, torque: float, moved: float, i: float) -> Any:
     return where(moved != 0.0, after, torque)
 
 
-@inlined
+@pasted
 def _line(
     parameters: Any, before: float, turned: float, after: float, share: float, motion: Motion
 ) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import called, inlined
+from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import sin, where
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
 from campaign.physics.friction.lugre import FRICTION as LUGRE
@@ -73,7 +73,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return mean + 0.5 * viscous * (abs(v0) + abs(v1)), after - before + gained + rise
 
 
-@inlined
+@pasted
 def _plastic(w: float, s: float, elastic: float) -> float:
     """alpha, for bristles of w (N m) in the direction of motion."""
     span = where(s > elastic, s - elastic, 1.0)

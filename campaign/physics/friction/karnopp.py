@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import Array, DryFriction, FrictionModel, SmallSignal
 from campaign.physics.friction.path import sign_of
@@ -53,7 +53,7 @@ def _parameters(options: KarnoppOptions) -> Array:
     return np.array([*curve_parameters(options), options.zero_band])
 
 
-@inlined
+@pasted
 def _size(parameters: Any, direction: float, speed: float) -> Any:
     """Ts within the band, s(v) outside (N m)."""
     static = where(direction >= 0.0, parameters[1], parameters[5])

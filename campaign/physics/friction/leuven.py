@@ -26,7 +26,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import called, inlined
+from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import power, where
 from campaign.physics.friction.elements import ElementOptions, count_of, shares_of
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
@@ -137,13 +137,13 @@ def _slope(ratio: float, exponent: float) -> float:
     return slope
 
 
-@inlined
+@pasted
 def _moved(ratio: float, slope: float, stiffness: float, way: float, s: float) -> Any:
     """How far z moves in the direction of motion, Q and stiffness held."""
     return (1.0 - ratio) * slope * way * decayed(stiffness * slope * way / s)
 
 
-@inlined
+@pasted
 def _held(torque: float, most: float) -> float:
     """What an element holds of a torque."""
     held: float = where(torque > most, most, where(torque < -most, -most, torque))

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.elementary import any_of, exp, expm1, power, where
 from campaign.physics.friction.interface import (
     Array,
@@ -82,7 +82,7 @@ def _gaussian_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, 
     return _advance(parameters, state, motion, v, speed, direction, ratio * ratio)
 
 
-@inlined
+@pasted
 def _mean_rates(motion: Motion) -> tuple[float, float, float]:
     """Means of v and of |v|, and their quotient: the direction, or less of it.
 
@@ -99,14 +99,14 @@ def _mean_rates(motion: Motion) -> tuple[float, float, float]:
     return v, speed, direction
 
 
-@inlined
+@pasted
 def _ratio(parameters: Any, v: float, speed: float) -> Any:
     """|v| / vs in the direction of v."""
     forwards, backwards = parameters[2], parameters[6]
     return speed * where(v >= 0.0, forwards, backwards)
 
 
-@inlined
+@pasted
 def _advance(
     parameters: Any,
     state: Any,

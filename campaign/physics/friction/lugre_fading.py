@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from campaign.physics.compilation import called, inlined
+from campaign.physics.compilation import called, pasted
 from campaign.physics.elementary import exp, where
 from campaign.physics.friction.dahl import relaxed
 from campaign.physics.friction.interface import Array, FrictionModel, Presliding, SmallSignal
@@ -76,7 +76,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return mean + 0.5 * viscous * (abs(v0) + abs(v1)), after - before + gained + rise
 
 
-@inlined
+@pasted
 def _damping(parameters: Any, rate: float) -> Any:
     """sigma1(v) / sigma0 (s)."""
     ratio = rate * parameters[11]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.elementary import expm1, where
 from campaign.physics.step_function import Motion
 
@@ -25,7 +25,7 @@ class Parts(NamedTuple):
     turns: Any
 
 
-@inlined
+@pasted
 def parts_of(motion: Motion) -> Parts:
     """The parts of a step."""
     v0, v1, step = motion.rate_start, motion.rate_end, motion.step
@@ -36,14 +36,14 @@ def parts_of(motion: Motion) -> Parts:
     return Parts(first, where(turns, whole - first, 0.0), share, turns)
 
 
-@inlined
+@pasted
 def sign_of(x: float) -> float:
     """1, -1, or 0 at 0."""
     sign: float = where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
     return sign
 
 
-@inlined
+@pasted
 def decayed(x: float) -> float:
     """(1 - exp(-x)) / x for x >= 0: the mean of a decay over what it lasts."""
     share: float = where(x > 0.0, -expm1(-x) / where(x > 0.0, x, 1.0), 1.0)

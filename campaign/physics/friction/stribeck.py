@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from campaign.options import Options
-from campaign.physics.compilation import inlined
+from campaign.physics.compilation import pasted
 from campaign.physics.elementary import exp, power, tanh, where
 from campaign.physics.friction.interface import (
     Array,
@@ -167,7 +167,7 @@ def _sliding(parameters: Any, direction: float, speed: float) -> float:
     return torque
 
 
-@inlined
+@pasted
 def curve_torque(parameters: Any, direction: float, speed: float) -> Any:
     """s(v) of Equation 4.4 (N m)."""
     tc_forwards, ts_forwards, vs_forwards, exponent_forwards = (
