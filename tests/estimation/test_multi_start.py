@@ -201,13 +201,13 @@ def test_the_unit_of_residuals_that_state_no_deviation_decides_nothing(unit: flo
     assert two.half_width == pytest.approx(one.half_width, rel=1e-3)
 
 
-PAGE = Path(__file__).parents[2] / "docs" / "calibration.md"
+PAGE = Path(__file__).parents[2] / "docs" / "developers" / "estimators.md"
 
 
 def test_the_example_of_the_page_finds_what_most_fits_miss() -> None:
     blocks = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
     names: dict[str, Any] = {}
-    exec(compile(blocks[0], "calibration.md", "exec"), names)
+    exec(compile(blocks[0], "estimators.md", "exec"), names)
     assert holds(names["frequency"], 3.1)
     assert 0 < names["frequency"].half_width < 0.01
     assert 1 <= names["found"].agreeing < 10
