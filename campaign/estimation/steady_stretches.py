@@ -90,16 +90,21 @@ def steady_stretches(
     still = SLOWEST * largest if slowest is None else slowest
     slowest = max(still, NOISE * noise / TELLS)
     fewest = max(SHORTEST, int(np.ceil(shortest * sample_rate / size)))
+    # What is left of a stretch that settles for long is as long as the shortest one after its cut.
+    left = max(FEWEST, (fewest - 2 * max(1, round(TRIM * fewest))) * size)
     grown = [(a, b) for a, b in _grown(means, noise, slowest) if b - a >= fewest]
     level = None
-    if torque is not None and not driven and np.isfinite(torque).any():
-        level = float(np.nanquantile(np.abs(torque), 0.9))
+    if torque is not None and not driven and grown:
+        # Not of the whole recording: what accelerates an inertia may be many times friction.
+        sliding = np.concatenate([torque[a * size : b * size] for a, b in grown])
+        if np.isfinite(sliding).any():
+            level = float(np.nanquantile(np.abs(sliding), 0.9))
     found = []
     for first, stop in _settled(grown, means):
         for share in SETTLING:
             begin = (first + max(1, round(share * (stop - first)))) * size
             end = (stop - max(1, round(TRIM * (stop - first)))) * size
-            if end - begin < FEWEST:
+            if end - begin < left:
                 break
             part = slice(begin, end)
             if _is_steady(rate[part], None if torque is None else torque[part], level):
