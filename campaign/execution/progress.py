@@ -103,10 +103,11 @@ class Ledger:
         self._bench_time_left += sum(trial.task.duration for trial in trials)
         self._worth_left += sum(map(self._worth, trials))
 
-    def begin(self, trial: Trial) -> None:
-        """A trial is about to be executed."""
-        self._running[trial.number] = trial
-        self._reached[trial.number] = 0.0
+    def begin(self, *trials: Trial) -> None:
+        """Trials are about to be executed together."""
+        for trial in trials:
+            self._running[trial.number] = trial
+            self._reached[trial.number] = 0.0
         self._tell(None)
 
     def reached(

@@ -84,9 +84,8 @@ class TrialSequence:
         try:
             while True:
                 while len(self._running) < executor.most_pending and (batch := self._next()):
-                    for trial in batch:
-                        self._ledger.begin(trial)
-                        self._under_way[trial.number] = trial
+                    self._ledger.begin(*batch)
+                    self._under_way |= {trial.number: trial for trial in batch}
                     future = executor.submit(batch, lambda *ended: self._news.put(ended))
                     self._running[future] = batch
                     future.add_done_callback(self._news.put)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from campaign.axis_kind import axis_terms, each_in_axis_terms, in_axis_terms, sides_in
@@ -31,6 +31,9 @@ LARGEST_RECORDING = 200_000_000
 """samples of one trial; more is a slip of units. They are recorded in flat memory, and an analysis
 holds the channels that it reads."""
 
+_ALL_GIVEN = set(Trial.model_fields)
+"""Shared by all trials: a set of its own has 2 kB."""
+
 
 @dataclass(frozen=True)
 class Expanded:
@@ -51,7 +54,7 @@ class Expanded:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Place:
     """One trial before it is numbered."""
 
@@ -80,14 +83,12 @@ def expand(
     own_benches: dict[str, tuple[Bench, Tree]] = {}
     truths = _Truths(test)
     benches = memory.BENCH * len({id(point.bench) for point in points})
-    whole = len(points) * test.entry.repeat
-    asked = 0
-    for done, (repeat, point) in enumerate(
-        itertools.product(range(1, test.entry.repeat + 1), points), start=1
-    ):
+    repeats = test.entry.repeat
+    whole, asked = len(points) * repeats, 0
+    for done, point in enumerate(points, start=1):
         requests = _requests(test, point, own_benches, truths)
         for index, (request, bench, tree, truth) in enumerate(requests):
-            places.append(_Place(point, request, index, repeat, bench, tree, truth))
+            places.append(_Place(point, request, index, 1, bench, tree, truth))
             asked += memory.of_task(request.task)
             if len(places) + before > LARGEST_PLAN and not allow_large:
                 raise PointError([size_problem(test, "the plan has")])
@@ -95,7 +96,13 @@ def expand(
                 raise PointError([memory_problem(test, asked * whole // done + benches)])
         if asked * whole // done > memory.SURELY * left:
             raise PointError([memory_problem(test, asked * whole // done + benches)])
-    spent = asked + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH
+    if len(places) * repeats + before > LARGEST_PLAN and not allow_large:
+        raise PointError([size_problem(test, "the plan has")])
+    spent = asked * repeats + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH
+    if spent > left:
+        raise PointError([memory_problem(test, spent)])
+    # What an experiment asks for at a point is the same in each repetition, which share it.
+    places = [replace(place, repeat=n) for n in range(1, repeats + 1) for place in places]
     if stages and (reason := _no_stages(places)):
         message = f"a test whose trials {reason} can have no stages"
         raise PointError([test.origin.problem((), "value", message)])
@@ -103,8 +110,9 @@ def expand(
     numbers = itertools.count(before + 1)
     set_by_hand = set_by_operator(test)
     setups = {id(point): _setup(test, point) for point in points}
+    known: dict[tuple[int, int], Mapping[str, Any]] = {}
     trials = tuple(
-        _trial(test, place, next(numbers), seed, setups[id(place.point)], set_by_hand)
+        _trial(test, place, next(numbers), seed, setups[id(place.point)], set_by_hand, known)
         for place in ordered
     )
     measured = (place for place in places if place.request.role is Role.MEASUREMENT)
@@ -248,36 +256,42 @@ def _trial(
     seed: int,
     setup: tuple[str, ...],
     set_by_hand: tuple[str, ...],
+    known: dict[tuple[int, int], Mapping[str, Any]],
 ) -> Trial:
     # All parts are validated; constructing without validation shares one bench tree among the
-    # trials of a point, where validation would copy it for each of up to 100 000.
-    request = place.request
-    options = place.point.options_tree if request.planned else place.point.written
-    requires, can_use = channels_of(test.experiment, request)
-    swept = {**place.point.values, **request.point}
-    with axis_terms(sides_in(place.bench_tree)):
-        note = in_axis_terms(request.note)
-        told = told_point(test.experiment.options, test.options, request.point)
+    # trials of a point, where validation would copy it for each of up to 100 000. `known` are the
+    # fields that the repetitions of a place share.
+    request, key = place.request, (id(place.point), place.index)
+    if key not in known:
+        options = place.point.options_tree if request.planned else place.point.written
+        requires, can_use = channels_of(test.experiment, request)
+        with axis_terms(sides_in(place.bench_tree)):
+            note = in_axis_terms(request.note)
+            told = told_point(test.experiment.options, test.options, request.point)
+        known[key] = {
+            "point": {**place.point.values, **request.point},
+            "told": {**place.point.told, **told},
+            "options": {**options, **request.options} if request.options else options,
+            "note": note,
+            "requires": requires,
+            "can_use": can_use,
+        }
     return Trial.model_construct(
+        _ALL_GIVEN,
         number=number,
         test=test.entry.name,
         kind=test.entry.kind,
         role=request.role,
-        point=swept,
-        told={**place.point.told, **told},
-        options={**options, **request.options},
         repeat=place.repeat,
         seed=place_hash(seed, place.point.values, place.index, place.repeat),
         bench=place.bench_tree,
         task=request.task,
-        note=note,
         setup=setup,
         set_by_operator=set_by_hand,
-        requires=requires,
-        can_use=can_use,
         windows=request.windows,
         truth=place.truth,
         recording=request.recording,
+        **known[key],
     )
 
 

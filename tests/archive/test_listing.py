@@ -127,7 +127,7 @@ def test_a_torn_last_line_was_never_reported(tmp_path, kit):
         path.write_bytes(whole + tail)
         story = read_journal(path)
         assert (list(story.finished), story.ended) == ([1], None)
-        assert story.text.encode() == whole
+        assert story.size == len(whole)
     path.write_bytes(whole.replace(b"run started", b"run sta?ted"))
     with pytest.raises(ArchiveError, match=r"journal\.jsonl:1: is not a line"):
         read_journal(path)

@@ -204,8 +204,8 @@ def test_the_journal_tells_of_decisions_steps_and_the_resume(tmp_path, kit):
     writer.operator_step(3, "Preload the spring to 5 N m", "done", at=kit.ENDED)
     path = writer.seal(RunStatus.FAULT, "no power", ended=kit.ENDED)
     writer = RunWriter.resume(path, **(RESUMED | {"changes": ["versions.numpy: 2.0 → 2.1"]}))
-    kinds = [type(entry).__name__ for entry in writer.told]
-    assert kinds[-3:] == ["Decision", "OperatorStep", "RunEnded"]
+    kinds = [type(entry).__name__ for entry in read_journal(writer.folder / JOURNAL).entries]
+    assert kinds[-4:] == ["Decision", "OperatorStep", "RunEnded", "RunResumed"]
     run = open_run(writer.folder)
     assert (run.status, run.reason) == (
         RunStatus.INCOMPLETE,

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from campaign.archive import RunStatus, RunWriter, list_runs, open_run
-from campaign.archive.layout.followup_trials import trials_followed, trials_in
-from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
+from campaign.archive.layout.followup_trials import stages_in, trials_followed, trials_in
+from campaign.archive.layout.journal import JOURNAL, TrialsFollowed, read_journal
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
@@ -66,7 +66,7 @@ def test_a_sealed_run_is_gone_on_with_and_has_them_again(tmp_path, kit):
     writer, further = begun(tmp_path, kit)
     path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
     writer = RunWriter.resume(path, **RESUMED)
-    assert list(trials_in(e for e in writer.told if isinstance(e, TrialsFollowed))) == further
+    assert list(trials_in(stages_in(read_journal(writer.folder / JOURNAL).entries))) == further
     assert writer.archived(3).trial == further[0]
     assert writer.archived(3).ending.outcome is Outcome.COMPLETED
     with pytest.raises(LookupError):

@@ -103,6 +103,15 @@ def sha256_of(
     return digest.hexdigest()
 
 
+def sha256_of_part(path: Path, offset: int, size: int) -> str:
+    """SHA-256 of so many bytes of a file, in flat memory."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        file.seek(offset)
+        _digest(file, digest, size, lambda count: None)
+    return digest.hexdigest()
+
+
 def _digest(
     file: BinaryIO,
     digest: hashlib._Hash,

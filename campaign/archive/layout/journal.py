@@ -6,12 +6,14 @@ only; a torn line was never reported, so a reader leaves it out.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import accumulate
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -38,6 +40,10 @@ _ESTIMATE = TypeAdapter(Estimate)
 
 class _Line(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
+
+    def model_post_init(self, context: object) -> None:
+        """Nobody asks which fields were given: a set of them would take half of the memory."""
+        self.__pydantic_fields_set__.clear()
 
 
 class RunStarted(_Line):
@@ -218,10 +224,13 @@ class Journal:
             os.ftruncate(self._descriptor, whole)
             os.fsync(self._descriptor)
 
-    def append(self, *entries: Entry) -> None:
-        """Add a line for each. Raises ArchiveError, leaving all as it was, when that fails."""
-        texts = [canonical_json(entry.model_dump(mode="json")) for entry in entries]
-        lines = "".join(f"{text}\n" for text in texts).encode()
+    def append(self, *entries: Entry) -> list[int]:
+        """Add a line for each; returns their places, for `entry`.
+
+        Raises ArchiveError, leaving all as it was, when that fails.
+        """
+        texts = [f"{canonical_json(each.model_dump(mode='json'))}\n".encode() for each in entries]
+        lines = b"".join(texts)
         with self._lock:
             before = os.fstat(self._descriptor).st_size
             try:
@@ -232,6 +241,16 @@ class Journal:
             except OSError as error:
                 os.ftruncate(self._descriptor, before)
                 raise ArchiveError(f"{self._path}: cannot be written: {why(error)}") from None
+        return list(accumulate(map(len, texts), initial=before))[:-1]
+
+    def entry(self, place: int) -> Entry:
+        """The line at a place. Raises ArchiveError."""
+        try:
+            with self._path.open("rb") as file:
+                file.seek(place)
+                return _ENTRY.validate_python(json.loads(file.readline()))
+        except (OSError, ValueError) as error:
+            raise ArchiveError(f"{self._path}: cannot be read: {why(error)}") from None
 
     def close(self) -> None:
         with self._lock:
@@ -249,8 +268,9 @@ class Story:
         finished: by trial number, in the order of their numbers; a trial's last attempt counts.
         earlier: by trial number, the attempts before that, in the order they were made.
         ended: None when the run is still in progress or was killed.
-        entries: all of it, in order.
-        text: the whole lines, verbatim.
+        entries: all of it, in order, but for what was measured: that takes most of the memory.
+        measured: the places of what was measured, by the digest of the trial's record.
+        size: bytes of the whole lines.
     """
 
     started: RunStarted
@@ -258,7 +278,8 @@ class Story:
     earlier: dict[int, tuple[TrialFinished, ...]]
     ended: RunEnded | None
     entries: tuple[Entry, ...]
-    text: str
+    measured: dict[str, int]
+    size: int
 
     @property
     def files(self) -> list[TrialFinished]:
@@ -270,37 +291,43 @@ class Story:
 def read_journal(path: Path) -> Story:
     """Read a journal. Raises ArchiveError naming the line that cannot be understood."""
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            return _tell(path, file)
     except OSError as error:
         raise ArchiveError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse_journal(path, content)
 
 
 def parse_journal(path: Path, content: bytes) -> Story:
     """What a journal tells; `path` is for messages."""
-    lines = content.split(b"\n")[:-1]  # what follows the last line's end was never reported
-    return _tell(path, lines)
+    return _tell(path, io.BytesIO(content))
 
 
-def _tell(path: Path, lines: list[bytes]) -> Story:
-    entries = list(_parse(path, lines))
-    if not entries or not isinstance(entries[0], RunStarted):
-        raise ArchiveError(f"{path}: does not begin with the start of a run")
+def _tell(path: Path, lines: Iterable[bytes]) -> Story:
+    entries: list[Entry] = []
     attempts: dict[int, dict[str, TrialFinished]] = {}
-    for entry in entries:
+    measured: dict[str, int] = {}
+    size = 0
+    for entry, length in _parse(path, lines):
+        if isinstance(entry, TrialMeasured):
+            measured[entry.record] = size
+        else:
+            entries.append(entry)
         if isinstance(entry, TrialFinished):
             of_trial = attempts.setdefault(entry.trial, {})
             of_trial.pop(entry.file, None)
             of_trial[entry.file] = entry
+        size += length
+    if not entries or not isinstance(entries[0], RunStarted):
+        raise ArchiveError(f"{path}: does not begin with the start of a run")
     kept = {number: list(attempts[number].values()) for number in sorted(attempts)}
-    text = b"".join(line + b"\n" for line in lines[: len(entries)]).decode()
     return Story(
         started=entries[0],
         finished={number: of_trial[-1] for number, of_trial in kept.items()},
         earlier={n: tuple(of_trial[:-1]) for n, of_trial in kept.items() if len(of_trial) > 1},
         ended=_end(entries),
         entries=tuple(entries),
-        text=text,
+        measured=measured,
+        size=size,
     )
 
 
@@ -314,11 +341,15 @@ def _end(entries: list[Entry]) -> RunEnded | None:
     return None
 
 
-def _parse(path: Path, lines: list[bytes]) -> Iterable[Entry]:
+def _parse(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[Entry, int]]:
+    """Each line, and its bytes."""
+    wrong = 0
     for number, line in enumerate(lines, start=1):
+        if not line.endswith(b"\n"):
+            return  # it was never reported
+        if wrong:  # a power cut may leave a last line of rubbish, but no other one
+            raise ArchiveError(f"{path}:{wrong}: is not a line of a journal")
         try:
-            yield _ENTRY.validate_python(json.loads(line))
+            yield _ENTRY.validate_python(json.loads(line)), len(line)
         except (ValidationError, ValueError, RecursionError):
-            if number == len(lines):  # a power cut may leave a last line of rubbish
-                return
-            raise ArchiveError(f"{path}:{number}: is not a line of a journal") from None
+            wrong = number

@@ -182,7 +182,7 @@ def shared_trees(trial: Trial) -> tuple[Tree, dict[str, Tree]]:
 def trees_text(trees: Trees) -> str:
     """Trees as JSON lines, in the order of their digests."""
     return "".join(
-        f'{{"sha256":"{digest}","tree":{canonical_json(tree)}}}\n'
+        f'{{"sha256":"{digest}","tree":{tree_text(tree)}}}\n'
         for digest, tree in sorted(trees.items())
     )
 

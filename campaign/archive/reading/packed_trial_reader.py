@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -84,12 +85,18 @@ def packed_record(
         raise ArchiveError(f"{path}: /{entry}/record/json: {MISMATCH}")
     record = parse_record(path, f"/{entry}/record", packed.record)
     try:
-        trees = parse_trees(packed.trees)
+        trees = _trees(packed.trees)
     except ValueError as error:
         raise ArchiveError(f"{path}: /{entry}/record/trees: {error}") from None
     if not record.tree_names <= trees.keys():
         raise ArchiveError(f"{path}: /{entry}/record/trees: its bench or its options are missing")
     return record, trees
+
+
+@lru_cache(maxsize=8)
+def _trees(text: str) -> Trees:
+    """Trials one after another mostly have the same bench and options."""
+    return parse_trees(text)
 
 
 def parse_record(path: Path, place: str, text: str) -> TrialRecord:

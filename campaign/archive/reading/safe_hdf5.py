@@ -22,7 +22,7 @@ import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5i, h5o, h5s, h5t
 from numpy.typing import NDArray
 
-from campaign.archive.layout.files import why
+from campaign.archive.layout.files import sha256_of_part, why
 from campaign.archive.layout.storage import CHECKSUM, SAMPLE
 from campaign.archive.reading.global_heap_check import heaps_are_sound
 from campaign.errors import ArchiveError
@@ -149,21 +149,37 @@ def text_at(parent: h5py.Group, name: str, digest: str | None = None) -> str:
     return raw.decode("utf-8")
 
 
+def check_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> None:
+    """As `text_at`, in flat memory."""
+    dataset = _text_id(parent, name)
+    offset, size = dataset.get_offset(), dataset.get_storage_size()
+    if offset is None:  # it lies in its header
+        text_at(parent, name, digest)
+    else:
+        path = Path(os.fsdecode(h5f.get_name(dataset)))
+        _compare(dataset, sha256_of_part(path, offset, size), digest)
+
+
 def unchecked_text_at(parent: h5py.Group, name: str) -> str:
     """A text as it stands there, damaged or not."""
     return _raw_text(parent, name)[1].decode("utf-8", "replace")
 
 
 def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
+    dataset = _text_id(parent, name)
+    value = np.empty((), dtype=dataset.dtype)
+    dataset.read(h5s.ALL, h5s.ALL, value)
+    return dataset, bytes(value[()])
+
+
+def _text_id(parent: h5py.Group, name: str) -> h5d.DatasetID:
     dataset, plan = _dataset_id(parent, name)
     kind = dataset.dtype
     if dataset.rank or kind.kind != "S" or plan.get_layout() == h5d.CHUNKED:
         raise ArchiveError(f"{_place(parent, name)}: is not a text of fixed length")
     if dataset.get_storage_size() != kind.itemsize:
         raise ArchiveError(f"{_place(parent, name)}: is not stored whole")
-    value = np.empty((), dtype=kind)
-    dataset.read(h5s.ALL, h5s.ALL, value)
-    return dataset, bytes(value[()])
+    return dataset
 
 
 def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:

@@ -12,7 +12,6 @@ from pathlib import Path
 import h5py
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from campaign.archive.layout import storage
 from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.header import FORMAT
 from campaign.archive.layout.run_folder import first_line
@@ -44,10 +43,9 @@ class Seal(BaseModel):
     texts: dict[str, str]
 
 
-def seal_text(run: str, texts: Mapping[str, str | int]) -> str:
-    """The seal of `texts`, which are by their place in `/run`."""
-    digests = {name: text_digest(storage.storable(str(text))) for name, text in texts.items()}
-    return canonical_json({"format": FORMAT, "run": run, "texts": digests})
+def seal_text(run: str, digests: Mapping[str, str]) -> str:
+    """The seal of texts, whose digests are by their place in `/run`."""
+    return canonical_json({"format": FORMAT, "run": run, "texts": dict(digests)})
 
 
 class SealedTexts:
@@ -107,7 +105,9 @@ class SealedTexts:
         if place in NUMBERS:
             self.integer(place)
         else:
-            self.text(place)
+            with safe_hdf5.guarded(self._path, f"/run/{place}"):
+                parent, name = self._parent(place)
+                safe_hdf5.check_text_at(parent, name, self._digest(place))
 
     def _parent(self, place: str) -> tuple[h5py.Group, str]:
         group, _, name = place.rpartition("/")

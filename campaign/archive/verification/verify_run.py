@@ -6,6 +6,7 @@ nothing that can be read; the hash of the file finds it, and it is reported as s
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 
 import h5py
@@ -14,7 +15,7 @@ from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import ENTRY, entry_names
 from campaign.archive.layout.files import PART, sha256_of
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
-from campaign.archive.layout.journal import JOURNAL, TrialFinished
+from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.reading import safe_hdf5
@@ -113,7 +114,11 @@ class _Check(EntryCheck):
             reasons: dict[str, list[str]] = {}
             for entry in sorted(gone):
                 reasons.setdefault(not_kept[entry], []).append(entry)
-                self._without_samples(run, entry, told[entry])
+            # What the index says of a trial without a group was read when the run was opened.
+            for archived in (*run.trials, *chain(*run.earlier_attempts.values())):
+                if (entry := archived.entry) in gone:
+                    fingerprint = archived.trial.fingerprint
+                    self.executed[entry] = Executed.of(entry, f"/{entry}", archived, fingerprint)
             for why, entries in reasons.items():
                 more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
                 what = f"no samples of it{more} are kept: {why}; their digests are"
@@ -170,14 +175,6 @@ class _Check(EntryCheck):
         same = sha256_of(self.path, place, self.progress) == digest
         if not same and not self.problems.found:
             self.problems.add("", STRUCTURE)
-
-    def _without_samples(self, run: RunReader, entry: str, finished: TrialFinished) -> None:
-        """A trial that has no group: what the index says of it was read when the run was opened."""
-        attempts = run.earlier_attempts.get(finished.trial, ())
-        for archived in (*run.trials, *attempts):
-            if archived.entry == entry:
-                fingerprint = archived.trial.fingerprint
-                self.executed[entry] = Executed.of(entry, f"/{entry}", archived, fingerprint)
 
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str

@@ -34,11 +34,10 @@ from campaign.archive.layout.storage import (
     shuffling_helps,
     storable,
 )
+from campaign.archive.writing.long_text import SHORT, LongText
 
 Array = NDArray[np.float64]
 
-
-_COMPACT = 32_000  # bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes
 _MEMORY_FILES = itertools.count(1)
 _STRING = h5py.string_dtype()
 _TEXT = h5t.py_create(_STRING, logical=True)
@@ -103,11 +102,8 @@ def put_attribute(item: h5py.HLObject, name: str, value: str) -> None:
 def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None:
     """A text as a scalar of fixed length, so that a reader knows its size before reading it."""
     raw = storable(text).encode("utf-8")
-    kind = h5t.C_S1.copy()
-    kind.set_size(max(1, len(raw)))
-    kind.set_strpad(h5t.STR_NULLPAD)
-    kind.set_cset(h5t.CSET_UTF8)
-    dataset = _put_scalar(group, name, kind, np.array(raw, dtype=f"S{max(1, len(raw))}"), raw)
+    size = max(1, len(raw))
+    dataset = _put_scalar(group, name, _text_kind(size), np.array(raw, dtype=f"S{size}"), raw)
     for key, value in attributes.items():
         put_attribute(dataset, key, value)
 
@@ -150,7 +146,7 @@ def put_texts(group: h5py.Group, name: str, texts: Sequence[str], **attributes: 
 def _put_scalar(
     group: h5py.Group, name: str, kind: h5t.TypeID, value: NDArray[Any], raw: bytes
 ) -> h5py.Dataset:
-    plan = _scalar_plan(compact=len(raw) <= _COMPACT)
+    plan = _scalar_plan(compact=len(raw) <= SHORT)
     made = h5d.create(group.id, name.encode(), kind, _SCALAR, plan)
     made.write(h5s.ALL, h5s.ALL, value, kind)
     dataset = h5py.Dataset(made)
@@ -165,6 +161,25 @@ def _scalar_plan(compact: bool) -> h5p.PropDCID:
     if compact:
         plan.set_layout(h5d.COMPACT)
     return plan
+
+
+def put_long_text(group: h5py.Group, name: str, text: LongText) -> int:
+    """Room for a text, as `put_text` stores it; returns where it goes in the file, once closed."""
+    plan = h5p.create(h5p.DATASET_CREATE)
+    plan.set_obj_track_times(False)
+    plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    plan.set_fill_time(h5d.FILL_TIME_NEVER)
+    made = h5d.create(group.id, name.encode(), _text_kind(text.size), _SCALAR, plan)
+    put_attribute(h5py.Dataset(made), CHECKSUM, text.sha256)
+    return int(made.get_offset())
+
+
+def _text_kind(size: int) -> h5t.TypeID:
+    kind = h5t.C_S1.copy()
+    kind.set_size(size)
+    kind.set_strpad(h5t.STR_NULLPAD)
+    kind.set_cset(h5t.CSET_UTF8)
+    return kind
 
 
 def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:

@@ -87,10 +87,10 @@ class SampleColumns:
 
     Args:
         names: of the series, in the order of the rows that `append` takes.
-        file: where chunks go; None: nowhere, only digests are wanted.
+        file: where chunks go.
     """
 
-    def __init__(self, names: Sequence[str], file: PackedFile | None, chunk: int = CHUNK) -> None:
+    def __init__(self, names: Sequence[str], file: PackedFile, chunk: int = CHUNK) -> None:
         self._file = file
         self._names = tuple(names)
         self._buffer = np.zeros((len(names), chunk), dtype=SAMPLE)
@@ -120,10 +120,6 @@ class SampleColumns:
             for name, shuffled, places in told
         )
 
-    def drop(self) -> None:
-        """From now on only digests are wanted."""
-        self._file = None
-
     def append(self, rows: Sequence[Array]) -> list[Array]:
         """Add samples, one row per series; returns the whole chunks written, as new arrays."""
         total = len(rows[0])
@@ -149,11 +145,10 @@ class SampleColumns:
     def _write_chunk(self) -> None:
         for row, digest in zip(self._buffer, self._digests, strict=True):
             digest.update(row[: self._filled])
-        if self._file is not None:
-            self._put_chunk(self._file)
+        self._put_chunk()
         self._written, self._filled = self._written + self._filled, 0
 
-    def _put_chunk(self, file: PackedFile) -> None:
+    def _put_chunk(self) -> None:
         if not self._shuffled:
             self._shuffled = [shuffling_helps(row[: self._filled]) for row in self._buffer]
         if not self._filled:
@@ -163,4 +158,4 @@ class SampleColumns:
         size = self._buffer.shape[1] if self._written else self._filled
         told = zip(self._buffer, self._shuffled, self._places, strict=True)
         for row, shuffled, places in told:
-            places.append(file.put(pack(row[:size], shuffled)))
+            places.append(self._file.put(pack(row[:size], shuffled)))

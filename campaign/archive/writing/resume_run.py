@@ -44,7 +44,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
             unseal(sealed)
         set_aside_signature(sealed)  # also one that a crash left when its file was gone
         story = _read_folder(folder)
-        journal = Journal(folder / JOURNAL, whole=len(story.text.encode()))
+        journal = Journal(folder / JOURNAL, whole=story.size)
         return folder, story, journal, lock
 
 

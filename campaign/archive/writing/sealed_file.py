@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping
+import sys
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import h5py
 from h5py import h5d
 
 from campaign import __version__
+from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import entry_name
 from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.followup_trials import planned_in, stages_in
@@ -19,8 +21,9 @@ from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import FORMAT, RunHeader
 from campaign.archive.layout.journal import JOURNAL, RunEnded, Story, TrialFinished
 from campaign.archive.layout.packed_trial import Place
-from campaign.archive.layout.record import TrialRecord, parse_trees, series_of, trees_text
+from campaign.archive.layout.record import TrialRecord, parse_trees, series_of
 from campaign.archive.layout.run_folder import PLAN, parse_plan, read_text
+from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME
 from campaign.archive.reading.damage import DamageList
@@ -29,6 +32,7 @@ from campaign.archive.reading.seal import SEAL, SealedTexts, seal_text
 from campaign.archive.reading.series import layout_of
 from campaign.archive.writing import hdf5, nexus
 from campaign.archive.writing.default_plot import telling_trial
+from campaign.archive.writing.long_text import LongText, file_pieces, text_of
 from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
@@ -36,6 +40,7 @@ from campaign.trial import Tree, canonical_json
 
 Placed = Mapping[tuple[str, str], tuple[str, tuple[Place, ...]]]
 """The unit of each series of a trial, and where its chunks lie, by group and name."""
+Text = str | LongText | int
 
 
 class SealedFile:
@@ -52,8 +57,7 @@ class SealedFile:
         self.placed: dict[str, Placed] = {}
         self.not_kept: dict[str, str] = {}
         self._part = part
-        self._lines: dict[str, str] = {}
-        self._trees: dict[str, Tree] = {}
+        self._trees: dict[str, str] = {}  # lines by digest
         self._instruments: dict[nexus.Described, str] = {}
         self._hash_place: tuple[int, int]  # once it is finished
         self._file = hdf5.create_file(part)
@@ -74,7 +78,7 @@ class SealedFile:
         packed = read_packed(path, name)
         record, trees = packed_record(path, name, packed, finished.record)
         if packed.not_kept:
-            self.not_kept[entry] = packed.not_kept
+            self.not_kept[entry] = sys.intern(packed.not_kept)
         else:
             with safe_hdf5.guarded(path, f"/{entry}"), path.open("rb") as source:
                 written = self._entries.write(entry, record, packed, source)
@@ -85,28 +89,43 @@ class SealedFile:
                 self.placed[entry] = {
                     key: (units[key[1]], layout_of(made)) for key, (made, _) in written.items()
                 }
-        self._trees |= trees
-        self._lines[entry] = packed.record
+        for digest, line in zip(trees, packed.trees.splitlines(), strict=True):
+            self._trees.setdefault(digest, line)
         self.copied[entry] = finished
 
     def finish(self, folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> None:
         """Write everything but the trials, and close the file."""
         texts = _texts(folder, header, story, ended)
-        planned = parse_trees(read_text(folder / PLAN_TREES))
-        texts["trees/data"] = trees_text(planned | self._trees)
-        entries = sorted(self._lines, key=_by_number)
-        texts["index/data"] = "".join(f"{self._lines[entry]}\n" for entry in entries)
+        planned = read_text(folder / PLAN_TREES)
+        lines = dict(zip(parse_trees(planned), planned.splitlines(), strict=True)) | self._trees
+        texts["trees/data"] = "".join(f"{line}\n" for _, line in sorted(lines.items()))
+        texts["index/data"] = text_of(partial(self._index, folder))
+        rooms: dict[int, LongText] = {}
         with hdf5.closing(self._file) as file:
             run = hdf5.make_group(file, "run", "NXentry")
             for place, text in texts.items():
-                _put(run, place, text, header)
+                _put(run, place, text, header, rooms)
             if self.not_kept:
                 not_kept = canonical_json(self.not_kept)
                 for name, text in _note("application/json", "not-kept.json", not_kept).items():
-                    _put(run, f"not_kept/{name}", text, header)
-            _put(run, SEAL, seal_text(header.name, texts), header)
-            _write_root(file, header.created, _shown(file, folder, story))
+                    _put(run, f"not_kept/{name}", text, header, rooms)
+            digests = {place: _digest(text) for place, text in texts.items()}
+            _put(run, SEAL, seal_text(header.name, digests), header, rooms)
+            _write_root(file, header.created, _shown(file, self.placed, folder, story))
             self._hash_place = hdf5.blank_digest(run["outcome"], "file_sha256")
+        with self._part.open("r+b") as raw:
+            for offset, long in rooms.items():
+                raw.seek(offset)
+                raw.writelines(long.pieces())
+
+    def _index(self, folder: Path) -> Iterator[bytes]:
+        """The records, each with its end, in the order of trials; they are on the disk anyway."""
+        for entry in sorted(self.copied, key=_by_number):
+            finished = self.copied[entry]
+            packed = read_packed(folder / finished.file, entry_name(finished.trial))
+            if text_digest(packed.record) != finished.record:
+                raise ArchiveError(f"{folder / finished.file}: was changed while it was sealed")
+            yield f"{packed.record}\n".encode()
 
     def put_hash(self) -> None:
         """Put the hash of the whole file into the file.
@@ -172,10 +191,14 @@ def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Placed) -> 
         safe_hdf5.check_attribute(series, "units", unit)
 
 
-def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, str | int]:
+def _digest(text: Text) -> str:
+    return text.sha256 if isinstance(text, LongText) else text_digest(storable(str(text)))
+
+
+def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, Text]:
     """The texts of `/run` that are known without the trials, by their place."""
     failed = sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values())
-    texts: dict[str, str | int] = {
+    texts: dict[str, Text] = {
         "title": header.title or header.protocol_name or header.name,
         "entry_identifier": header.name,
         "start_time": header.created,
@@ -195,9 +218,13 @@ def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> di
         f"source_{number:03d}": _note(toml, name, text)
         for number, (name, text) in enumerate(sorted(header.sources.items()), start=1)
     } | {
-        "journal": _note(lines, JOURNAL, story.text),
-        "plan": _note(lines, PLAN, read_text(folder / PLAN)),
-        "plan_trials": _note(lines, PLAN_TRIALS, read_text(folder / PLAN_TRIALS)),
+        "journal": _note(
+            lines, JOURNAL, text_of(partial(file_pieces, folder / JOURNAL, story.size))
+        ),
+        "plan": _note(lines, PLAN, text_of(partial(file_pieces, folder / PLAN))),
+        "plan_trials": _note(
+            lines, PLAN_TRIALS, text_of(partial(file_pieces, folder / PLAN_TRIALS))
+        ),
         "trees": _note(lines, PLAN_TREES, ""),
         "index": _note(lines, "index.jsonl", ""),
     }
@@ -206,14 +233,17 @@ def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> di
     return texts
 
 
-def _note(kind: str, file_name: str, text: str) -> dict[str, str]:
+def _note(kind: str, file_name: str, text: str | LongText) -> dict[str, str | LongText]:
     return {"type": kind, "file_name": file_name, "data": text}
 
 
 _CLASSES = {"provenance": "NXcollection", "outcome": "NXcollection"}
 
 
-def _put(run: h5py.Group, place: str, text: str | int, header: RunHeader) -> None:
+def _put(
+    run: h5py.Group, place: str, text: Text, header: RunHeader, rooms: dict[int, LongText]
+) -> None:
+    """Write a text; of a long one `rooms` is told where it goes."""
     group_name, _, name = place.rpartition("/")
     group = run
     if group_name:
@@ -222,6 +252,8 @@ def _put(run: h5py.Group, place: str, text: str | int, header: RunHeader) -> Non
         group = run[group_name] if there else hdf5.make_group(run, group_name, nx_class)
     if isinstance(text, int):
         hdf5.put_integer(group, name, text)
+    elif isinstance(text, LongText):
+        rooms[hdf5.put_long_text(group, name, text)] = text
     elif place == "program_name":
         version = header.versions.get("campaign", "unknown")
         hdf5.put_text(group, name, text, version=version)
@@ -245,15 +277,19 @@ def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None
         hdf5.put_attribute(file, "default", shown.name.lstrip("/"))
 
 
-def _shown(file: h5py.File, folder: Path, story: Story) -> h5py.Group | None:
+def _shown(
+    file: h5py.File, placed: Collection[str], folder: Path, story: Story
+) -> h5py.Group | None:
     """What a viewer opens first: see `default_plot`."""
-    plan = parse_plan(folder, read_text(folder / PLAN))
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
     with_samples = [
         n
         for n in sorted(story.finished)
-        if (name := entry_name(n)) in file and "data" in file[name]
+        if (name := entry_name(n)) in placed and "data" in file[name]
     ]
+    if not with_samples:
+        return None
+    plan = parse_plan(folder, read_text(folder / PLAN))
     followed = planned_in(stages_in(story.entries))
     best = telling_trial((*plan, *followed), completed, with_samples)
     return None if best is None else file[entry_name(best)]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.archive.layout.checksums import series_digest
 from campaign.archive.layout.entries import entry_name, file_name
 from campaign.archive.layout.files import PART, publish, why
 from campaign.archive.layout.packed_trial import PackedSeries, PackedTrial
@@ -183,14 +184,13 @@ class TrialFile:
         """What the record says of the samples, and of their preview where one was written."""
         if self._columns is None:
             return None, None
-        rest, (time, *digests) = self._columns.finish()
+        if self._not_kept and self._whole is not None:
+            return self._described(self._whole.shape[1], map(series_digest, self._whole)), None
+        rest, digests = self._columns.finish()
         if rest.shape[1] == self._columns.length:
             self._whole = rest
         self._add_to_preview(rest)
-        told = zip(self._channels, digests, strict=True)
-        series = self._columns.length, time, [SeriesRecord.of(*both) for both in told]
-        if self._not_kept:
-            return series, None
+        series = self._described(self._columns.length, digests)
         groups["data"] = self._columns.series
         if self._columns.length <= PREVIEW_POINTS:
             return series, None
@@ -202,19 +202,23 @@ class TrialFile:
         preview = PreviewRecord(channel=channel, samples=columns.length, time=time, values=values)
         return series, preview
 
+    def _described(self, length: int, digests: Iterable[str]) -> Written:
+        time, *of_channels = digests
+        told = zip(self._channels, of_channels, strict=True)
+        return length, time, [SeriesRecord.of(*both) for both in told]
+
     def _put(self, columns: SampleColumns, rows: Sequence[Array]) -> None:
         with self._writing():
             for chunk in columns.append(rows):
                 self._add_to_preview(chunk)
 
     def _put_held(self, columns: SampleColumns) -> None:
-        """Write, or only digest, what waited for the trial's end."""
-        if self._not_kept:
-            columns.drop()
-        if self._held:
-            self._whole = np.concatenate(self._held, axis=1)
+        """Write what waited for the trial's end, unless only its digests are wanted."""
+        nothing = np.empty((1 + len(self._channels), 0))
+        self._whole = np.concatenate([nothing, *self._held], axis=1)
+        self._held.clear()
+        if not self._not_kept:
             self._put(columns, list(self._whole))
-            self._held.clear()
 
     def _add_to_preview(self, rows: Array) -> None:
         self._preview.add(rows[0], rows[1 + self._shown])

@@ -8,6 +8,8 @@ one whole run is on the disk, and it is clear which one.
 from __future__ import annotations
 
 import contextlib
+import json
+from collections.abc import Iterator
 from pathlib import Path
 
 from campaign.archive.layout.checksums import text_digest
@@ -20,10 +22,11 @@ from campaign.archive.layout.files import (
     sync_folder,
     why,
     write_atomically,
+    write_lines_atomically,
 )
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL, Entry, Story, TrialFinished, parse_journal
+from campaign.archive.layout.journal import JOURNAL, TrialFinished, parse_journal
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.layout.record import Trees, TrialRecord, parse_trees, trees_text
 from campaign.archive.layout.run_folder import HEADER, PLAN, header_document
@@ -100,7 +103,7 @@ def _fill(sealed: Path, folder: Path) -> None:
                 packed = packed_entry(sealed, entry)
             name = file_name(finished.trial, finished.attempt)  # once it had another ending
             written[finished.file] = _write(folder, sealed, packed, finished, name)
-    write_atomically(folder / JOURNAL, _journal(story, written))
+    write_lines_atomically(folder / JOURNAL, _journal(run.journal, written))
 
 
 def _without_samples(line: str, trees: Trees, not_kept: str) -> PackedTrial:
@@ -123,15 +126,12 @@ def _write(
     return finished.model_copy(update={"file": name, "sha256": digest, "bytes": size})
 
 
-def _journal(story: Story, written: dict[str, TrialFinished]) -> str:
+def _journal(text: str, written: dict[str, TrialFinished]) -> Iterator[str]:
     """The journal as it was, but for the hashes of the trial files, which are new ones."""
-
-    def line(entry: Entry, text: str) -> str:
-        if isinstance(entry, TrialFinished):
-            new = written[entry.file]
-            told = {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
-            return canonical_json(entry.model_copy(update=told).model_dump(mode="json"))
-        return text
-
-    lines = story.text.splitlines()
-    return "".join(line(*both) + "\n" for both in zip(story.entries, lines, strict=True))
+    for line in text.splitlines():
+        told = json.loads(line)
+        if told["event"] == "trial finished":
+            new = written[told["file"]]
+            told |= {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
+            line = canonical_json(told)
+        yield line + "\n"

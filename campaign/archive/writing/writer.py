@@ -20,7 +20,7 @@ from campaign.archive.layout.journal import (
     TrialsFollowed,
     utc_now,
 )
-from campaign.archive.reading.archived_metrics import measured_in, with_metrics
+from campaign.archive.reading.archived_metrics import with_metrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.writing.new_run_folder import make_folder
 from campaign.archive.writing.resume_run import reopen
@@ -56,8 +56,7 @@ class RunWriter:
         self._lock = threading.Lock()
         self._writers: list[TrialWriter] = []
         self._last: dict[int, TrialFinished] = {}
-        self._measured: dict[str, TrialMeasured] = {}
-        self._told: tuple[Entry, ...] = ()
+        self._measured: dict[str, int] = {}  # places in the journal, by the record's digest
         self._sealer = Sealer(self._folder)
 
     @classmethod
@@ -119,8 +118,7 @@ class RunWriter:
         writer._last = dict(story.finished)
         for finished in story.files:
             writer._sealer.add(finished)
-        writer._measured = measured_in(story.entries)
-        writer._told = story.entries
+        writer._measured = story.measured
         try:
             journal.append(
                 RunResumed(
@@ -146,11 +144,6 @@ class RunWriter:
         """How the last attempt at each trial ended, by number; those of before a resume, too."""
         with self._lock:
             return {number: self._last[number].outcome for number in sorted(self._last)}
-
-    @property
-    def told(self) -> tuple[Entry, ...]:
-        """What the journal held when the run was resumed, in order; empty in a new run."""
-        return self._told
 
     def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
         """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
@@ -190,15 +183,23 @@ class RunWriter:
 
         with self._lock:
             finished = self._last[number]
-            measured = self._measured.get(finished.record)
+            place = self._measured.get(finished.record)
         archived = read_trial_file(self._folder / finished.file, finished)
-        return with_metrics(archived, measured)
+        return with_metrics(archived, self._told(place))
 
     def metrics(self) -> dict[int, tuple[Estimate, ...]]:
         """What was measured in the last finished attempt at each trial, by number."""
         with self._lock:
-            told = {number: self._measured.get(last.record) for number, last in self._last.items()}
-        return {number: each.estimates for number, each in told.items() if each is not None}
+            places = {
+                number: self._measured.get(last.record) for number, last in self._last.items()
+            }
+        told = ((number, self._told(place)) for number, place in places.items())
+        return {number: each.estimates for number, each in told if each is not None}
+
+    def _told(self, place: int | None) -> TrialMeasured | None:
+        """What was measured, from the journal: of all trials it would fill the memory."""
+        entry = None if place is None else self._journal.entry(place)
+        return entry if isinstance(entry, TrialMeasured) else None
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
         """Note what a person was asked to do before `trial`, and the answer."""
@@ -242,8 +243,8 @@ class RunWriter:
 
     def note(self, *entries: Entry) -> None:
         """Put lines into the journal, all or none; of a finished trial its file is on the disk."""
-        self._journal.append(*entries)
-        for entry in entries:
+        places = self._journal.append(*entries)
+        for entry, place in zip(entries, places, strict=True):
             if isinstance(entry, TrialFinished):
                 with self._lock:
                     self._last[entry.trial] = entry
@@ -252,4 +253,4 @@ class RunWriter:
                     self._sealer.advance()
             elif isinstance(entry, TrialMeasured):
                 with self._lock:
-                    self._measured[entry.record] = entry
+                    self._measured[entry.record] = place

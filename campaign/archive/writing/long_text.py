@@ -1,0 +1,43 @@
+"""Texts that are as long as their run, in pieces: none of them is ever in memory whole."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from campaign.archive.layout.storage import storable
+
+SHORT = 32_000
+"""Bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes."""
+
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class LongText:
+    """A text by its pieces, UTF-8, which are made anew whenever they are asked for."""
+
+    pieces: Callable[[], Iterable[bytes]]
+    size: int
+    sha256: str
+
+
+def text_of(pieces: Callable[[], Iterable[bytes]]) -> str | LongText:
+    """The text, if it is short."""
+    digest, size, short = hashlib.sha256(), 0, b""
+    for piece in pieces():
+        digest.update(piece)
+        size += len(piece)
+        short = short + piece if size <= SHORT else b""
+    return LongText(pieces, size, digest.hexdigest()) if size > SHORT else short.decode()
+
+
+def file_pieces(path: Path, size: int | None = None) -> Iterator[bytes]:
+    """The first `size` bytes of a file, or all of it, as they can be stored."""
+    with path.open("rb") as file:
+        left = path.stat().st_size if size is None else size
+        while block := file.read(min(_BLOCK, left)):
+            left -= len(block)
+            yield block.replace(b"\0", storable("\0").encode())

@@ -1,0 +1,65 @@
+"""Memory of a run with many trials: what a writer and a sealing keep of each."""
+
+from __future__ import annotations
+
+import os
+import tracemalloc
+from pathlib import Path
+
+import h5py
+
+from campaign.archive import RunStatus, RunWriter
+from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing.long_text import SHORT
+from campaign.policy import Keeping
+from campaign.recording import Ending, Event, Outcome
+from tests.archive.forging import canonical, sha256
+
+PROTOCOL = {"tests": [{"name": "map"}]}
+FEW = 40
+LONG = 40_000
+"""Characters of a record; the journal's lines have none of them."""
+
+
+def begun(folder: Path, kit, count: int) -> RunWriter:
+    """A run in which so many trials without samples were recorded."""
+    trials = [kit.trial(number) for number in range(1, count + 1)]
+    header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
+    writer = RunWriter.create(folder, header, trials)
+    for trial in trials:
+        recorder = writer.begin(trial, Keeping("none"))
+        recorder.start(kit.CHANNELS)
+        recorder.append(*kit.samples(10, trial.number))
+        recorder.event(Event(0.0, "x" * LONG))
+        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    return writer
+
+
+def most(folder: Path, kit, count: int) -> int:
+    """Bytes at most while such a run is recorded and sealed."""
+    tracemalloc.start()
+    try:
+        begun(folder, kit, count).seal(RunStatus.COMPLETE, ended=kit.ENDED)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_no_text_of_a_trial_stays_in_memory(tmp_path: Path, kit, monkeypatch) -> None:
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)  # takes most of the time
+    few, many = (most(tmp_path / str(count), kit, count) for count in (FEW, 3 * FEW))
+    assert (many - few) / (2 * FEW) < LONG / 4
+
+
+def test_texts_written_in_pieces_are_what_the_folder_had(tmp_path: Path, kit, monkeypatch) -> None:
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
+    writer = begun(tmp_path, kit, 5 * FEW)
+    notes = {"plan": "plan.jsonl", "plan_trials": "plan-trials.jsonl", "journal": "journal.jsonl"}
+    texts = {note: (writer.folder / name).read_text() for note, name in notes.items()}
+    assert min(map(len, texts.values())) > SHORT
+    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    assert verify_run(path).problems == ()
+    with h5py.File(path) as file:
+        for note, text in texts.items():
+            assert file[f"run/{note}/data"][()].decode().startswith(text)
+        assert len(file["run/index/data"][()].splitlines()) == 5 * FEW
