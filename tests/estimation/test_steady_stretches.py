@@ -63,6 +63,20 @@ def test_a_sine_and_standstill_have_none():
         assert abs(part[-1] - part[0]) <= 0.02 * abs(part.mean())
 
 
+@pytest.mark.parametrize("seed", [1, 6, 33])
+def test_a_multisine_that_accelerates_a_large_inertia_has_none(seed: int):
+    """Its turning points last 20 to 140 ms; a tenth of its torque is as large as its friction."""
+    time = np.arange(24_000) / 1000.0
+    for tones in (10, 20):
+        phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, tones)
+        speeds = 2 * np.pi * 0.125 * np.arange(1, tones + 1)
+        angles = np.outer(time, speeds) + phases
+        rate = np.cos(angles).sum(axis=1) / np.sqrt(tones)
+        acceleration = -(speeds * np.sin(angles)).sum(axis=1) / np.sqrt(tones)
+        torque = 69.0 * acceleration + 27.0 * np.sign(rate)
+        assert steady_stretches(rate, 1000.0, torque, driven=False) == ()
+
+
 def test_a_creep_before_breakaway_is_no_sliding():
     """The rate is steady there, but the torque rises; later it does not."""
     creep, slide = np.full(1000, 0.05), np.full(1000, 1.0)
