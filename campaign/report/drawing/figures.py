@@ -65,6 +65,10 @@ LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
 LINE = 14.0
 """... and across it."""
+SHORTEST = 12
+"""Letters that a line of a title has at least ..."""
+NARROW, NARROW_LETTERS = 38.0, 9
+"""... but above a panel of fewer points, whose titles are smaller, and broken after so many."""
 NAME, AROUND = 0.134, 0.7
 """Inches of a named place along y, and of the title and labels above and below all of them."""
 LOW = 2.0
@@ -75,6 +79,8 @@ FIGURE_POINTS = 40_000
 """Most points of a figure's lines together; many curves share them."""
 TITLE_PAD = 7.0
 """Points between the axes and their title."""
+BESIDE = 0.05
+"""Share of its width that a panel of named places is wider on either side: signs are whole."""
 ROOM = 0.14
 """Share of its height that a panel is higher on either side, for the labels of points in it."""
 
@@ -165,9 +171,11 @@ def _drawn(
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
             title = f"({letter(place)}) {panel.title}" if len(figure.panels) > 1 else panel.title
-            ax.set_title(
-                fill(title.rstrip(), max(12, int(wide / BOLD_LETTER)), break_long_words=False)
-            )
+            letters = max(SHORTEST, int(wide / BOLD_LETTER))
+            small: dict[str, Any] = {}
+            if wide < NARROW:
+                letters, small = NARROW_LETTERS, {"fontsize": 7.0}
+            ax.set_title(fill(title.rstrip(), letters, break_long_words=False), **small)
         for place, panel in enumerate(figure.panels):
             if place % across and panel.y.places and panel.y == figure.panels[place - 1].y:
                 axes[place].tick_params(labelleft=False)  # the panel on its left has the names
@@ -336,9 +344,9 @@ def _size(figure: Figure) -> tuple[float, float]:
         width, each = SINGLE, 2.9 if down == 1 else 1.9
     if figure.panels and all(p.x.places and not p.y.places for p in figure.panels):
         each = min(each, LOW)
-    each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
     wide = 72.0 * width / across - 50.0
     each += LETTER / 72 * max((_longest(p) for p in figure.panels if _turned(p, wide)), default=0)
+    each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
     return width, 0.35 + each * max(down, 1)
 
 
@@ -411,6 +419,8 @@ def _draw_panel(
     if panel.y.scale == "linear":
         spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
     _limit_axes(ax, panel, scale_x, scale_y)
+    if panel.x.places and panel.x.limits is None:
+        ax.margins(x=BESIDE)
     if any(mark.point for mark in panel.marks) and panel.y.limits is None:
         ax.margins(y=ROOM)
     leave_room(ax, np.concatenate([np.empty(0), *bounds]))
@@ -434,13 +444,13 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
     ax, panel = drawn.ax, drawn.panel
     scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
     _label_axes(ax, panel, room)
+    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
+    draw_marks(marked)  # they may widen what is in view
     set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / NUMBER))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
     if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
         ax.set_xticklabels(names, rotation=90)
-    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
-    draw_marks(marked)
     if not any(np.isfinite(y).any() for y in drawn.y[: len(panel.curves)]):
         ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", color=MUTED.light)
     return marked
