@@ -22,6 +22,9 @@ from campaign.result import Axis, Curve, Figure, Finding, Mark, Panel
 from tests.report.print_checks import problems, told_apart
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
+USUAL = ("quickstart", "friction_behaviour")
+LONG = ("compensator_data", "draws", "presliding_multisine", "stick_slip_map", "thesis")
+"""They take minutes; but for two figures of multisines and one map, others draw what they draw."""
 COLUMNS: tuple[Column, ...] = ("single", "double")
 X = np.linspace(0.1, 5.0, 60)
 SINE = Curve(X, np.sin(X), "sine", "measured")
@@ -141,11 +144,11 @@ def test_panels_one_below_the_other_name_a_common_axis_once() -> None:
 @pytest.mark.parametrize(
     "protocol",
     [
-        "quickstart",
-        "friction_behaviour",
+        *USUAL,
         *(
-            pytest.param(each, marks=pytest.mark.statistics)
-            for each in ("excitation", "linear", "ship_motion")
+            pytest.param(path.stem, marks=pytest.mark.statistics)
+            for path in sorted(PROTOCOLS.glob("*.toml"))
+            if path.stem not in {*USUAL, *LONG}
         ),
     ],
 )

@@ -65,10 +65,8 @@ LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
 LINE = 14.0
 """... and across it."""
-SHORTEST = 12
-"""Letters that a line of a title has at least ..."""
-NARROW, NARROW_LETTERS = 38.0, 9
-"""... but above a panel of fewer points, whose titles are smaller, and broken after so many."""
+SHORTEST, TITLE, SMALL_TITLE = 12, 9.0, 7.0
+"""Letters that a line of a title has at least; its points, and those where a word has no room."""
 NAME, AROUND = 0.134, 0.7
 """Inches of a named place along y, and of the title and labels above and below all of them."""
 LOW = 2.0
@@ -91,7 +89,7 @@ STYLE: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
     "text.parse_math": False,  # a label is a name, whatever signs are in it
-    "axes.titlesize": 9,
+    "axes.titlesize": TITLE,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.titlepad": TITLE_PAD,
@@ -158,6 +156,8 @@ def _drawn(
     figure: Figure, published: Marks | None, chosen: Mapping[str, Look] | None
 ) -> Iterator[Canvas]:
     """A sheet with the figure on it, in the report's style."""
+    import matplotlib as mpl
+
     published, chosen = published or {}, chosen or looks(series_of(figure))
     with canvas(*_size(figure)) as sheet:
         across = _across(figure)
@@ -166,16 +166,13 @@ def _drawn(
         total = sum(len(panel.curves) for panel in figure.panels)
         points = max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
         wide, high = _room(figure)
+        letters, mpl.rcParams["axes.titlesize"] = _title_type(figure, wide)
         sets = []
         for place, (panel, ax) in enumerate(zip(figure.panels, axes, strict=False)):
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
             title = f"({letter(place)}) {panel.title}" if len(figure.panels) > 1 else panel.title
-            letters = max(SHORTEST, int(wide / BOLD_LETTER))
-            small: dict[str, Any] = {}
-            if wide < NARROW:
-                letters, small = NARROW_LETTERS, {"fontsize": 7.0}
-            ax.set_title(fill(title.rstrip(), letters, break_long_words=False), **small)
+            ax.set_title(fill(title.rstrip(), letters, break_long_words=False))
         for place, panel in enumerate(figure.panels):
             if place % across and panel.y.places and panel.y == figure.panels[place - 1].y:
                 axes[place].tick_params(labelleft=False)  # the panel on its left has the names
@@ -354,6 +351,15 @@ def _turned(panel: Panel, wide: float) -> bool:
     """Whether names along x stand upright, since they have no room side by side."""
     long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
     return LETTER * max(map(sum, pairwise(long)), default=0) / 2 > wide / max(len(long), 1)
+
+
+def _title_type(figure: Figure, wide: float) -> tuple[int, float]:
+    """Letters of a line of the panels' titles, and their size (points)."""
+    words = " ".join(panel.title for panel in figure.panels).replace("-", "- ").split()
+    word = max(map(len, words), default=0)
+    if word * BOLD_LETTER <= wide:
+        return max(SHORTEST, int(wide / BOLD_LETTER)), TITLE
+    return max(word, int(wide * TITLE / SMALL_TITLE / BOLD_LETTER)), SMALL_TITLE
 
 
 def _longest(panel: Panel) -> int:
