@@ -41,7 +41,7 @@ from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
 from campaign.report.drawing.math_type import in_svg
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
-from campaign.report.drawing.ticks import set_ticks
+from campaign.report.drawing.ticks import decade_letters, set_ticks
 from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
 from campaign.result import Axis, Figure, Panel
 from campaign.text import pretty_unit
@@ -63,8 +63,8 @@ LOWEST = 1.4
 """Inches of a row; where a page has not room for so many, more panels stand side by side."""
 LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
-LINE = 14.0
-"""... and across it."""
+LINE, GAP = 14.0, 8.0
+"""... and across it; and between a number and the next."""
 SHORTEST, TITLE, SMALL_TITLE = 12, 9.0, 7.0
 """Letters that a line of a title has at least; its points, and those where a word has no room."""
 NAME, AROUND = 0.134, 0.7
@@ -452,7 +452,8 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
     _label_axes(ax, panel, room)
     marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
     draw_marks(marked)  # they may widen what is in view
-    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / NUMBER))
+    number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
+    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
     if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
