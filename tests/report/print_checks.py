@@ -20,7 +20,7 @@ WIDTHS = {"single": 88.0, "double": 180.0}
 """mm."""
 TOUCH = 1.0
 """Points by which boxes of texts may overlap: their letters do not fill them."""
-BETWEEN = 2.0
+BETWEEN = 1.0
 """Points between a number at an axis and the next."""
 SEEN = 0.05
 """Share of the height of a panel that what it shows spans at least."""
