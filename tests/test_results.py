@@ -349,8 +349,23 @@ def test_silx_opens_on_what_nexus_says(run):
     with silx.io.open(str(results_path(run))) as file:
         shown = get_default(file)
         assert shown.is_valid
-        assert shown.group.name == "/results/stabilization/figure_relative_rate_1"
+        assert shown.group.name == "/results/stabilization/figure_position_error_1"
         assert [axis.attrs["units"] for axis in shown.axes] == ["s"]
+
+
+def test_silx_plots_every_trial_figure_and_table(run):
+    pytest.importorskip("silx", reason="silx is not installed")
+    import silx.io
+    from silx.io.nxdata import NXdata
+
+    for path in (run, results_path(run)):
+        with silx.io.open(str(path)) as file:
+            groups: list[object] = []
+            file.visititems(lambda _, each, all_of=groups: all_of.append(each))
+            plots = [NXdata(g) for g in groups if g.attrs.get("NX_class") == "NXdata"]
+            assert plots
+            assert [issue for each in plots for issue in each.issues] == []
+            assert all(each.is_curve for each in plots)
 
 
 def test_results_are_no_run_to_any_command(run):

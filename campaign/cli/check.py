@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from campaign.cli.output import print_json, print_line, print_note, print_table
+from campaign.cli.output import on_a_terminal, print_json, print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import Fact, facts_of
@@ -24,6 +24,7 @@ from campaign.text import number
 from campaign.units import convert
 
 TWO_PI = 2.0 * math.pi
+FINE = "fine"
 HEADINGS = (
     "command",
     "compensation",
@@ -54,7 +55,7 @@ class CheckedLoop:
             return f"no linear loop: {self.why}"
         if not self.margins.stable:
             return "UNSTABLE"
-        return "low margin" if self.margins.low else "fine"
+        return "low margin" if self.margins.low else FINE
 
 
 def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode:
@@ -132,8 +133,12 @@ def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> N
         print_line()
     if not facts:
         return
+    shown = [fact for fact in facts if fact.verdict != FINE] if on_a_terminal() else facts
     headings = ("what against what", "is", "of", "share", "verdict", "what to do")
-    print_table(headings, [_fact_row(fact) for fact in facts], spare=("of", "is", "share"))
+    if shown:
+        print_table(headings, [_fact_row(fact) for fact in shown], spare=("of", "is", "share"))
+    if fine := len(facts) - len(shown):
+        print_line(f"left out: {fine} sizes that are fine; with `| cat` all is shown")
     print_line()
 
 

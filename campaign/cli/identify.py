@@ -18,6 +18,7 @@ from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import error_console, print_line, print_note, print_table
 from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
+from campaign.estimate import Origin
 from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
@@ -179,6 +180,7 @@ def _write_bench(path: Path, text: str) -> None:
 
 
 def _say(found: Identification) -> None:
+    print_line(_verdict(found))
     with axis_terms(found.bench.sides):
         for section in found.sections:
             if section.result is None:
@@ -194,6 +196,19 @@ def _say(found: Identification) -> None:
         advice = next_measurement(found)
         if advice:
             _wrapped(advice)
+
+
+def _verdict(found: Identification) -> str:
+    """`11 parameters identified (presliding 9, ramps 2), 4 not determined`."""
+    parameters = {each.model.name: each.identified.parameters for each in found.sections}
+    open_ones = {
+        name: sum(each.estimate.origin is Origin.NOT_DETERMINED for each in own)
+        for name, own in parameters.items()
+    }
+    counts = {name: len(own) - open_ones[name] for name, own in parameters.items()}
+    by = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    told = f"{sum(counts.values())} parameters identified{f' ({by})' if by else ''}"
+    return f"{told}, {sum(open_ones.values())} not determined"
 
 
 def _tell(section: Section) -> None:

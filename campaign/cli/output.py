@@ -155,9 +155,17 @@ def error_console() -> Console:
     return PlainConsole(sys.stderr)
 
 
-def print_line(text: str = "") -> None:
-    """One line of output; on a terminal it goes on below between words, and no word is broken."""
-    _print_words(console(), Text(_plain(text)))
+def on_a_terminal() -> bool:
+    """Whether a person reads the output."""
+    return console().is_terminal
+
+
+def print_line(text: str = "", hang: int = 0) -> None:
+    """One line of output; on a terminal it goes on below between words, and no word is broken.
+
+    hang: columns by which what goes on below is indented further.
+    """
+    _print_words(console(), Text(_plain(text)), hang)
 
 
 def print_text(text: str) -> None:
@@ -170,15 +178,15 @@ def print_note(text: str, style: str = "") -> None:
     _print_words(error_console(), Text(_plain(text), style=style))
 
 
-def _print_words(out: Console, text: Text) -> None:
+def _print_words(out: Console, text: Text, hang: int = 0) -> None:
     """Line by line; where a terminal is too narrow for one, the rest of it goes below, indented."""
     if out.is_terminal:
-        lines = (_wrapped(line, out.width) for line in text.plain.split("\n"))
+        lines = (_wrapped(line, out.width, hang) for line in text.plain.split("\n"))
         text = Text("\n".join(lines), style=text.style)
     out.print(text, soft_wrap=True)
 
 
-def _wrapped(line: str, width: int) -> str:
+def _wrapped(line: str, width: int, hang: int) -> str:
     if line.startswith(TYPED):
         return line
     text = line.lstrip()
@@ -187,7 +195,7 @@ def _wrapped(line: str, width: int) -> str:
         text,
         width,
         initial_indent=indent,
-        subsequent_indent=indent,
+        subsequent_indent=indent + " " * hang,
         break_long_words=False,
         break_on_hyphens=False,
     )
@@ -205,7 +213,7 @@ def print_table(
 
     On a terminal no word is broken: columns that are `spare` are left out, the first of them first,
     until the others fit, and rows that fit in no way stand one cell below the other. What was left
-    out is named in a line on standard error.
+    out is named in a line below.
     """
     out = console()
     if not out.is_terminal:
@@ -213,39 +221,58 @@ def print_table(
             print_text("\t".join(_plain(" ".join(cell.split())) for cell in row) + "\n")
         return
     columns = [[heading, *cells] for heading, *cells in _columns(headings, rows)]
-    kept = _fitting(out, columns, list(spare))
-    if kept is not None:
-        out.print(_table(kept))
-        there = {column[0] for column in kept}
-        if missing := [heading for heading in headings if heading not in there]:
-            print_note(f"left out: {', '.join(missing)}; with `| cat` all is shown", style="dim")
+    fitting = _fitting(out, columns, list(spare))
+    if fitting is None:
+        for row in list(zip(*columns, strict=True))[1:]:
+            _print_record(out, headings, row)
         return
-    for row in list(zip(*columns, strict=True))[1:]:
-        _print_record(out, headings, row)
+    out.print(fitting)
+    there = {str(column.header) for column in fitting.columns}
+    if missing := [heading for heading in headings if heading not in there]:
+        told = f"left out: {', '.join(missing)}; with `| cat` all is shown"
+        _print_words(out, Text(told, style="dim"))
 
 
 def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
     return zip(*([_plain(cell) for cell in row] for row in (headings, *rows)), strict=True)
 
 
-def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> list[list[str]] | None:
-    """The columns of a table that fits the terminal; None where there is none."""
+def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table | None:
+    """A table that fits the terminal; None where there is none."""
     unlimited = out.options.update(width=1_000_000)
-    while Measurement.get(out, unlimited, _table(columns)).minimum > out.width:
+    while True:
+        widths = [_least(column) for column in columns]
+        left = out.width - Measurement.get(out, unlimited, _table(columns, widths)).minimum
+        if left >= 0:
+            return _table(columns, _shared(columns, widths, left))
         if not spare:
             return None
         without = spare.pop(0)
         columns = [column for column in columns if column[0] != without]
-    return columns
 
 
-def _table(columns: Sequence[Sequence[str]]) -> Table:
-    """Columns, each with its heading first, that wrap between words only."""
+def _least(column: Sequence[str]) -> int:
+    """Width at which no word is broken; short cells and names stay in one line."""
+    whole = all(cell_len(cell) <= ONE_LINE or " " not in cell for cell in column)
+    return max(cell_len(part) for cell in column for part in ([cell] if whole else cell.split()))
+
+
+def _shared(columns: Sequence[Sequence[str]], widths: list[int], left: int) -> list[int]:
+    """The widths, and what is left of a line given to whoever needs it, least need first."""
+    needs = [max(map(cell_len, column)) - at for column, at in zip(columns, widths, strict=True)]
+    wider = list(widths)
+    for place, each in enumerate(order := sorted(range(len(needs)), key=needs.__getitem__)):
+        more = min(needs[each], left // (len(order) - place))
+        wider[each] += more
+        left -= more
+    return wider
+
+
+def _table(columns: Sequence[Sequence[str]], widths: Sequence[int]) -> Table:
+    """Columns of these widths, each with its heading first."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in columns:
-        whole = _in_one_line(column)  # and is not cut: it is as wide as its cells
-        wide = max(map(cell_len, column)) if whole else None
-        table.add_column(column[0], no_wrap=whole, min_width=wide)
+    for column, width in zip(columns, widths, strict=True):
+        table.add_column(column[0], width=width)
     for row in list(zip(*columns, strict=True))[1:]:
         table.add_row(*map(Text, row))
     return table
@@ -257,12 +284,7 @@ def _print_record(out: Console, headings: Sequence[str], row: Sequence[str]) -> 
     wide = max(map(len, headings[1:]), default=0)
     for heading, cell in zip(headings[1:], row[1:], strict=True):
         if cell:
-            _print_words(out, Text(f"  {heading:<{wide}}  {cell}"))
-
-
-def _in_one_line(column: Sequence[str]) -> bool:
-    """Short cells and names stay in one line; other texts may go on below between words."""
-    return all(cell_len(cell) <= ONE_LINE or " " not in cell for cell in column)
+            _print_words(out, Text(f"  {heading:<{wide}}  {cell}"), wide + 2)
 
 
 def _plain(text: str) -> str:

@@ -21,7 +21,7 @@ from campaign.archive.layout.record import plain
 from campaign.archive.layout.signature_file import has_signature, signature_path
 from campaign.archive.reading.damage import Damage
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import print_json, print_line, print_table
+from campaign.cli.output import on_a_terminal, print_json, print_line, print_table
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
 from campaign.recording import Outcome
@@ -50,10 +50,18 @@ def show_archive(
 def _print(run: RunReader, story: Lines) -> None:
     for label, value in _facts(run):
         if value:
-            print_line(f"{label + ':':<13}{value}")
+            print_line(f"{label + ':':<13}{value}", 13)
     print_line()
     headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
-    print_table(headings, _tests(run), spare=("kind",))
+    tests, shown = _tests(run), on_a_terminal()
+    begun = {trial.trial.test for trial in run.trials}
+    if told := [row for row in tests if row[0] in begun or not shown]:
+        none = [
+            each.value for k, each in enumerate(Outcome, 3) if all(row[k] == "0" for row in told)
+        ]
+        print_table(headings, told, spare=(*none, "kind"))
+    if idle := [row[0] for row in tests if row[0] not in begun and shown]:
+        print_line(f"no trial was executed of {', '.join(idle)}")
     failed = [trial for trial in run.trials if trial.ending.outcome is not Outcome.COMPLETED]
     rows = [(t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed]
     _section(("trial", "what", "outcome", "reason"), rows)
@@ -172,11 +180,11 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
     versions = ", ".join(f"{name} {version}" for name, version in header.versions.items())
     return [
         ("run", run.name),
+        ("status", f"{run.status.value}{f': {run.reason}' if run.reason else ''}"),
+        ("safe state", run.safe_state.value),
         ("title", header.title),
         ("archive", str(run.path)),
-        ("status", f"{run.status.value}{f': {run.reason}' if run.reason else ''}"),
         ("signature", _signature(run)),
-        ("safe state", run.safe_state.value),
         ("started", header.created),
         ("ended", run.ended),
         ("protocol", header.protocol_name),

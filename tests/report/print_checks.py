@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ WIDTHS = {"single": 88.0, "double": 180.0}
 """mm."""
 TOUCH = 1.0
 """Points by which boxes of texts may overlap: their letters do not fill them."""
+BETWEEN = 1.0
+"""Points between a number at an axis and the next."""
 SEEN = 0.05
 """Share of the height of a panel that what it shows spans at least."""
 LIGHTER = 15.0
@@ -147,6 +149,23 @@ def _overlaps(sheet: Any) -> Iterator[str]:
                 yield f"{said!r} lies on a curve"
 
 
+def _run_together(ax: Any) -> Iterator[str]:
+    """Numbers along x that are no letter's width apart."""
+    low, high = sorted(ax.get_xlim())
+    shown = [
+        t.label1
+        for t in ax.xaxis.get_major_ticks()
+        if low <= t.get_loc() <= high and t.label1.get_text()
+    ]
+    boxes = sorted(
+        ((each.get_window_extent(), each) for each in shown if not each.get_rotation()),
+        key=lambda pair: pair[0].x0,
+    )
+    for (one, text), (other, following) in pairwise(boxes):
+        if other.x0 - one.x1 < BETWEEN:
+            yield f"{text.get_text()!r} runs into {following.get_text()!r}"
+
+
 def _of_panel(
     panel: Panel, ax: Any, sheet: Any, chosen: Mapping[str, Look], named_series: Set[str]
 ) -> Iterator[str]:
@@ -172,6 +191,7 @@ def _of_panel(
         if not (same or attached or panel.x.places or told_apart(one, other, chosen)):
             yield f"{one.label!r} and {other.label!r} look alike"
     yield from _scale(ax)
+    yield from _run_together(ax)
 
 
 def _scale(ax: Any) -> Iterator[str]:

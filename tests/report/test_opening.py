@@ -23,6 +23,7 @@ from campaign.report.build import build_report, render
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import Opening
+from campaign.report.content.run_problems import without_trials
 from campaign.result import (
     Amount,
     Axis,
@@ -255,6 +256,16 @@ def test_a_test_without_any_trial_says_so(made_up: ModuleType, tmp_path: Path):
     found = opening(made_up, tmp_path, run=run, stabilization=says())
     assert found.answers[0].problem == "none of its trials was executed"
     assert not any("No result" in each for each in found.wrong), "it is not executed, not failed"
+
+
+def test_tests_without_trials_are_told_once_behind_the_cause(made_up: ModuleType, tmp_path: Path):
+    run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
+    run = replace(run, trials=(), status=RunStatus.INTERRUPTED, reason="stopped by SIGTERM")
+    tests = document_of(run, experiments(made_up, stabilization=says())).tests
+    (told,) = without_trials(run, tests)
+    assert told.startswith("The run was interrupted: stopped by SIGTERM. No trial of 1 test was")
+    assert told.endswith(" executed: stabilization.")
+    assert [*without_trials(run, ())] == []
 
 
 def test_a_bench_that_nobody_saw_at_rest_is_told(made_up: ModuleType, tmp_path: Path):

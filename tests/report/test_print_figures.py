@@ -22,6 +22,9 @@ from campaign.result import Axis, Curve, Figure, Finding, Mark, Panel
 from tests.report.print_checks import problems, told_apart
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
+USUAL = ("quickstart", "friction_behaviour")
+LONG = ("compensator_data", "draws", "presliding_multisine", "stick_slip_map", "thesis")
+"""They take minutes; but for two figures of multisines and one map, others draw what they draw."""
 COLUMNS: tuple[Column, ...] = ("single", "double")
 X = np.linspace(0.1, 5.0, 60)
 SINE = Curve(X, np.sin(X), "sine", "measured")
@@ -67,6 +70,16 @@ def test_named_places_fit_and_are_low(column: Column, scale: str) -> None:
     assert problems(of_panel(*dots, x=axis, y=y), column) == []
 
 
+@pytest.mark.parametrize("column", COLUMNS)
+@pytest.mark.parametrize("across", [1, 2, 3])
+def test_large_decades_do_not_run_together(across: int, column: Column) -> None:
+    wide = np.geomspace(60.0, 7e5, 60)
+    curve = Curve(wide, np.sin(X), "sine", "measured")
+    (panel,) = of_panel(curve, x=Axis("Stiffness", "N m/rad", scale="log")).panels
+    panels = [replace(panel, title=str(k)) for k in range(3)]
+    assert problems(Figure("key", "T", "C.", "A.", panels, across=across), column) == []
+
+
 def finding(value: float) -> Finding:
     known = Estimate("torque", value, "N m", low=value - 1.0, high=value + 1.0)
     return Finding.of(known, {})
@@ -85,6 +98,7 @@ def finding(value: float) -> Finding:
         (replace(several(2), panels=2 * several(1).panels), "(b) repeats (a)"),
         (of_panel(replace(SINE, label="t" * 90)), "leaves the sheet"),
         (of_panel(SINE, x=Axis("t", places=((1.0, "a long name"), (1.1, "too near")))), "overlaps"),
+        (of_panel(SINE, x=Axis("t", places=((1.0, "a name"), (1.62, "near")))), "runs into"),
     ],
     ids=lambda each: each if isinstance(each, str) else "",
 )
@@ -141,11 +155,11 @@ def test_panels_one_below_the_other_name_a_common_axis_once() -> None:
 @pytest.mark.parametrize(
     "protocol",
     [
-        "quickstart",
-        "friction_behaviour",
+        *USUAL,
         *(
-            pytest.param(each, marks=pytest.mark.statistics)
-            for each in ("excitation", "linear", "ship_motion")
+            pytest.param(path.stem, marks=pytest.mark.statistics)
+            for path in sorted(PROTOCOLS.glob("*.toml"))
+            if path.stem not in {*USUAL, *LONG}
         ),
     ],
 )

@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from campaign.api.analysis import AnalysedTest
+from campaign.api.analysis import NOT_EXECUTED, AnalysedTest
 from campaign.archive import ArchivedTrial, RunReader, RunStatus
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials
@@ -46,6 +46,14 @@ def wrong_with(
     if without:
         names = ", ".join(without)
         yield f"No result of {len(without)} of {_trials(len(tests), 'test')}: {names}."
+
+
+def without_trials(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
+    """In one line, cause first: how the run ended, and which tests it did not come to."""
+    names = [test.name for test in tests if test.problem == NOT_EXECUTED]
+    if names:
+        told = f"No trial of {_trials(len(names), 'test')} was executed: {', '.join(names)}."
+        yield " ".join((*_end(run), told))
 
 
 def _end(run: RunReader) -> Iterator[str]:

@@ -41,7 +41,7 @@ from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
 from campaign.report.drawing.math_type import in_svg
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
-from campaign.report.drawing.ticks import set_ticks
+from campaign.report.drawing.ticks import decade_letters, set_ticks
 from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
 from campaign.result import Axis, Figure, Panel
 from campaign.text import pretty_unit
@@ -63,8 +63,10 @@ LOWEST = 1.4
 """Inches of a row; where a page has not room for so many, more panels stand side by side."""
 LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
-LINE = 14.0
-"""... and across it."""
+LINE, GAP = 14.0, 8.0
+"""... and across it; and between a number and the next."""
+SHORTEST, TITLE, SMALL_TITLE = 12, 9.0, 7.0
+"""Letters that a line of a title has at least; its points, and those where a word has no room."""
 NAME, AROUND = 0.134, 0.7
 """Inches of a named place along y, and of the title and labels above and below all of them."""
 LOW = 2.0
@@ -75,6 +77,8 @@ FIGURE_POINTS = 40_000
 """Most points of a figure's lines together; many curves share them."""
 TITLE_PAD = 7.0
 """Points between the axes and their title."""
+BESIDE = 0.05
+"""Share of its width that a panel of named places is wider on either side: signs are whole."""
 ROOM = 0.14
 """Share of its height that a panel is higher on either side, for the labels of points in it."""
 
@@ -85,7 +89,7 @@ STYLE: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
     "text.parse_math": False,  # a label is a name, whatever signs are in it
-    "axes.titlesize": 9,
+    "axes.titlesize": TITLE,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.titlepad": TITLE_PAD,
@@ -152,6 +156,8 @@ def _drawn(
     figure: Figure, published: Marks | None, chosen: Mapping[str, Look] | None
 ) -> Iterator[Canvas]:
     """A sheet with the figure on it, in the report's style."""
+    import matplotlib as mpl
+
     published, chosen = published or {}, chosen or looks(series_of(figure))
     with canvas(*_size(figure)) as sheet:
         across = _across(figure)
@@ -160,14 +166,13 @@ def _drawn(
         total = sum(len(panel.curves) for panel in figure.panels)
         points = max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
         wide, high = _room(figure)
+        letters, mpl.rcParams["axes.titlesize"] = _title_type(figure, wide)
         sets = []
         for place, (panel, ax) in enumerate(zip(figure.panels, axes, strict=False)):
             beside = {k: marks for (at, k), marks in published.items() if at == place}
             sets.append(_draw_panel(ax, panel, chosen, points, beside))
             title = f"({letter(place)}) {panel.title}" if len(figure.panels) > 1 else panel.title
-            ax.set_title(
-                fill(title.rstrip(), max(12, int(wide / BOLD_LETTER)), break_long_words=False)
-            )
+            ax.set_title(fill(title.rstrip(), letters, break_long_words=False))
         for place, panel in enumerate(figure.panels):
             if place % across and panel.y.places and panel.y == figure.panels[place - 1].y:
                 axes[place].tick_params(labelleft=False)  # the panel on its left has the names
@@ -336,9 +341,9 @@ def _size(figure: Figure) -> tuple[float, float]:
         width, each = SINGLE, 2.9 if down == 1 else 1.9
     if figure.panels and all(p.x.places and not p.y.places for p in figure.panels):
         each = min(each, LOW)
-    each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
     wide = 72.0 * width / across - 50.0
     each += LETTER / 72 * max((_longest(p) for p in figure.panels if _turned(p, wide)), default=0)
+    each = max(min(each, (TALLEST - 0.35) / max(down, 1)), _lowest(figure))
     return width, 0.35 + each * max(down, 1)
 
 
@@ -346,6 +351,15 @@ def _turned(panel: Panel, wide: float) -> bool:
     """Whether names along x stand upright, since they have no room side by side."""
     long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
     return LETTER * max(map(sum, pairwise(long)), default=0) / 2 > wide / max(len(long), 1)
+
+
+def _title_type(figure: Figure, wide: float) -> tuple[int, float]:
+    """Letters of a line of the panels' titles, and their size (points)."""
+    words = " ".join(panel.title for panel in figure.panels).replace("-", "- ").split()
+    word = max(map(len, words), default=0)
+    if word * BOLD_LETTER <= wide:
+        return max(SHORTEST, int(wide / BOLD_LETTER)), TITLE
+    return max(word, int(wide * TITLE / SMALL_TITLE / BOLD_LETTER)), SMALL_TITLE
 
 
 def _longest(panel: Panel) -> int:
@@ -411,6 +425,8 @@ def _draw_panel(
     if panel.y.scale == "linear":
         spare_rounding_errors(ax, [*drawn, *(end for ends in ends_shown for end in ends)])
     _limit_axes(ax, panel, scale_x, scale_y)
+    if panel.x.places and panel.x.limits is None:
+        ax.margins(x=BESIDE)
     if any(mark.point for mark in panel.marks) and panel.y.limits is None:
         ax.margins(y=ROOM)
     leave_room(ax, np.concatenate([np.empty(0), *bounds]))
@@ -434,13 +450,14 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
     ax, panel = drawn.ax, drawn.panel
     scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
     _label_axes(ax, panel, room)
-    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / NUMBER))
+    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
+    draw_marks(marked)  # they may widen what is in view
+    number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
+    set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
     if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
         ax.set_xticklabels(names, rotation=90)
-    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
-    draw_marks(marked)
     if not any(np.isfinite(y).any() for y in drawn.y[: len(panel.curves)]):
         ax.text(0.5, 0.5, "no data", transform=ax.transAxes, ha="center", color=MUTED.light)
     return marked

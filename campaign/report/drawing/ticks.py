@@ -93,6 +93,12 @@ def logarithmic(low: float, high: float, most: int = MOST_DECADES) -> list[float
     return [float(place) for place in steps if low <= place <= high and place > 0]
 
 
+def decade_letters(ends: tuple[float, float]) -> int:
+    """Letters of the longest number that a logarithmic axis has at a decade."""
+    within = (10.0 ** math.floor(math.log10(end)) for end in ends if 0 < end < math.inf)
+    return max((len(number(each)) for each in within), default=0)
+
+
 def _nines(low: float, high: float) -> list[float]:
     """The unlabelled ticks between: 2 to 9 of each decade, where these are not too many."""
     if not 0 < low < high or math.log10(high / low) > MOST_DECADES:

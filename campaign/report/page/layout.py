@@ -9,7 +9,7 @@ from functools import partial
 from shlex import quote
 from typing import Any
 
-from campaign.api.analysis import AnalysedTest, one_line
+from campaign.api.analysis import NOT_EXECUTED, AnalysedTest, one_line
 from campaign.axis_kind import axis_terms
 from campaign.published.scoreboard import Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
@@ -19,6 +19,7 @@ from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
 from campaign.report.content.published_columns import as_compared, with_published
 from campaign.report.content.references import Compared
+from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawing_files import Drawn
@@ -172,6 +173,7 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
     figures = tuple(_of_incident(figure, folder, command) for figure in happened.figures)
     shown = tuple(_table_of_incident(table, folder) for table in happened.tables)
     problems = (
+        *without_trials(document.run, document.tests),
         *(f"{s.test.name}: {p}" for s in sections for p in _problems(s)),
         *scoreboard.problems,
         *document.references.problems,
@@ -196,7 +198,8 @@ def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "
 
 def _problems(section: Section) -> Iterator[str]:
     """What could not be shown of a test, and the trials that its analysis does without."""
-    yield from (each for each in section.problems if each not in section.left_out)
+    told_before = (*section.left_out, NOT_EXECUTED)
+    yield from (each for each in section.problems if each not in told_before)
     yield from section.test.account
 
 
