@@ -24,7 +24,7 @@ from scipy.stats import binomtest
 from benchmarks.document import table
 from campaign.channels import DRIVE_TORQUE, REFERENCE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimate import Origin
-from campaign.parameter import Identified
+from campaign.parameter import IdentifiedRig
 from campaign.trial import Channel, Recording
 from tests.estimation.blind_rigs import RATE, BlindRig, blind_rigs
 from tests.experiments.asked import asked
@@ -98,17 +98,17 @@ def recorded(rig: BlindRig) -> Any:
     )
 
 
-def by_inverse_dynamics(rig: BlindRig) -> Identified:
+def by_inverse_dynamics(rig: BlindRig) -> IdentifiedRig:
     """As `campaign identify --model inverse_dynamics` does."""
     return asked("inverse_dynamics", [recorded(rig)]).identified
 
 
-def by_whole_model(rig: BlindRig) -> Identified:
+def by_whole_model(rig: BlindRig) -> IdentifiedRig:
     """The model that can be right: Stribeck friction by direction; one start."""
     return asked("whole_model", [recorded(rig)], model=MODEL, starts=1).identified
 
 
-def told(method: Callable[[BlindRig], Identified], rig: BlindRig, number: int) -> list[Told]:
+def told(method: Callable[[BlindRig], IdentifiedRig], rig: BlindRig, number: int) -> list[Told]:
     """Every number of a rig against its truth; nothing where the method refused."""
     try:
         found = method(rig)

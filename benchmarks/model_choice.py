@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Filtering, motion_of_position
-from campaign.experiments.any_motion.motions import Moved
+from campaign.estimation.inverse.motion import FilterSettings, motion_of_position
+from campaign.experiments.any_motion.motions import MotionPiece
 from campaign.experiments.whole_model.whole_model_fit import Whole, find
 from campaign.physics.friction import friction_models
 from campaign.physics.friction_response import Along
@@ -66,10 +66,10 @@ def identified(
     torque = INERTIA * np.gradient(rate, time) + friction
     torque = torque + TORQUE_NOISE * draw.standard_normal(len(time))
     seen = angle + ANGLE_NOISE * draw.standard_normal(len(time))
-    filtering = Filtering.for_rate(RATE)
+    filtering = FilterSettings.for_rate(RATE)
     motion = motion_of_position(time, seen, torque, filtering.low_pass)
     filtering = replace(filtering, slowest=0.005 * float(np.abs(motion.rate).max()))
-    return find([Moved(1, motion, None)], [], filtering, starts=starts, names=names)
+    return find([MotionPiece(1, motion, None)], [], filtering, starts=starts, names=names)
 
 
 def main() -> None:

@@ -53,7 +53,7 @@ class PlugIn:
 
 
 @dataclass(frozen=True)
-class Installed:
+class InstalledPlugins:
     """Every plug-in there is, and a line about each package that could not be read."""
 
     plug_ins: tuple[PlugIn, ...]
@@ -61,7 +61,7 @@ class Installed:
 
 
 @cache
-def installed() -> Installed:
+def installed() -> InstalledPlugins:
     """All packages that this process can import are searched, once."""
     plug_ins: dict[str, tuple[PlugIn, ...]] = {}
     unreadable = []
@@ -82,7 +82,7 @@ def installed() -> Installed:
             where = distribution.locate_file("")
             unreadable.append(f"the package {which} in {where} cannot be read: {one_line(error)}")
     found = (one for several in plug_ins.values() for one in several)
-    return Installed(tuple(found), tuple(dict.fromkeys(unreadable)))
+    return InstalledPlugins(tuple(found), tuple(dict.fromkeys(unreadable)))
 
 
 def packages_of(module: str) -> tuple[str, ...]:

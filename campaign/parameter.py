@@ -73,7 +73,7 @@ class Unseen:
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedRig:
     """What an analysis identifies of a rig, beside its tables, figures and findings.
 
     Attributes:
@@ -100,4 +100,4 @@ class Identified:
         return tuple(each for each in told if each)
 
 
-NOTHING_IDENTIFIED = Identified()
+NOTHING_IDENTIFIED = IdentifiedRig()

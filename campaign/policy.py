@@ -85,7 +85,7 @@ class Policy(Options):
 
 
 @dataclass(frozen=True)
-class Keeping:
+class SampleRetention:
     """Which attempts of a run keep their samples; of the others record and metrics are archived.
 
     Attributes:
@@ -123,4 +123,4 @@ class Keeping:
         return f"the protocol says keep = {self.keep}"
 
 
-KEEP_ALL = Keeping()
+KEEP_ALL = SampleRetention()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import InstanceOf
 
 from campaign.estimate import Estimate, Origin
-from campaign.parameter import NOTHING_IDENTIFIED, Identified
+from campaign.parameter import NOTHING_IDENTIFIED, IdentifiedRig
 from campaign.reason import NONE, Cause, Reason
 
 Array = Annotated[NDArray[np.float64], InstanceOf()]
@@ -369,7 +369,7 @@ class Result:
     conclusions: tuple[Conclusion, ...] = ()
     telling: str = ""
     doubts: tuple[RecordingDoubt, ...] = ()
-    identified: Identified = NOTHING_IDENTIFIED
+    identified: IdentifiedRig = NOTHING_IDENTIFIED
 
     @property
     def is_empty(self) -> bool:

@@ -136,7 +136,7 @@ class Stopwatch:
         self._thread.work, self._thread.now, self._thread.used = work, now, used
 
 
-class Untimed:
+class NullStopwatch:
     """Measures nothing."""
 
     def span(self, work: Work) -> AbstractContextManager[None]:
@@ -155,4 +155,4 @@ class Untimed:
 
 
 _NOTHING = nullcontext()
-UNTIMED = Untimed()
+UNTIMED = NullStopwatch()

@@ -48,7 +48,7 @@ __all__ = [
     "Fault",
     "MemoryRecorder",
     "Most",
-    "Offered",
+    "OfferedRecording",
     "Outcome",
     "PanicStop",
     "Recorder",
@@ -238,7 +238,7 @@ class TrialRequest:
 
 
 @dataclass(frozen=True)
-class Offered:
+class OfferedRecording:
     """A recording from elsewhere, as an experiment is offered it: it may hold several trials.
 
     Attributes:

@@ -229,17 +229,17 @@ def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
     return f"{convert(value, axis_unit(unit), shown):{form}} {shown}"
 
 
-def angle_here(value: float, form: str = ".3g") -> str:
+def angle_text(value: float, form: str = ".3g") -> str:
     """`5 deg`, or `5 mm`, of an angle (rad) or a position (m)."""
     return in_words(value, "rad", "deg", form)
 
 
-def rate_here(value: float, form: str = ".3g") -> str:
+def rate_text(value: float, form: str = ".3g") -> str:
     """`5 deg/s`, or `5 mm/s`, of a rate (rad/s or m/s)."""
     return in_words(value, "rad/s", "deg/s", form)
 
 
-def shown_here(value: float, unit: str, display: str) -> float:
+def display_value(value: float, unit: str, display: str) -> float:
     """A number (SI) in the unit that a reader is shown; see `in_words`."""
     return float(convert(value, axis_unit(unit), axis_unit(display)))
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.pdf import keeps_pdf
 from campaign.report.page.drawings import Drawing, Overview
 
-KEPT: dict[str, Drawn | None] = {}
+KEPT: dict[str, DrawingFiles | None] = {}
 """By all that is drawn."""
 
 
@@ -23,8 +23,8 @@ def keep_drawings(patch: pytest.MonkeyPatch) -> None:
         patch.setattr(kind, "made", _kept(kind.made))
 
 
-def _kept(make: Callable[[Any], Drawn | None]) -> Callable[[object], Drawn | None]:
-    def made(drawable: object) -> Drawn | None:
+def _kept(make: Callable[[Any], DrawingFiles | None]) -> Callable[[object], DrawingFiles | None]:
+    def made(drawable: object) -> DrawingFiles | None:
         if keeps_pdf():  # the sheet is wanted, too
             return make(drawable)
         shown = hashlib.sha256(pickle.dumps(drawable)).hexdigest()

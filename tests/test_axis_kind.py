@@ -47,7 +47,7 @@ from campaign.resources import protocols_folder
 from campaign.result import Amount, Axis, Column, Conclusion, Figure, Panel, Result, Table
 from campaign.trial import Task
 from campaign.unit_grammar import parse_unit
-from campaign.units import ANGLE, OBSERVER_GAIN, POSITION, angle_here, rate_here
+from campaign.units import ANGLE, OBSERVER_GAIN, POSITION, angle_text, rate_text
 from campaign.wire.messages import Channel
 
 LEAD = Sides(AxisKind.LINEAR, AxisKind.ROTARY)
@@ -242,10 +242,10 @@ def test_each_unit_has_one_of_the_same_size_in_SI() -> None:
 
 
 def test_numbers_in_sentences_are_converted_and_not_renamed() -> None:
-    assert rate_here(0.005) == "0.286 deg/s"
+    assert rate_text(0.005) == "0.286 deg/s"
     with axis_terms(LEAD):
-        assert rate_here(0.005) == "5 mm/s"
-        assert angle_here(0.15, ".2g") == "1.5e+02 mm"
+        assert rate_text(0.005) == "5 mm/s"
+        assert angle_text(0.15, ".2g") == "1.5e+02 mm"
         assert axis_unit("N m s/rad") == "N s/m"
         assert axis_unit("Hz") == "Hz"
 

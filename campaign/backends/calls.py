@@ -20,7 +20,7 @@ from campaign.backends.interface import (
     BackendKind,
     StopFlag,
     StoppedByCommand,
-    StoppedOutside,
+    SupportsExternalStop,
 )
 from campaign.entry_points import blamed, one_line, provider
 from campaign.errors import BackendError, CampaignError
@@ -36,7 +36,7 @@ TICK = 0.05
 """s between two looks at the clock."""
 METHODS: Mapping[type, tuple[str, ...]] = {
     Backend: ("__enter__", "__exit__", "refuses", "channels", "execute", "make_safe"),
-    StoppedOutside: ("introduce", "panic_stop", "clear_stop"),
+    SupportsExternalStop: ("introduce", "panic_stop", "clear_stop"),
 }
 _MAIN = threading.main_thread()
 T = TypeVar("T")
@@ -92,7 +92,7 @@ def opened(kind: BackendKind, options: Options) -> Backend:
     """A backend of `kind`. This and all below raise BackendError."""
     backend = _blaming(lambda: kind.open(options), kind.open, "open")
     if kind.stopped_outside:
-        _typed(backend, StoppedOutside, kind.open, "open")  # type: ignore[type-abstract]
+        _typed(backend, SupportsExternalStop, kind.open, "open")  # type: ignore[type-abstract]
     return _typed(backend, Backend, kind.open, "open")  # type: ignore[type-abstract]
 
 
@@ -112,7 +112,7 @@ def make_safe(backend: Backend) -> SafeState:
     return _typed(_within(MAKING_SAFE, backend, "make_safe"), SafeState, backend, "make_safe")
 
 
-def panic_stop(backend: StoppedOutside) -> PanicStop | None:
+def panic_stop(backend: SupportsExternalStop) -> PanicStop | None:
     """The stop from outside that keeps the bench off."""
     stop = _within(LOOKING, backend, "panic_stop")
     if stop is None:

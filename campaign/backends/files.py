@@ -18,7 +18,11 @@ import numpy as np
 from pydantic import Field, JsonValue, field_validator
 
 from campaign.backends.handover import checks
-from campaign.backends.handover.acceptance import Refused, as_asked, not_completed
+from campaign.backends.handover.acceptance import (
+    RefusedRecording,
+    accepted_recording,
+    not_completed,
+)
 from campaign.backends.handover.columns import first_mapping, layout_of, read_layouts
 from campaign.backends.handover.excitation import (
     excitation,
@@ -49,7 +53,7 @@ from campaign.backends.handover.pages import (
 from campaign.backends.handover.returned_recording import (
     ColumnsError,
     OtherRateError,
-    Returned,
+    ReturnedRecording,
     read_returned,
 )
 from campaign.backends.interface import BackendKind, Source, StopFlag
@@ -182,7 +186,7 @@ class FilesBackend:
         except (ProtocolError, MappingError, ColumnsError) as error:
             reason = f"the hand-over: the recording of {attempt.name} is not understood: {error}"
             return Ending(Outcome.INTERRUPTED, reason, telemetry=told)
-        except Refused as refused:
+        except RefusedRecording as refused:
             reason = str(refused.found)
             self._judge(attempt, Verdict(reason, used, read_by))
             if refused.recording is not None:
@@ -270,28 +274,31 @@ class FilesBackend:
 
     # Taking in
 
-    def _taken(self, trial: Trial, files: Sequence[Path], layout: Layout) -> Returned:
-        """The recording, if it is what was asked. Raises Refused, and what reading raises."""
+    def _taken(self, trial: Trial, files: Sequence[Path], layout: Layout) -> ReturnedRecording:
+        """The recording, if it is what was asked.
+
+        Raises RefusedRecording, and what reading raises.
+        """
         wanted = {*trial.requires, *trial.can_use, *(each.channel for each in WATCHED)}
         others = [each for number, each in sorted(self._trials.items()) if number != trial.number]
         accepted = {n for n, column in layout.channels.items() if CLIPPING in column.accept}
         try:
             recording = read_returned(trial, files, layout, wanted)
         except OtherRateError as error:
-            raise Refused(checks.RecordingProblem("another rate", str(error))) from None
+            raise RefusedRecording(checks.RecordingProblem("another rate", str(error))) from None
         except RecordingError as error:
-            raise Refused(checks.RecordingProblem("unreadable", str(error))) from None
+            raise RefusedRecording(checks.RecordingProblem("unreadable", str(error))) from None
         except MappingError as error:
             if error.of_columns and not error.defect:
                 raise
             name = DEFECTS.get(error.defect, error.defect or "no even clock")
-            raise Refused(checks.RecordingProblem(name, str(error))) from None
-        return as_asked(trial, recording, others, accepted)
+            raise RefusedRecording(checks.RecordingProblem(name, str(error))) from None
+        return accepted_recording(trial, recording, others, accepted)
 
     def _check_whose(
         self, trial: Trial, attempt: Attempt, used: Mapping[str, str], read_by: str
     ) -> None:
-        """Raises Refused for files that came back for another attempt.
+        """Raises RefusedRecording for files that came back for another attempt.
 
         What was refused may come once more for its own trial, when the columns were wrong and have
         been corrected: then the rig need not do it again.
@@ -303,18 +310,18 @@ class FilesBackend:
             if came.trial == trial.number and came.columns != read_by:
                 continue
             told = f"{name} is, to the last byte, what came back for {came.attempt}"
-            raise Refused(checks.RecordingProblem("the same file", told))
+            raise RefusedRecording(checks.RecordingProblem("the same file", told))
         said = read_json(attempt.returned / MANIFEST)
         if said is not None and said.get("fingerprint") != trial.fingerprint:
             told = f"the manifest beside it is that of {said.get('name')}"
-            raise Refused(checks.RecordingProblem("another trial", told))
+            raise RefusedRecording(checks.RecordingProblem("another trial", told))
 
     def _judge(self, attempt: Attempt, verdict: Verdict) -> None:
         attempt.judge(verdict)
         self._came |= came_by(attempt, verdict)
 
 
-def _record(recording: Returned, recorder: Recorder, stop: StopFlag) -> bool:
+def _record(recording: ReturnedRecording, recorder: Recorder, stop: StopFlag) -> bool:
     """Whether all of it was recorded: a stop ends it, and the recording is there for a resume."""
     recorder.start(recording.channels)
     for remark in recording.remarks:

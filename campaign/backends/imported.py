@@ -13,7 +13,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from campaign.backends.interface import BackendKind, Source, StopFlag
-from campaign.importing.description import Described
+from campaign.importing.description import RecordingDescription
 from campaign.importing.interface import RecordingError
 from campaign.importing.open_files import OpenedFiles
 from campaign.importing.reader import RecordingReader, paths_unchanged
@@ -72,7 +72,7 @@ class ImportBackend:
         """Nothing here moves."""
         return SafeState.CONFIRMED
 
-    def _opened(self, described: Described) -> OpenedFiles:
+    def _opened(self, described: RecordingDescription) -> OpenedFiles:
         key = (described.files, described.table, described.channels, described.clock)
         if getattr(self._kept, "key", None) != key:
             opened = OpenedFiles(paths_unchanged(described))
@@ -82,8 +82,8 @@ class ImportBackend:
         return opened_files
 
 
-def _described(trial: Trial) -> Described:
-    return Described.model_validate(trial.recording, context={"si": True})
+def _described(trial: Trial) -> RecordingDescription:
+    return RecordingDescription.model_validate(trial.recording, context={"si": True})
 
 
 def _stretches(lost: np.ndarray) -> list[tuple[int, int]]:

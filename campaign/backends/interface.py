@@ -69,7 +69,7 @@ class Backend(Protocol):
 
 
 @runtime_checkable
-class Introduced(Protocol):
+class SupportsHolder(Protocol):
     """What a backend does besides when others ask whose bench it is."""
 
     def introduce(self, run: str) -> None:
@@ -77,7 +77,7 @@ class Introduced(Protocol):
 
 
 @runtime_checkable
-class StoppedOutside(Introduced, Protocol):
+class SupportsExternalStop(SupportsHolder, Protocol):
     """What a backend does besides when others can switch its bench off: see `PanicStop`."""
 
     def panic_stop(self) -> PanicStop | None:
@@ -162,7 +162,7 @@ class SimulatesTruth(Protocol):
 
 
 @runtime_checkable
-class Timed(Protocol):
+class SupportsTiming(Protocol):
     """What a backend has besides when it can tell what it spends its time on."""
 
     timing: Timing
@@ -192,7 +192,8 @@ class BackendKind:
         by_hand: whether a person executes the trials, and nothing here moves anything: operator
             steps and pauses are a person's as with a live one, but nobody counts how long nothing
             is heard.
-        stopped_outside: whether others can switch its bench off: it is a `StoppedOutside`, too.
+        stopped_outside: whether others can switch its bench off: then it is a
+            `SupportsExternalStop`.
         several: whether several trials may be executed at a time (`--workers`).
         needs: what it needs of a bench, as dotted paths (`motor.resistance`); a protocol with a
             bench that lacks some is refused, with all of them named.

@@ -59,7 +59,7 @@ Why = tuple[End, str]
 PLAYED: Why = (End.PLAYED, "")
 
 
-class Halted(Exception):  # noqa: N818 - no error: somebody stopped it
+class Halt(Exception):  # noqa: N818 - no error: somebody stopped it
     """Nothing that enables the drive may be sent any more."""
 
 
@@ -241,7 +241,7 @@ class Relay:
         try:
             self._enable(job)
             why = self._run(job, seen)
-        except Halted:
+        except Halt:
             why = self._halted or why
         except DriveError as error:
             why = self._halted or (End.SILENT if error.silent else End.DRIVE, str(error))
@@ -273,7 +273,7 @@ class Relay:
             with self._commanding:
                 self._halt_if_latched()
                 if self._halted:
-                    raise Halted
+                    raise Halt
                 drive.command(ENABLING[state])
             word, last = od.STATUSWORD, state
             self._until(lambda: state_of(drive.read(word)) is not last, "state")  # noqa: B023
@@ -282,7 +282,7 @@ class Relay:
         deadline = time.monotonic() + ENABLE
         while not condition():
             if self._halted:
-                raise Halted
+                raise Halt
             if time.monotonic() > deadline:
                 raise DriveError(f"no other {what} within {ENABLE:g} s")
             time.sleep(0.002)
@@ -296,7 +296,7 @@ class Relay:
             time.sleep(max(0.0, due - time.monotonic()))
             with self._commanding:
                 if self._halted:
-                    raise Halted
+                    raise Halt
                 drive.send(cob + drive.address.node, target.pack(value))
                 single = drive.sync(number % od.COUNTED + 1 if job["counted"] else None)
             late = time.monotonic() - due
@@ -305,7 +305,7 @@ class Relay:
                 if time.monotonic() > due + period + patience or self._halted:
                     break
             if self._halted:
-                raise Halted
+                raise Halt
             if sample is None or not single:
                 self._tell({"id": job["id"], "lost": number})
                 return End.LOST, "an answer to SYNC is " + ("missing" if single else "doubled")

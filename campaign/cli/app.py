@@ -52,7 +52,7 @@ GROUPS = {
 """Commands as the help lists them, by heading."""
 
 
-class Grouped(TyperGroup):
+class GroupedCommands(TyperGroup):
     """Lists commands by heading; one without a heading comes last."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -66,7 +66,7 @@ class Grouped(TyperGroup):
 
 app = typer.Typer(
     name="campaign",
-    cls=Grouped,
+    cls=GroupedCommands,
     help="Friction experiments on stabilized servo platforms: run, archive, identify, report.",
     epilog="Exit codes: 0 done, 1 some trials failed, 2 bad usage or protocol, 3 a limit or a "
     "backend fault, 4 a damaged archive, 5 safe state NOT confirmed, 6 no result, "
@@ -172,7 +172,7 @@ def run(
 
     stopwatch = Stopwatch() if profile else None
     with (stopwatch or UNTIMED).span(Work.IMPORTING):
-        from campaign.cli.cluster import Where
+        from campaign.cli.cluster import ExecutorChoice
         from campaign.cli.prepare import Request, short_settings
         from campaign.cli.run import Remarks, run_protocol
         from campaign.cli.step_check import SETTING
@@ -186,7 +186,7 @@ def run(
             request,
             results,
             workers=workers,
-            where=Where(executor, tls),
+            where=ExecutorChoice(executor, tls),
             report=report,
             yes=yes,
             clear_stop=clear_stop,
@@ -220,7 +220,7 @@ def resume(
     watch: WatchOption = False,
 ) -> None:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
-    from campaign.cli.cluster import Where
+    from campaign.cli.cluster import ExecutorChoice
     from campaign.cli.resume import resume_run
 
     raise typer.Exit(
@@ -229,7 +229,7 @@ def resume(
             results,
             accept_changes=accept_changes,
             workers=workers,
-            where=Where(executor, tls),
+            where=ExecutorChoice(executor, tls),
             report=report,
             port=port,
             yes=yes,

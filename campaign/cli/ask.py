@@ -48,7 +48,7 @@ def allow_motion(
     """
     if not kind.live or not trials:
         return
-    if not yes and not somebody_is_there():
+    if not yes and not has_terminal():
         raise UsageError(
             f"the backend {kind.name!r} moves a real bench, and there is no terminal to ask "
             "whether it may; --yes says so"
@@ -104,7 +104,7 @@ def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance
         return UNATTENDED
     if yes:
         return Attendance(AssumingOperator(), wait_unless)
-    if kind.by_hand and not somebody_is_there():
+    if kind.by_hand and not has_terminal():
         return Attendance(ReadingOperator(), wait_unless)
     return Attendance(ConsoleOperator(display.hidden), wait_unless)
 
@@ -158,6 +158,6 @@ def read_line(stop: Callable[[], bool]) -> str | None:
     return None
 
 
-def somebody_is_there() -> bool:
+def has_terminal() -> bool:
     """Whether there is a terminal to ask."""
     return sys.stdin is not None and sys.stdin.isatty()

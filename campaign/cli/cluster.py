@@ -16,7 +16,7 @@ from campaign.trial import Trial
 
 
 @dataclass(frozen=True)
-class Where:
+class ExecutorChoice:
     """Where trials are executed, as typed.
 
     Attributes:
@@ -60,4 +60,4 @@ class Where:
             yield found.threads, found.executor
 
 
-HERE = Where()
+HERE = ExecutorChoice()

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from campaign import __version__
 from campaign.cli.check import CheckedLoop, loops_checked
 from campaign.cli.output import print_line, print_note
-from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets import targets
 from campaign.errors import UsageError
 from campaign.physics.bench_knowledge import KnownValue
@@ -30,7 +30,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     known = targets()
     if target not in known:
         raise UsageError(f"--to {target}: there are {', '.join(known)}")
-    made = Sampled.of(simulable(bench), name)
+    made = SampledCompensation.of(simulable(bench), name)
     head = list(_head(bench, made))
     texts = known[target].write(made, head, trial_inputs(made))
     try:
@@ -49,7 +49,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     return [output / file for file in texts]
 
 
-def _head(bench: str, made: Sampled) -> Iterator[str]:
+def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
     """Where each number comes from, and what the loop is worth with it."""
     source = bench_source(bench)
     its = made.bench

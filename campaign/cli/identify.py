@@ -22,9 +22,9 @@ from campaign.estimate import Origin
 from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
 from campaign.identify.identification import Identification, Section, identify
-from campaign.identify.material import Chosen, choose
+from campaign.identify.material import ChosenRun, choose
 from campaign.identify.page import PAGE, next_measurement, write_identification
-from campaign.identify.tables import changes_table, told
+from campaign.identify.tables import changes_table, parameter_text
 from campaign.interrupts import unwinding
 from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
@@ -107,7 +107,7 @@ def identify_run(
     return made, worst_exit_code([*map(_say_damaged, sides)])
 
 
-def _say_damaged(chosen: Chosen) -> ExitCode:
+def _say_damaged(chosen: ChosenRun) -> ExitCode:
     return say_damaged(chosen.run.path, chosen.run.damaged)
 
 
@@ -150,7 +150,7 @@ def _named(run: str) -> str:
     return Path(run).name
 
 
-def _beside(chosen: Chosen) -> Path:
+def _beside(chosen: ChosenRun) -> Path:
     test = f"-{chosen.test}" if chosen.test else ""
     return chosen.run.path.with_name(f"{chosen.run.path.stem}{test}-identification")
 
@@ -218,7 +218,7 @@ def _tell(section: Section) -> None:
     rows = [
         (
             words(each.estimate.name),
-            told(each.estimate, each.display),
+            parameter_text(each.estimate, each.display),
             pretty_unit(each.display or each.estimate.unit),
             each.bench,
         )

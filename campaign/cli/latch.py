@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 
 from campaign.backends import calls
-from campaign.backends.interface import Backend, StoppedOutside
-from campaign.cli.ask import read_line, somebody_is_there
+from campaign.backends.interface import Backend, SupportsExternalStop
+from campaign.cli.ask import has_terminal, read_line
 from campaign.cli.output import print_note
 from campaign.errors import BackendError, CampaignError, ExitCode
 from campaign.execution.display import clock
@@ -33,21 +33,21 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
 
     Raises StillStoppedError when it stays off, with what to do.
     """
-    if not isinstance(backend, StoppedOutside):
+    if not isinstance(backend, SupportsExternalStop):
         return ""
     found = calls.panic_stop(backend)
     if found is None:
         if seen is not None:
             print_note(f"--clear-stop {seen}: the bench is not stopped")
         return ""
-    print_note(f"PANIC STOP: {told(found)}", "bold red")
+    print_note(f"PANIC STOP: {latch_text(found)}", "bold red")
     how = "at the terminal" if seen is None else f"by --clear-stop {seen}"
     if seen is None:
         _ask(found, stop)
         seen = found.count
     if seen != found.count:
         raise StillStoppedError(
-            f"--clear-stop {seen}: that is not the latest stop; the bench was {told(found)}; "
+            f"--clear-stop {seen}: that is not the latest stop; the bench was {latch_text(found)}; "
             "nothing was moved"
         )
     try:
@@ -55,19 +55,20 @@ def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> 
     except BackendError as error:  # another stop has come meanwhile, say
         raise StillStoppedError(f"{error}; nothing was moved") from None
     print_note(f"stop {seen} is cleared; the bench may move")
-    return f"{told(found)}, was cleared {how}"
+    return f"{latch_text(found)}, was cleared {how}"
 
 
-def told(stop: PanicStop) -> str:
+def latch_text(stop: PanicStop) -> str:
     """When, by whom, and the count that clears it."""
     when = "at a time that is not known" if stop.age is None else f"{clock(stop.age)} ago"
     return f"stopped by {stop.by}, {when} (stop {stop.count})"
 
 
 def _ask(found: PanicStop, stop: Callable[[], bool]) -> None:
-    if not somebody_is_there():
+    if not has_terminal():
         raise StillStoppedError(
-            f"the bench was {told(found)}, and there is no terminal to ask whether it may move; "
+            f"the bench was {latch_text(found)}, and there is no terminal to ask whether it may "
+            "move; "
             f"who has seen why it was stopped adds --clear-stop {found.count}; nothing was moved"
         )
     print_note("It stays off until that is cleared. Look at the bench first.")

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from typer.core import TyperCommand
 
 from campaign.cli.bench_commands import app  # with all commands
-from campaign.cli.output import others_print_aside, paged, plain_streams, print_note
+from campaign.cli.output import paged, plain_streams, print_note, redirect_prints
 from campaign.entry_points import blamed, one_line
 from campaign.errors import (
     DEBUG,
@@ -32,7 +32,7 @@ class QuietCommand(TyperCommand):
     """A command whose standard output is for what it prints itself, and for no plug-in."""
 
     def invoke(self, ctx: Any) -> Any:
-        with self._paging(ctx), others_print_aside():
+        with self._paging(ctx), redirect_prints():
             return super().invoke(ctx)
 
     def _paging(self, ctx: Any) -> AbstractContextManager[None]:

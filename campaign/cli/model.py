@@ -53,7 +53,7 @@ class MotionOptions(Options):
 
 
 @dataclass(frozen=True)
-class Met:
+class ModelCycle:
     """What a model makes of the last cycle; SI, shape (PER_CYCLE,) each.
 
     Attributes:
@@ -142,7 +142,7 @@ def _chosen(
             raise UsageError(f"--set {key}: none of these models has it: {', '.join(names)}")
 
 
-def _met(model: AnyModel, options: Any, motion: MotionOptions) -> Met:
+def _met(model: AnyModel, options: Any, motion: MotionOptions) -> ModelCycle:
     """With a step that is halved until that changes little."""
     per_cycle, coarse = PER_CYCLE, _cycle(model, options, motion, PER_CYCLE)
     while True:
@@ -150,7 +150,7 @@ def _met(model: AnyModel, options: Any, motion: MotionOptions) -> Met:
         fine = _cycle(model, options, motion, per_cycle)
         change = float(np.max(np.abs(fine - coarse)) / max(np.max(np.abs(fine)), 1e-300))
         if change <= ACCURACY or per_cycle >= FINEST:
-            return Met(model, options, fine, change)
+            return ModelCycle(model, options, fine, change)
         coarse = fine
 
 
@@ -175,7 +175,7 @@ def _motion(
     return time, motion.rate * np.sin(turned * time), angle
 
 
-def _figure(met: Sequence[Met], motion: MotionOptions) -> Figure:
+def _figure(met: Sequence[ModelCycle], motion: MotionOptions) -> Figure:
     time, rate, angle = _motion(motion)
     torque = Axis("Friction torque", "N m", "N m")
     steady = np.linspace(-motion.rate, motion.rate, 401)
@@ -217,7 +217,7 @@ def _figure(met: Sequence[Met], motion: MotionOptions) -> Figure:
     )
 
 
-def _csv(met: Sequence[Met], motion: MotionOptions) -> str:
+def _csv(met: Sequence[ModelCycle], motion: MotionOptions) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(["time_s", "rate_rad_per_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])

@@ -86,7 +86,7 @@ def plain_streams() -> Iterator[None]:
 
 
 @contextmanager
-def others_print_aside() -> Iterator[None]:
+def redirect_prints() -> Iterator[None]:
     """Inside the block `print` goes to standard error, and standard output is for this module."""
     global _ours
     before, _ours = _ours, sys.stdout

@@ -14,7 +14,7 @@ from campaign.cli.chosen_options import chosen_lines
 from campaign.cli.cost import Cost, cost_lines, costs
 from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
-from campaign.cli.prepare import Prepared, Request, lacking, prepare
+from campaign.cli.prepare import PreparedRun, Request, lacking, prepare
 from campaign.errors import ExitCode
 from campaign.execution.display import clock
 from campaign.experiments import experiments
@@ -76,7 +76,7 @@ def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, st
 
 
 def _print(
-    prepared: Prepared,
+    prepared: PreparedRun,
     results: Path,
     losses: Sequence[Mapping[str, str]],
     cost: Mapping[str, Cost],

@@ -51,7 +51,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedRun:
     """A plan and the backend that is to execute it, not yet connected."""
 
     path: Path
@@ -64,7 +64,7 @@ class Prepared:
         return open_backend(self.kind, self.options, self.plan.trials, self.plan.truths)
 
 
-def prepare(request: Request) -> Prepared:
+def prepare(request: Request) -> PreparedRun:
     """Load, validate and expand. Raises ProtocolError or UsageError."""
     path = find_protocol(request.protocol)
     kind = find_backend(request.backend)
@@ -86,7 +86,7 @@ def prepare(request: Request) -> Prepared:
             protocol, only=request.only, allow_large=request.allow_large, seed=request.seed
         )
     _check_keep(plan, kind)
-    return Prepared(path, plan, kind, options)
+    return PreparedRun(path, plan, kind, options)
 
 
 def _check_keep(plan: Plan, kind: BackendKind) -> None:
@@ -221,9 +221,9 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         for name in names
     )
     if kind.name == IMPORT:
-        from campaign.importing.description import Described
+        from campaign.importing.description import RecordingDescription
 
-        described = Described.model_validate(trial.recording, context={"si": True})
+        described = RecordingDescription.model_validate(trial.recording, context={"si": True})
         there = ", ".join(each.name for each in described.channels)
         tables = ", ".join(f"[columns.NAME.{name}]" for name in names)
         return (

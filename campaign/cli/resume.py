@@ -13,7 +13,7 @@ from campaign.archive.layout.journal import utc_now
 from campaign.archive.layout.signature_file import has_signature
 from campaign.backends.interface import BackendKind
 from campaign.cli.ask import allow_motion, say_by_hand
-from campaign.cli.cluster import HERE, Where
+from campaign.cli.cluster import HERE, ExecutorChoice
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
@@ -73,7 +73,7 @@ def resume_run(
     yes: bool,
     clear_stop: int | None = None,
     sign: Path | None = None,
-    where: Where = HERE,
+    where: ExecutorChoice = HERE,
     watch: bool = False,
 ) -> ExitCode:
     """Execute what is left of a run; the archive's path is the last line of standard output.

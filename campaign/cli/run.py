@@ -9,10 +9,10 @@ from pathlib import Path
 from campaign.archive import RunHeader, RunWriter, reserved_name
 from campaign.archive.layout.header import PARTIAL, Truth
 from campaign.cli.ask import allow_motion, say_by_hand
-from campaign.cli.cluster import HERE, Where
+from campaign.cli.cluster import HERE, ExecutorChoice
 from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
-from campaign.cli.prepare import Prepared, Request, find_backend, prepare
+from campaign.cli.prepare import PreparedRun, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
 from campaign.cli.session import Session, conduct
 from campaign.cli.sign import rehearse_signing
@@ -50,7 +50,7 @@ def run_protocol(
     clear_stop: int | None = None,
     remarks: Remarks | None = None,
     sign: Path | None = None,
-    where: Where = HERE,
+    where: ExecutorChoice = HERE,
     stopwatch: Stopwatch | None = None,
     watch: bool = False,
 ) -> ExitCode:
@@ -113,7 +113,7 @@ def run_protocol(
 
 
 def run_header(
-    prepared: Prepared, request: Request, name: str, began: datetime, remarks: Remarks
+    prepared: PreparedRun, request: Request, name: str, began: datetime, remarks: Remarks
 ) -> RunHeader:
     """Everything the archive keeps about the run before its first trial."""
     plan = prepared.plan

@@ -17,8 +17,8 @@ from campaign.backends import calls
 from campaign.backends.interface import (
     Backend,
     BackendKind,
-    Introduced,
-    Timed,
+    SupportsHolder,
+    SupportsTiming,
 )
 from campaign.cli.ask import attendance_of
 from campaign.cli.damage import archive_of, note_damaged, say_damaged
@@ -50,7 +50,7 @@ from campaign.execution.safety import (
 from campaign.execution.stages import Stages, refusal_of
 from campaign.execution.stop import NOTHING_BEGUN, GuardianPipes, StopSwitch
 from campaign.execution.supervision import Supervision
-from campaign.execution.trial_metrics import Measuring
+from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.execution.watch_display import WatchDisplay
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
@@ -152,9 +152,9 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     source = session.source
     read = say_damaged(source.path, source.damaged) if source else ExitCode.DONE
     here = Path.cwd()
-    if isinstance(session.backend, Introduced):
+    if isinstance(session.backend, SupportsHolder):
         calls.called(session.backend, "introduce", session.folder.stem)
-    if isinstance(session.backend, Timed):
+    if isinstance(session.backend, SupportsTiming):
         session.backend.timing = session.timing
     try:
         # Signals first: from the moment that the bench is connected, a stop has to be orderly.
@@ -217,7 +217,7 @@ def _saying_what_is_kept(folder: Path) -> Iterator[None]:
 
 
 def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSwitch) -> RunOutcome:
-    measuring = Measuring(experiments(), session.timing)
+    measuring = TrialMeasurement(experiments(), session.timing)
     executor, left = session.executor, sum(1 for _ in session.left)
     here = executor is None and not session.watch
     if here and in_processes(session.kind, session.workers, left):

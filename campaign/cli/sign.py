@@ -16,7 +16,7 @@ from campaign.archive.layout.signature_file import (
     write_signature,
 )
 from campaign.archive.writing.run_lock import RunLock
-from campaign.cli.ask import somebody_is_there
+from campaign.cli.ask import has_terminal
 from campaign.cli.output import print_line, print_note
 from campaign.errors import ArchiveError, CampaignError, ExitCode, UsageError
 from campaign.execution.run_reference import reference
@@ -58,7 +58,7 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
 
 def rehearse_signing(key: Path) -> None:
     """Sign a test text, so that a key that cannot sign costs no bench time. Raises UsageError."""
-    made = signing.sign_test_text(key, ask=somebody_is_there())
+    made = signing.sign_test_text(key, ask=has_terminal())
     if made.asked:
         print_note(
             "the passphrase is asked for again when the run is sealed; with an agent "
@@ -117,7 +117,7 @@ def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
     """The new signature is made before an old one is touched."""
     from campaign.archive.verification.statement import run_statement
 
-    made = signing.sign(run_statement(sealed), key, ask=somebody_is_there())
+    made = signing.sign(run_statement(sealed), key, ask=has_terminal())
     _check_free(sealed, replace=replace)
     try:
         old = set_aside_signature(sealed, "replaced")

@@ -15,7 +15,7 @@ RECOMPUTED = "anyone who changes a run can compute its checksums anew; only a si
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExpectedSigner:
     """Whose signature a run must have."""
 
     signer: str
@@ -23,7 +23,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Checked:
+class SignatureCheck:
     """What was found out about the signature of one run.
 
     Attributes:
@@ -39,7 +39,7 @@ class Checked:
     key: str = ""
 
 
-def wanted_signature(signer: str | None, allowed: Path | None) -> Wanted | None:
+def wanted_signature(signer: str | None, allowed: Path | None) -> ExpectedSigner | None:
     """What the two options of `verify` mean. Raises UsageError when they cannot be used."""
     if signer is None and allowed is None:
         return None
@@ -49,31 +49,33 @@ def wanted_signature(signer: str | None, allowed: Path | None) -> Wanted | None:
             "file that says which keys are theirs"
         )
     signing.check_tool()
-    return Wanted(signer, signing.AllowedSigners.read(allowed))
+    return ExpectedSigner(signer, signing.AllowedSigners.read(allowed))
 
 
-def check_signature(run: Path, wanted: Wanted | None) -> Checked:
+def check_signature(run: Path, wanted: ExpectedSigner | None) -> SignatureCheck:
     """Whether the run has the signature that is wanted. Raises UsageError when nobody can tell."""
     file = signature_path(run).name if run.is_file() and has_signature(run) else ""
     if wanted is None:
         return _unchecked(run, file)
     if not run.is_file():
-        return Checked("", False, f"{run}: is not signed: only a sealed run can be")
+        return SignatureCheck("", False, f"{run}: is not signed: only a sealed run can be")
     try:
         signature = read_signature(run)
         key = signing.verify(run_statement(run), signature, wanted.signer, wanted.allowed)
     except signing.SignatureError as error:
-        return Checked(file, False, f"{run.with_name(file)}: {error}")
+        return SignatureCheck(file, False, f"{run.with_name(file)}: {error}")
     except ArchiveError as error:
-        return Checked(file, False, str(error))
+        return SignatureCheck(file, False, str(error))
     text = f"{run}: signed by {wanted.signer} with the key {key}; that {WHAT_IT_PROVES}"
-    return Checked(file, True, text, key)
+    return SignatureCheck(file, True, text, key)
 
 
-def _unchecked(run: Path, file: str) -> Checked:
+def _unchecked(run: Path, file: str) -> SignatureCheck:
     if not run.is_file():
-        return Checked("", None, "")
+        return SignatureCheck("", None, "")
     if file:
         hint = "--signer NAME --allowed-signers FILE say by whom"
-        return Checked(file, None, f"{run}: note: {file} was not checked ({hint}); {RECOMPUTED}")
-    return Checked("", None, f"{run}: note: not signed; {RECOMPUTED}")
+        return SignatureCheck(
+            file, None, f"{run}: note: {file} was not checked ({hint}); {RECOMPUTED}"
+        )
+    return SignatureCheck("", None, f"{run}: note: not signed; {RECOMPUTED}")

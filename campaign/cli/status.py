@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from campaign.cli.latch import told
+from campaign.cli.latch import latch_text
 from campaign.cli.output import print_json, print_line
 from campaign.errors import BackendError, ExitCode
 from campaign.execution.display import clock
@@ -96,7 +96,7 @@ def _show(answers: Answers, *, as_json: bool) -> None:
     drive, rest = ("on" if status.drive_on else "off"), ("at rest" if status.at_rest else "moving")
     print_line(f"state:  {status.state.text}, drive {drive}, {rest}")
     print_line(f"held:   {_held(holder, host)}")
-    print_line(f"latch:  {'not stopped' if stop is None else told(stop)}")
+    print_line(f"latch:  {'not stopped' if stop is None else latch_text(stop)}")
 
 
 def _held(holder: Holder, host: str) -> str:

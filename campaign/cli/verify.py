@@ -13,12 +13,12 @@ from campaign.archive.reading.results_file import holds_results, read_any_result
 from campaign.archive.verification.result import Verification
 from campaign.archive.verification.verify_run import verify_run
 from campaign.cli.output import error_console, print_json, print_line, print_note
-from campaign.cli.signature import Checked, Wanted, check_signature
+from campaign.cli.signature import ExpectedSigner, SignatureCheck, check_signature
 from campaign.errors import ArchiveError, ExitCode
 
 
 def verify_archives(
-    names: Sequence[str], results: Path, *, as_json: bool, wanted: Wanted | None = None
+    names: Sequence[str], results: Path, *, as_json: bool, wanted: ExpectedSigner | None = None
 ) -> ExitCode:
     """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them.
 
@@ -61,7 +61,7 @@ def _print_problems(found: Verification) -> None:
         print_line(f"{found.path}: {in_words(damage)}")
 
 
-def _print(found: Verification, signature: Checked) -> None:
+def _print(found: Verification, signature: SignatureCheck) -> None:
     """One line per problem on standard output; one when there is none; one for a signature."""
     _print_problems(found)
     if found.sound:
@@ -77,7 +77,7 @@ def _print(found: Verification, signature: Checked) -> None:
         print_note(signature.text)
 
 
-def _tree(found: Verification, signature: Checked) -> dict[str, object]:
+def _tree(found: Verification, signature: SignatureCheck) -> dict[str, object]:
     return {
         "path": str(found.path),
         "sound": found.sound,

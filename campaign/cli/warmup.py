@@ -12,12 +12,12 @@ def warm_up() -> ExitCode:
     """Make all machine code that the shipped benches need; say what, how long, and where it is."""
     from campaign.execution.first_start import Helpers, make_all
     from campaign.physics.compilation import distrusted
-    from campaign.physics.machine_code import WIDTHS, Made, folder, is_made
+    from campaign.physics.machine_code import WIDTHS, CompiledPart, folder, is_made
 
-    compiled: list[Made] = []
+    compiled: list[CompiledPart] = []
     kept = 0
 
-    def tell(made: Made) -> None:
+    def tell(made: CompiledPart) -> None:
         nonlocal kept
         if made.compiled:
             compiled.append(made)

@@ -13,11 +13,11 @@ from campaign.comparison.quantity_words import display_unit
 from campaign.comparison.same_quantity import PairedTest
 from campaign.estimate import Origin
 from campaign.estimation.difference import BOUNDS
-from campaign.references.verdict import Judged
+from campaign.references.verdict import JudgedNumber
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pair(Judged):
+class Pair(JudgedNumber):
     """A finding of the reference beside the same of another run.
 
     Attributes:

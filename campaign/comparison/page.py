@@ -28,14 +28,14 @@ from campaign.estimation.family import RATE
 from campaign.references.verdict import Verdict
 from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import draw
 from campaign.report.formats.interface import Format
-from campaign.report.page.article import Article, Part, damage_told, problems_part
-from campaign.report.page.article_page import Making
+from campaign.report.page.article import Article, Part, damage_text, problems_part
+from campaign.report.page.article_page import PageParts
 from campaign.report.page.changes import changes_figure
 from campaign.report.page.folder import Folder, ShownFigure
-from campaign.report.page.pieces import Files, Folded, Items, Paragraph, Piece
+from campaign.report.page.pieces import Files, FoldedSection, Items, Paragraph, Piece
 from campaign.result import Figure
 
 NAME = "comparison"
@@ -59,7 +59,7 @@ def write_comparison(
 
 def article_of(comparison: Comparison) -> Article:
     """What the comparison says."""
-    making = Making()
+    making = PageParts()
     making.problems += [problem for side in comparison.sides for problem in side.problems]
     several = len(comparison.against) > 1
     parts = [
@@ -67,7 +67,7 @@ def article_of(comparison: Comparison) -> Article:
         for each in comparison.against
         for part in _against(each, comparison, making, several=several)
     ]
-    told = [damage_told(each.letter, each.damaged) for each in comparison.sides if each.damaged]
+    told = [damage_text(each.letter, each.damaged) for each in comparison.sides if each.damaged]
     others = "; each of the others is compared with it" if several else ""
     return Article(
         name=NAME,
@@ -119,7 +119,7 @@ def _how(comparison: Comparison) -> Iterator[str]:
 
 
 def _against(
-    against: Against, comparison: Comparison, making: Making, *, several: bool
+    against: Against, comparison: Comparison, making: PageParts, *, several: bool
 ) -> Iterator[Part]:
     letters = Letters(against.reference.letter, against.other.letter)
     both = (letters.reference, letters.other)
@@ -169,7 +169,7 @@ def _headlines(against: Against) -> Iterator[Piece]:
         yield Items(tuple(map(headline, bare)))
 
 
-def _tests(against: Against, letters: Letters, prefix: str, making: Making) -> Iterator[Part]:
+def _tests(against: Against, letters: Letters, prefix: str, making: PageParts) -> Iterator[Part]:
     for place, tested in enumerate(against.pairing.tests, start=1):
         pairs = [pair for pair in against.pairs if pair.test is tested.reference]
         if not pairs:
@@ -187,7 +187,7 @@ def _test(
     against: Against,
     letters: Letters,
     prefix: str,
-    making: Making,
+    making: PageParts,
 ) -> Iterator[Piece]:
     name, folder = f"{prefix}{tested.reference.name}", making.folder
     order = list(Verdict)
@@ -202,7 +202,7 @@ def _test(
     if table.rows:
         why = Items(tuple(not_judged(rest)))
         shown = folder.shown_table(table, (), f"{name}-not-judged")
-        yield Folded(f"Found in both runs and not judged ({len(rest)})", (why, shown))
+        yield FoldedSection(f"Found in both runs and not judged ({len(rest)})", (why, shown))
     with axis_terms(tested.reference.sides):
         shared = against.shared.get(tested.reference.name, ())
         cancelled = ", ".join(sorted(map(in_axis_terms, shared)))
@@ -215,7 +215,7 @@ def _test(
 
 
 def _figures(
-    tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: Making
+    tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: PageParts
 ) -> tuple[tuple[ShownFigure, ...], tuple[str, ...]]:
     """Numbers side by side, figures over each other, and why some are not."""
     folder = making.folder
@@ -238,7 +238,9 @@ def _drawn(figure: Figure, letters: Letters, name: str, folder: Folder) -> Shown
     """Each run in the look that it has in all pictures of the page."""
     chosen = dict(zip((letters.reference, letters.other), letters.looks, strict=True))
     svg = draw(figure, chosen=chosen)
-    return folder.figure(figure, Drawn.of(svg, figure), (), f"{name}-{figure.key}", looks=chosen)
+    return folder.figure(
+        figure, DrawingFiles.of(svg, figure), (), f"{name}-{figure.key}", looks=chosen
+    )
 
 
 def _side_by_side(
@@ -249,7 +251,7 @@ def _side_by_side(
         return None
     words = "; ".join(f"{pair.quantity}: {change_of(pair)}" for pair in pairs[:12])
     return folder.picture(
-        Drawn.of(svg),
+        DrawingFiles.of(svg),
         f"Numbers of {letters.reference} and {letters.other} side by side",
         "With their 95 % intervals; what was declared different is in bold.",
         f"Changes: {words}.",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.overlays import Letters
-from campaign.comparison.quantity_words import condition_words, name_here
+from campaign.comparison.quantity_words import axis_quantity_name, condition_words
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
 from campaign.references.verdict import Verdict
@@ -28,7 +28,7 @@ PANELS = 6
 def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
     """Each with its name: `Coulomb friction · direction positive`."""
     return [
-        (pair, f"{name_here(pair.test, pair.quantity)} · {place}".removesuffix(" · "))
+        (pair, f"{axis_quantity_name(pair.test, pair.quantity)} · {place}".removesuffix(" · "))
         for pair, place in zip(pairs, row_names(pairs), strict=True)
     ]
 
@@ -68,7 +68,7 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
         name_row(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
     rows(ax, len(pairs))
-    words = name_here(first.test, first.quantity)
+    words = axis_quantity_name(first.test, first.quantity)
     label = words[:1].upper() + words[1:]
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)
 

@@ -49,7 +49,7 @@ def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:
     return ", ".join(told)
 
 
-def name_here(test: AnalysedTest, quantity: str) -> str:
+def axis_quantity_name(test: AnalysedTest, quantity: str) -> str:
     """What a quantity is called of the axis of the test's bench: `breakaway force`."""
     with axis_terms(test.sides):
         return quantity_words(quantity)

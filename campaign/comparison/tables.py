@@ -11,7 +11,7 @@ from campaign.api.analysis import AnalysedTest
 from campaign.comparison.circumstances import Change
 from campaign.comparison.draws import common_draws
 from campaign.comparison.finding_pairs import Pair
-from campaign.comparison.quantity_words import condition_words, name_here
+from campaign.comparison.quantity_words import axis_quantity_name, condition_words
 from campaign.comparison.run_comparison import Against, size_of
 from campaign.estimate import Estimate
 from campaign.estimation.difference import BOUNDS, in_unit
@@ -110,7 +110,7 @@ def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
 def name_of(pair: Pair) -> str:
     """`coulomb torque, direction positive`."""
     words = condition_words(pair.test, pair.conditions)
-    name = name_here(pair.test, pair.quantity)
+    name = axis_quantity_name(pair.test, pair.quantity)
     return f"{name}, {words}" if words else name
 
 
@@ -237,7 +237,7 @@ def _alone(
         {
             "run": letter,
             "test": test.name,
-            "quantity": name_here(test, finding.quantity),
+            "quantity": axis_quantity_name(test, finding.quantity),
             "conditions": condition_words(test, finding.conditions),
             "value": finding.known,
             "unit": pretty_unit(finding.unit),

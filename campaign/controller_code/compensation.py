@@ -36,7 +36,7 @@ FREQUENCIES = 0.3, 1.7, 6.1
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledCompensation:
     """A compensation made ready: what code for a controller is written from.
 
     Attributes:
@@ -55,7 +55,7 @@ class Sampled:
         return words[:50].rstrip("_")  # MATLAB has names of 63
 
     @classmethod
-    def of(cls, bench: CompleteBench, name: str) -> Sampled:
+    def of(cls, bench: CompleteBench, name: str) -> SampledCompensation:
         """Raises UsageError where the bench has no such compensation, or it is not sampled."""
         if name not in bench.compensation:
             there = ", ".join(bench.compensation) or "none"
@@ -112,7 +112,7 @@ def _run(
         out[k] = _compensate(1, controller, compensation, memory, gyro, motor_torque)
 
 
-def trial_inputs(made: Sampled) -> Array:
+def trial_inputs(made: SampledCompensation) -> Array:
     """`INPUTS` along three sines with noise of the sensors' size, shape (n, 4): always the same."""
     draw, limits = np.random.default_rng(1), made.bench.limits
     time = np.arange(SAMPLES) * float(made.controller.period[0])

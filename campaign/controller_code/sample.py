@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 from campaign.controller_code.syntax import NUMBER, ROWS, finite
-from campaign.controller_code.transpile import Made, Program
+from campaign.controller_code.transpile import Program, TargetFunction
 from campaign.physics import elementary
 from campaign.physics.friction_elements import Interface
 from campaign.physics.step_function import AN_INSTANT, ROOM_TEMPERATURE, Motion
@@ -26,7 +26,7 @@ class Rows(NamedTuple):
     values: tuple[float, ...] = ()
 
 
-def rows_of(made: Sampled) -> list[Rows]:
+def rows_of(made: SampledCompensation) -> list[Rows]:
     """All states, 0 at power-up, and the parameters of friction models."""
     order = made.controller.c.shape[0]
     states = [Rows("memory", len(MEMORY)), *([Rows("linear", order)] if order else [])]
@@ -37,7 +37,7 @@ def rows_of(made: Sampled) -> list[Rows]:
     return states
 
 
-def sample(program: Program, made: Sampled) -> Made:
+def sample(program: Program, made: SampledCompensation) -> TargetFunction:
     """The main function: torque (N m at the load) from `rows_of` and `INPUTS`."""
     rows = rows_of(made)
     scope = {"Motion": Motion, "sin": elementary.sin, "finite": finite}
@@ -48,7 +48,7 @@ def sample(program: Program, made: Sampled) -> Made:
     return program.text_function(source, scope, types, [each.size for each in rows])
 
 
-def _lines(made: Sampled) -> Iterator[str]:
+def _lines(made: SampledCompensation) -> Iterator[str]:
     its = made.controller
     pole, period = float(its.filter_pole[0]), float(its.period[0])
     share, d = (1.0 - pole) / period, its.d[:, 0].tolist()
@@ -78,7 +78,7 @@ def _lines(made: Sampled) -> Iterator[str]:
     yield "return torque"
 
 
-def _linear(made: Sampled) -> Iterator[str]:
+def _linear(made: SampledCompensation) -> Iterator[str]:
     a, b, c = (getattr(made.controller, each)[..., 0].tolist() for each in "abc")
     for row, inputs in enumerate(b):
         yield f"torque = torque + {c[row]!r} * linear[{row}]"
@@ -90,7 +90,7 @@ def _linear(made: Sampled) -> Iterator[str]:
         yield f"linear[{row}] = next_{row}"
 
 
-def _friction(made: Sampled) -> Iterator[str]:
+def _friction(made: SampledCompensation) -> Iterator[str]:
     """States over the sample that has ended, then the torque that stands now."""
     if not made.interfaces:
         return

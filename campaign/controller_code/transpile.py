@@ -45,7 +45,7 @@ class Said:
     type: Any
 
 
-class Made(NamedTuple):
+class TargetFunction(NamedTuple):
     """A function of the target: the type of its result, its arguments, and which it writes to."""
 
     name: str
@@ -67,7 +67,7 @@ class Program:
 
     def function(
         self, function: Callable[..., Any], types: Sequence[Any], rows: Sequence[int] = ()
-    ) -> Made:
+    ) -> TargetFunction:
         """A Python function for arguments of these types; written once.
 
         rows: how many numbers each argument of type `ROWS` has, in their order.
@@ -80,20 +80,20 @@ class Program:
             where = f"{function.__module__}.{function.__qualname__}"
             source = textwrap.dedent(inspect.getsource(function))
             self.text_function(source, names, types, rows, where=where, key=key)
-        made: Made = self.known[key]
+        made: TargetFunction = self.known[key]
         return made
 
     def text_function(
         self, source: str, scope: Mapping[str, Any], types: Sequence[Any], rows: Sequence[int] = (),
         *, where: str = "", key: Any = None,
-    ) -> Made:  # fmt: skip
+    ) -> TargetFunction:  # fmt: skip
         """The same of Python text, whose names mean what `scope` says."""
         tree = ast.parse(source).body[0]
         if not isinstance(tree, ast.FunctionDef):
             raise UsageError(f"{where}: {source.splitlines()[0]!r} is no function")
         key = key or source
         name = self.named(tree.name)
-        self.known[key] = Made(name, None)  # a function that calls itself ends there
+        self.known[key] = TargetFunction(name, None)  # a function that calls itself ends there
         made = _Function(self, name, tree, scope, types, rows, where or tree.name)
         self.known[key] = made.written()
         return self.known[key]  # type: ignore[no-any-return]
@@ -114,7 +114,7 @@ class Program:
             self.texts += [text] if text else []
         return str(self.known[kind, rows])
 
-    def polynomial(self, coefficients: Sequence[float]) -> Made:
+    def polynomial(self, coefficients: Sequence[float]) -> TargetFunction:
         """Estrin's scheme, as `elementary.polynomial` has it."""
         terms, power = [repr(float(c)) for c in coefficients], "x"
         lines: list[str] = []
@@ -131,7 +131,7 @@ class Program:
         source = "\n    ".join(["def polynomial(x):", *lines, f"return {terms[0]}"])
         if source not in self.known:
             self.text_function(source, vars(elementary), [NUMBER])
-        made: Made = self.known[source]
+        made: TargetFunction = self.known[source]
         return made
 
 
@@ -157,7 +157,7 @@ class _Function:
         sized = [each for each in arguments if self.types[each] == ROWS]
         self.rows = dict(zip(sized, rows, strict=True))
 
-    def written(self) -> Made:
+    def written(self) -> TargetFunction:
         """What its text gives; the text itself goes to the program."""
         self._block(self.tree.body)
         arguments = []
@@ -171,7 +171,7 @@ class _Function:
         self.program.texts.append(
             self.syntax.function(self.name, told, arguments, self.declared, self.lines)
         )
-        return Made(self.name, self.result, arguments)
+        return TargetFunction(self.name, self.result, arguments)
 
     def _named(self, name: str) -> str:
         """The name in the target, which tells no letters apart by their case."""
@@ -438,7 +438,11 @@ class _Function:
         return [a for a in arguments if self.types.get(getattr(a, "id", "")) == ROWS]
 
     def _called(
-        self, node: ast.Call, made: Made, arguments: Sequence[ast.expr], said: Sequence[Said]
+        self,
+        node: ast.Call,
+        made: TargetFunction,
+        arguments: Sequence[ast.expr],
+        said: Sequence[Said],
     ) -> Said:
         """A call, as a statement."""
         if made.kind is None:

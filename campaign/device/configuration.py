@@ -21,7 +21,7 @@ TABLES = ("task", "controller", "limits", "compensation", REHEARSAL)
 
 
 @dataclass(frozen=True)
-class Refused(Exception):  # noqa: N818 - a refusal is an answer, not a mishap
+class ConfigurationRefusal(Exception):  # noqa: N818 - a refusal is an answer, not a mishap
     """Why a configuration cannot be armed: what a NAK says."""
 
     code: NakCode
@@ -30,9 +30,11 @@ class Refused(Exception):  # noqa: N818 - a refusal is an answer, not a mishap
 
 
 def check_name(name: str) -> None:
-    """Raises Refused when no parameter can be called so."""
+    """Raises ConfigurationRefusal when no parameter can be called so."""
     if name.partition(".")[0] not in TABLES:
-        raise Refused(NakCode.UNKNOWN_NAME, name, f"names begin with one of {', '.join(TABLES)}")
+        raise ConfigurationRefusal(
+            NakCode.UNKNOWN_NAME, name, f"names begin with one of {', '.join(TABLES)}"
+        )
 
 
 def make_trial(bench: CompleteBench, parameters: Mapping[str, Value]) -> Trial:
@@ -40,23 +42,25 @@ def make_trial(bench: CompleteBench, parameters: Mapping[str, Value]) -> Trial:
 
     Limits and the gains of each loop that the host sets are wholly the host's, those of a loop that
     it does not name are the controller's own; of the bench itself only what a person can have set
-    to it. Raises Refused.
+    to it. Raises ConfigurationRefusal.
     """
     try:
         tree = nest(parameters)
     except ValueError as error:
-        raise Refused(NakCode.WRONG_TYPE, "", str(error)) from None
+        raise ConfigurationRefusal(NakCode.WRONG_TYPE, "", str(error)) from None
     rehearsal = tree.get(REHEARSAL, {})
     changed = _bench(bench, tree, rehearsal.get("bench", {}))
     task = _task(tree.get("task", {}), rehearsal)
     if task.compensation != "none" and task.compensation not in changed.compensation:
-        raise Refused(
+        raise ConfigurationRefusal(
             NakCode.OUT_OF_RANGE, "task.compensation", f"there is no {task.compensation!r}"
         )
     _check_limits(bench, changed, task)
     seed = rehearsal.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise Refused(NakCode.OUT_OF_RANGE, f"{REHEARSAL}.seed", "a whole number, not below 0")
+        raise ConfigurationRefusal(
+            NakCode.OUT_OF_RANGE, f"{REHEARSAL}.seed", "a whole number, not below 0"
+        )
     tree = changed.model_dump(mode="json")
     return Trial(number=1, test=REHEARSAL, kind=REHEARSAL, seed=seed, bench=tree, task=task)
 
@@ -96,12 +100,12 @@ def _check_limits(own: CompleteBench, bench: CompleteBench, task: Task) -> None:
         wanted = getattr(bench.limits, name)
         if wanted > bound * (1 + 1e-9):
             text = f"{wanted:g} is beyond the controller's own limit of {bound:g}"
-            raise Refused(NakCode.OUT_OF_RANGE, f"limits.{name}", text)
+            raise ConfigurationRefusal(NakCode.OUT_OF_RANGE, f"limits.{name}", text)
     for margin in margins(bench, task):
         if margin.broken:
             text = f"the {margin.called} would come to {margin.value:.6g} {margin.unit}"
             text += f"; the limit is {margin.bound:.6g}"
-            raise Refused(NakCode.LIMIT, f"limits.{margin.limit}", text)
+            raise ConfigurationRefusal(NakCode.LIMIT, f"limits.{margin.limit}", text)
 
 
 def _merged(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -113,7 +117,7 @@ def _merged(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
     return out
 
 
-def _refused(error: ValidationError, prefix: str) -> Refused:
+def _refused(error: ValidationError, prefix: str) -> ConfigurationRefusal:
     """What pydantic finds wrong first."""
     first = error.errors(include_url=False)[0]
     name = prefix + ".".join(str(key) for key in first["loc"])
@@ -124,4 +128,4 @@ def _refused(error: ValidationError, prefix: str) -> Refused:
         code = NakCode.UNKNOWN_NAME
     else:
         code = NakCode.WRONG_TYPE if kind.endswith(("_type", "_parsing")) else NakCode.OUT_OF_RANGE
-    return Refused(code, name, first["msg"])
+    return ConfigurationRefusal(code, name, first["msg"])

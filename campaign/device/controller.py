@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from campaign.backends.sim import CHANNELS
-from campaign.device.configuration import Refused, make_trial
+from campaign.device.configuration import ConfigurationRefusal, make_trial
 from campaign.device.faults import FaultName
 from campaign.device.latch import LatchMemory
 from campaign.device.machine import Machine, Setup
@@ -22,7 +22,7 @@ from campaign.recording import Ending, Fault, Outcome
 from campaign.wire import codes
 from campaign.wire.channel_features import channel_features
 from campaign.wire.codes import VERSION, Kind, NakCode, State, WireError
-from campaign.wire.device import Ack, Capabilities, Holder, Latch, Lost, Nak, Status
+from campaign.wire.device import Ack, Capabilities, Holder, Latch, LostRecords, Nak, Status
 from campaign.wire.fields import clipped
 from campaign.wire.frames import Frame
 from campaign.wire.host import (
@@ -114,7 +114,7 @@ class Controller:
         elif frame.kind in (Kind.HEARTBEAT, Kind.RESEND, Kind.QUERY, Kind.BYE):
             self._unnumbered(client, frame)
         elif self._session.client not in (None, client):
-            self._refuse(client, frame, Refused(NakCode.BUSY, "", self._held_by()))
+            self._refuse(client, frame, ConfigurationRefusal(NakCode.BUSY, "", self._held_by()))
         else:
             self._command(client, frame)
 
@@ -193,7 +193,7 @@ class Controller:
             ),
         )
 
-    def _refuse(self, client: int, frame: Frame, why: Refused) -> Nak:
+    def _refuse(self, client: int, frame: Frame, why: ConfigurationRefusal) -> Nak:
         name, text = clipped(why.name), clipped(why.text)
         nak = Nak(frame.sequence, frame.kind, why.code, self.state, name, text)
         self._send(client, nak)
@@ -242,7 +242,7 @@ class Controller:
             return
         state = after_hello(self.state, same, self._is_held())
         if isinstance(state, NakCode):
-            self._refuse(client, frame, Refused(state, "", self._held_by()))
+            self._refuse(client, frame, ConfigurationRefusal(state, "", self._held_by()))
             return
         self._session.begin(client, message.session, frame.sequence, message.host, self._now())
         self._setup.log("hello", host=message.host)
@@ -271,7 +271,7 @@ class Controller:
                 self._send(client, answer)
         elif isinstance(message, Resend):
             held = message.trial == ring.trial != 0
-            lost = (Lost(message.trial, message.first, message.count),)
+            lost = (LostRecords(message.trial, message.first, message.count),)
             for record in ring.again(message.first, message.count) if held else lost:
                 self._send(client, record)
 
@@ -281,7 +281,7 @@ class Controller:
         turn = self._session.numbering.turn(frame.kind, frame.sequence, frame.body)
         if turn is Turn.OUT_OF_ORDER:
             text = "neither the next command nor the last one again"
-            self._refuse(client, frame, Refused(NakCode.OUT_OF_ORDER, "", text))
+            self._refuse(client, frame, ConfigurationRefusal(NakCode.OUT_OF_ORDER, "", text))
             return
         if turn is Turn.REPEATED:
             for answer in self._session.answers:
@@ -300,17 +300,17 @@ class Controller:
         except WireError as error:
             known = frame.kind in set(Kind)
             code = NakCode.MALFORMED if known else NakCode.UNKNOWN_MESSAGE
-            return self._refuse(client, frame, Refused(code, "", str(error)))
+            return self._refuse(client, frame, ConfigurationRefusal(code, "", str(error)))
 
     def _carried_out(self, client: int, frame: Frame, message: Message) -> tuple[Message, ...]:
         """Carry out a new command; what was answered."""
         state = after(self.state, Kind(frame.kind))
         if isinstance(state, NakCode):
             text = f"not in state {self.state.text}"
-            return (self._refuse(client, frame, Refused(state, "", text)),)
+            return (self._refuse(client, frame, ConfigurationRefusal(state, "", text)),)
         try:
             further = self._do(message, frame)
-        except Refused as why:
+        except ConfigurationRefusal as why:
             return (self._refuse(client, frame, why),)
         # STOP leaves the state to the end of the trial; START's motion may have none to wait for.
         ack = Ack(frame.sequence, Kind(frame.kind), state, self._boot)
@@ -320,7 +320,7 @@ class Controller:
         return (ack, *further)
 
     def _do(self, message: Message, frame: Frame) -> tuple[Message, ...]:
-        """What a command does besides changing the state. Raises Refused."""
+        """What a command does besides changing the state. Raises ConfigurationRefusal."""
         match message:
             case Set():
                 self._configuration.add(frame.body, message.items)
@@ -338,7 +338,7 @@ class Controller:
             case Release():
                 if message.trial != self.machine.ring.trial:
                     text = f"the records are of trial {self.machine.ring.trial}"
-                    raise Refused(NakCode.WRONG_TRIAL, "", text)
+                    raise ConfigurationRefusal(NakCode.WRONG_TRIAL, "", text)
                 self.machine.ring.begin(0)
             case Clear():
                 self._clear()
@@ -349,38 +349,40 @@ class Controller:
         trial = make_trial(self._setup.bench, self._configuration.whole(message.crc))
         why = self.machine.refuses(trial)
         if why is not None:
-            raise Refused(NakCode.OUT_OF_RANGE, "", why)
+            raise ConfigurationRefusal(NakCode.OUT_OF_RANGE, "", why)
         channels = self.machine.arm(trial)
         return tuple(channels_messages(frame.sequence, trial.task.sample_rate, channels))
 
     def _clear(self) -> None:
         if not self.machine.at_rest:
-            raise Refused(NakCode.NOT_READY, "", "the axis is not yet at rest")
+            raise ConfigurationRefusal(NakCode.NOT_READY, "", "the axis is not yet at rest")
         if self._now() < self._hot_until:
-            raise Refused(NakCode.CAUSE_PERSISTS, "", "the motor is still too hot")
+            raise ConfigurationRefusal(NakCode.CAUSE_PERSISTS, "", "the motor is still too hot")
         self.machine.drop()
         self.machine.ring.begin(0)
 
     def _check_latch(self) -> None:
         if self._latch.latched:
             text = f"stopped by {self._latch.stop.by or 'nobody that it remembers'}"
-            raise Refused(NakCode.LATCHED, "", text)
+            raise ConfigurationRefusal(NakCode.LATCHED, "", text)
 
     def _unlatch(self, message: Unlatch) -> tuple[Message, ...]:
         try:
             cleared = self._latch.clear(message.count)
         except OSError as error:
             text = f"it could not be remembered: {error.strerror}"
-            raise Refused(NakCode.NOT_READY, "", text) from None
+            raise ConfigurationRefusal(NakCode.NOT_READY, "", text) from None
         if not cleared:
             text = f"its latest stop is number {self._latch.stop.count}"
-            raise Refused(NakCode.OTHER_STOP, "", text)
+            raise ConfigurationRefusal(NakCode.OTHER_STOP, "", text)
         self._setup.log("cleared", count=message.count, by=message.host)
         return (self._latch.message(),)
 
     def _check_heard(self) -> None:
         if self._now() >= self._silent_at():
-            raise Refused(NakCode.NO_HEARTBEAT, "", "no heartbeat has been heard lately")
+            raise ConfigurationRefusal(
+                NakCode.NO_HEARTBEAT, "", "no heartbeat has been heard lately"
+            )
 
     # What happens by itself
 

@@ -54,7 +54,7 @@ class Setup:
 
 
 @dataclass(frozen=True)
-class Armed:
+class ArmedTrial:
     """A trial that is ready to start, with its simulation under way."""
 
     trial: Trial
@@ -81,7 +81,7 @@ class Machine:
         self.winding = Winding(setup.bench.motor.resistance)
         self.trials = 0
         self.outcome: Outcome | None = None
-        self._armed: Armed | None = None
+        self._armed: ArmedTrial | None = None
         self._motion: Motion | None = None
         self._ending: Ending | None = None
         self._rest_at = -math.inf
@@ -115,7 +115,7 @@ class Machine:
         )
         producer = Producer(self._backend, trial, self._setup.wake)
         producer.begin()
-        self._armed = Armed(trial, channels, producer)
+        self._armed = ArmedTrial(trial, channels, producer)
         return channels
 
     def start(self, number: int) -> None:
@@ -157,7 +157,7 @@ class Machine:
         if self.drive_on:
             self._setup.log("drive off", why="dropped")
         for producer in (self._armed, self._motion):
-            if isinstance(producer, Armed):
+            if isinstance(producer, ArmedTrial):
                 producer.producer.cancel()
             elif producer is not None:
                 producer.stop()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from campaign.wire.device import Lost
+from campaign.wire.device import LostRecords
 from campaign.wire.messages import Record
 
 
@@ -58,11 +58,11 @@ class Ring:
             self._records.popleft()
             self.first += 1
 
-    def again(self, first: int, count: int) -> Iterator[Record | Lost]:
+    def again(self, first: int, count: int) -> Iterator[Record | LostRecords]:
         """The records asked for again; those no longer kept as one LOST, future ones not at all."""
         end = min(first + count, self.next)
         lost = min(end, self.first) - first
         if lost > 0:
-            yield Lost(self.trial, first, lost)
+            yield LostRecords(self.trial, first, lost)
         for number in range(max(first, self.first), end):
             yield self._records[number - self.first]

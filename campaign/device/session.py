@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from campaign.device.configuration import Refused, check_name
+from campaign.device.configuration import ConfigurationRefusal, check_name
 from campaign.wire.codes import NakCode, WireError
 from campaign.wire.messages import Message
 from campaign.wire.parameters import ArraySlice, Item, Value, assembled, configuration_crc
-from campaign.wire.statemachine import Numbering
+from campaign.wire.statemachine import SequenceNumbers
 
 LONGEST_ARRAY = 65536
 MOST_BYTES = 4 * 1024 * 1024
@@ -34,7 +34,7 @@ class Session:
     client: int | None = None
     number: int | None = None
     host: str = ""
-    numbering: Numbering = field(default_factory=Numbering)
+    numbering: SequenceNumbers = field(default_factory=SequenceNumbers)
     answers: tuple[Message, ...] = ()
     heard_at: float = -math.inf
     heartbeat: int = 0
@@ -56,24 +56,26 @@ class Configuration:
         self._size = 0
 
     def add(self, body: bytes, items: Sequence[Item]) -> None:
-        """Add one SET. Raises Refused, and then has added nothing."""
+        """Add one SET. Raises ConfigurationRefusal, and then has added nothing."""
         for item in items:
             check_name(item.name)
             if isinstance(item.value, ArraySlice) and item.value.total > LONGEST_ARRAY:
                 text = f"an array of more than {LONGEST_ARRAY} values"
-                raise Refused(NakCode.TOO_LARGE, item.name, text)
+                raise ConfigurationRefusal(NakCode.TOO_LARGE, item.name, text)
         if self._size + len(body) > MOST_BYTES:
-            raise Refused(NakCode.TOO_LARGE, "", f"more than {MOST_BYTES} bytes of parameters")
+            raise ConfigurationRefusal(
+                NakCode.TOO_LARGE, "", f"more than {MOST_BYTES} bytes of parameters"
+            )
         self._size += len(body)
         self._bodies.append(body)
         self._items += items
 
     def whole(self, crc: int) -> dict[str, Value]:
-        """All parameters, if they are what the host meant. Raises Refused."""
+        """All parameters, if they are what the host meant. Raises ConfigurationRefusal."""
         if configuration_crc(self._bodies) != crc:
             text = "the parameters that arrived are not those that were sent"
-            raise Refused(NakCode.CHECKSUM, "", text)
+            raise ConfigurationRefusal(NakCode.CHECKSUM, "", text)
         try:
             return assembled(self._items)
         except WireError as error:
-            raise Refused(NakCode.INCOMPLETE, "", str(error)) from None
+            raise ConfigurationRefusal(NakCode.INCOMPLETE, "", str(error)) from None

@@ -14,7 +14,7 @@ FALSE_ALARM = 0.01
 
 
 @dataclass(frozen=True)
-class Passing:
+class LevelCrossing:
     """A level was passed between the points `before` and `after` (indices).
 
     Both lie off it by more than their errors; what is between them may lie on either side.
@@ -38,7 +38,7 @@ def sides(above: Array, error: Array) -> Array:
     return np.asarray(np.where(np.abs(above) > surely * error, np.sign(above), 0.0))
 
 
-def passings(above: Array, error: Array) -> list[Passing]:
+def passings(above: Array, error: Array) -> list[LevelCrossing]:
     """Every time a curve passes zero; arguments as for `sides`.
 
     Noise cannot make one: it takes points on both sides that are off by more than their errors.
@@ -46,7 +46,7 @@ def passings(above: Array, error: Array) -> list[Passing]:
     side = sides(above, error)
     decided = np.flatnonzero(side)
     return [
-        Passing(int(before), int(after), bool(side[before] > 0))
+        LevelCrossing(int(before), int(after), bool(side[before] > 0))
         for before, after in itertools.pairwise(decided)
         if side[before] != side[after]
     ]

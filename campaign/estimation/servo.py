@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.continuation import DECIBEL, gain_margin_beyond
-from campaign.estimation.crossings import Passing, passings, sides
+from campaign.estimation.crossings import LevelCrossing, passings, sides
 from campaign.estimation.frequency_response import Array, ComplexArray, Response, open_loop
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import LEVEL, shifted_by, with_error
@@ -235,7 +235,7 @@ def _gain_margin(
 
 
 def _read(
-    frequency: Array, loop: Response, passing: Passing, zero: Quantity, value: Quantity
+    frequency: Array, loop: Response, passing: LevelCrossing, zero: Quantity, value: Quantity
 ) -> Reading | None:
     """The reading at a passing; None where points are too few or the fit does not pass."""
     place = math.log(frequency[passing.before]), math.log(frequency[passing.after])

@@ -15,14 +15,14 @@ from campaign.execution.recorder import SupervisingRecorder
 from campaign.execution.safety import describe
 from campaign.execution.supervision import SilenceWatch, Supervision, TrialStop
 from campaign.execution.writer import Begins, TrialWriter
-from campaign.policy import KEEP_ALL, Keeping
+from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import Ending, Outcome, SafeState
 from campaign.stopwatch import Work
 from campaign.trial import Trial
 
 
 @dataclass(frozen=True)
-class Executed:
+class AttemptEnd:
     """How an attempt ended.
 
     Attributes:
@@ -54,10 +54,10 @@ class Conditions:
     halted: Callable[[], bool]
     supervision: Supervision
     measure: Measure | None = None
-    keeping: Keeping = KEEP_ALL
+    keeping: SampleRetention = KEEP_ALL
 
 
-def execute_once(trial: Trial, conditions: Conditions) -> Executed:
+def execute_once(trial: Trial, conditions: Conditions) -> AttemptEnd:
     """One attempt at `trial`, archived however it ends. Raises only what the archive raises."""
     supervision = conditions.supervision
     with supervision.timing.span(Work.SAMPLES):  # less what is told to be something else
@@ -72,7 +72,7 @@ def execute_once(trial: Trial, conditions: Conditions) -> Executed:
 def execute_together(
     trials: Sequence[Trial],
     conditions: Conditions,
-    tell: Callable[[Trial, Executed], None],
+    tell: Callable[[Trial, AttemptEnd], None],
 ) -> None:
     """One attempt at each of `trials`, together; `tell` is told of each once it is archived.
 
@@ -89,23 +89,23 @@ def _execute_together(
     trials: Sequence[Trial],
     backend: ExecutesTogether,
     conditions: Conditions,
-    tell: Callable[[Trial, Executed], None],
+    tell: Callable[[Trial, AttemptEnd], None],
 ) -> None:
     attempts = dict(enumerate(_Attempt.begin(trial, conditions) for trial in trials))
 
-    def end(place: int, executed: Executed) -> None:
+    def end(place: int, executed: AttemptEnd) -> None:
         attempt = attempts.pop(place)
         tell(attempt.trial, attempt.archive(attempt.concluded(executed)))
 
     recorders = [attempt.recorder for attempt in attempts.values()]
     stops = [attempt.stop for attempt in attempts.values()]
     untold = Ending(Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED)
-    left = Executed(untold, gave_up=True)
+    left = AttemptEnd(untold, gave_up=True)
     try:
         for place, ending in calls.called(backend, "execute_together", trials, recorders, stops):
             if place not in attempts:
                 raise LookupError(f"no trial is at place {place!r}, or it has ended")
-            end(place, Executed(calls.checked_ending(ending, backend)))
+            end(place, AttemptEnd(calls.checked_ending(ending, backend)))
             if not attempts:
                 break
     except BaseException as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
@@ -139,19 +139,19 @@ class _Attempt:
         recorder = SupervisingRecorder(trial, file, stop, conditions.supervision)
         return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
 
-    def execute(self) -> Executed:
+    def execute(self) -> AttemptEnd:
         """What the backend says of it. Raises what the archive raises."""
         try:
-            return Executed(calls.execute(self.backend, self.trial, self.recorder, self.stop))
+            return AttemptEnd(calls.execute(self.backend, self.trial, self.recorder, self.stop))
         except Exception as error:  # noqa: BLE001 - likewise
             return _failed(error)
 
-    def concluded(self, executed: Executed, *, forced: bool = False) -> Executed:
+    def concluded(self, executed: AttemptEnd, *, forced: bool = False) -> AttemptEnd:
         """How it ended as the recorder has seen it."""
         ending = self.recorder.conclude(executed.ending, forced=forced)
         return replace(executed, ending=ending)
 
-    def archive(self, executed: Executed) -> Executed:
+    def archive(self, executed: AttemptEnd) -> AttemptEnd:
         """Keep the trial, then what its recording says. Raises what the archive raises."""
         executed = replace(executed, remarks=self.recorder.remarks)
         self._file.finish(executed.ending, self._started, utc_now())
@@ -159,23 +159,23 @@ class _Attempt:
             return executed
         return replace(executed, unmeasured=self._file.measure(self._measure))
 
-    def abandoned(self, safe_state: SafeState) -> Executed:
+    def abandoned(self, safe_state: SafeState) -> AttemptEnd:
         """It did not come back, although the bench was made safe over its head."""
         ending = Ending(Outcome.FAULT, "it did not come back from the trial", safe_state)
-        return Executed(self.recorder.conclude(ending, forced=True), gave_up=True)
+        return AttemptEnd(self.recorder.conclude(ending, forced=True), gave_up=True)
 
 
-def _failed(error: BaseException) -> Executed:
+def _failed(error: BaseException) -> AttemptEnd:
     """A backend that cannot go on, or has a bug. Raises what the recorder raised."""
     if isinstance(error, ArchiveError):
         raise error  # from the recorder: the archive cannot be written
     bug = None if isinstance(error, CampaignError) else error
     reason = str(error) if bug is None else f"internal error: {describe(error)}"
     ending = Ending(Outcome.FAULT, reason, SafeState.NOT_CONFIRMED)
-    return Executed(ending, bug=bug, gave_up=True)
+    return AttemptEnd(ending, bug=bug, gave_up=True)
 
 
-def _attended(attempt: _Attempt, supervision: Supervision) -> Executed:
+def _attended(attempt: _Attempt, supervision: Supervision) -> AttemptEnd:
     """Execute on a bench that really moves: somebody looks at the clock all the while.
 
     The backend has a thread of its own, which this one does not depend on: when it does not end a

@@ -25,15 +25,15 @@ from typing import Protocol, Self
 from campaign import processes
 from campaign.archive.layout.journal import Entry
 from campaign.archive.writing.trial_writer import FolderWriter
-from campaign.backends.interface import Backend, Timed
+from campaign.backends.interface import Backend, SupportsTiming
 from campaign.errors import ArchiveError
-from campaign.execution.attempt import Conditions, Executed, execute_once, execute_together
+from campaign.execution.attempt import AttemptEnd, Conditions, execute_once, execute_together
 from campaign.execution.safety import describe
 from campaign.execution.supervision import Supervision
-from campaign.execution.trial_metrics import Measuring
+from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.execution.writer import PlanWriter
 from campaign.experiments import experiments
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
 from campaign.trial import Trial
 
@@ -49,7 +49,7 @@ PRELOADED = (
     "campaign.physics.simulate",
 )
 """Modules that the fork server imports once for all worker processes."""
-OnEnd = Callable[[Trial, Executed, Sequence[Entry]], None]
+OnEnd = Callable[[Trial, AttemptEnd, Sequence[Entry]], None]
 """Receives how a trial ended and its journal entries still to be written; from any thread."""
 
 
@@ -140,7 +140,7 @@ def thread_executor(count: int, conditions: Conditions) -> Iterator[ThreadExecut
 
 
 def execute(
-    batch: Sequence[Trial], conditions: Conditions, on_end: Callable[[Trial, Executed], None]
+    batch: Sequence[Trial], conditions: Conditions, on_end: Callable[[Trial, AttemptEnd], None]
 ) -> None:
     """Execute a batch; report each trial once it is archived. Raises what the archive raises."""
     if len(batch) == 1:
@@ -155,7 +155,7 @@ class WorkerSetup:
 
     backend: Backend
     supervision: Supervision
-    keeping: Keeping
+    keeping: SampleRetention
     is_measured: bool
     is_timed: bool
 
@@ -183,7 +183,7 @@ class BatchResult:
         files: content of trial files by name, of a process that has not the folder of the run.
     """
 
-    ended: tuple[tuple[int, Executed, tuple[Entry, ...]], ...]
+    ended: tuple[tuple[int, AttemptEnd, tuple[Entry, ...]], ...]
     error: BaseException | None
     spent: Mapping[Work, Spent]
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -196,8 +196,8 @@ class BatchWorker:
         self._setup, self._stopped = setup, stopped
         self._stopwatch = Stopwatch() if setup.is_timed else None
         self._timing = timing = self._stopwatch or UNTIMED
-        self._measure = Measuring(experiments(), timing) if setup.is_measured else None
-        if isinstance(setup.backend, Timed):
+        self._measure = TrialMeasurement(experiments(), timing) if setup.is_measured else None
+        if isinstance(setup.backend, SupportsTiming):
             setup.backend.timing = timing
 
     def execute(
@@ -208,9 +208,9 @@ class BatchWorker:
         supervision = replace(self._setup.supervision, timing=self._timing)
         backend, keeping = self._setup.backend, self._setup.keeping
         conditions = Conditions(backend, writer, self._stopped, supervision, self._measure, keeping)
-        ended: list[tuple[int, Executed, tuple[Entry, ...]]] = []
+        ended: list[tuple[int, AttemptEnd, tuple[Entry, ...]]] = []
 
-        def on_end(trial: Trial, executed: Executed) -> None:
+        def on_end(trial: Trial, executed: AttemptEnd) -> None:
             if executed.bug is not None:
                 executed = replace(executed, bug=_picklable(executed.bug))
             ended.append((trial.number, executed, writer.take_entries()))

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from campaign.backends import calls
-from campaign.backends.interface import Backend, StoppedOutside
+from campaign.backends.interface import Backend, SupportsExternalStop
 from campaign.execution.safety import describe
 from campaign.execution.stop import StopSwitch
 from campaign.recording import PanicStop
@@ -33,7 +33,7 @@ class OutsideWatch:
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """`found` is told once, before the run is asked to stop."""
-        self._bench = backend if isinstance(backend, StoppedOutside) else None
+        self._bench = backend if isinstance(backend, SupportsExternalStop) else None
         self._switch = switch
         self._found = found
         self._now = now

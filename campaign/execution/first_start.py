@@ -20,7 +20,7 @@ from dataclasses import asdict
 from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.machine_code import (
     WIDTHS,
-    Made,
+    CompiledPart,
     engine,
     folder,
     is_made,
@@ -31,7 +31,7 @@ from campaign.physics.machine_code import (
 from campaign.protocol.bench_file import load_bench
 from campaign.resources import shipped_benches
 
-Told = Callable[[Made], None]
+Told = Callable[[CompiledPart], None]
 LONGEST = 600.0
 """s; longer nothing compiles, even on a machine that has much else to do."""
 
@@ -74,14 +74,14 @@ class Helpers:
             for stream in filter(None, (process.stdin, process.stdout)):
                 stream.close()
 
-    def wait(self) -> dict[str, Made]:
+    def wait(self) -> dict[str, CompiledPart]:
         """What they have made, by name, when they have ended; one that failed made less."""
         for process in self._processes:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(LONGEST)
             process.kill()  # one that hangs
         lines = [line for each in self._processes for line in each.stdout or ()]
-        made = [Made(**json.loads(line)) for line in lines]
+        made = [CompiledPart(**json.loads(line)) for line in lines]
         return {each.name: each for each in made}
 
     @staticmethod

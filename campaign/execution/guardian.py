@@ -46,7 +46,7 @@ ASKING = (signal.SIGINT, signal.SIGTERM)
 HANG_UP = getattr(signal, "SIGHUP", None)
 
 
-class Asked:
+class StopRequests:
     """Counts who asked the program to stop: a hang-up only asks, it does not insist."""
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Guardian:
         self.moves = False
         self._insisted: float | None = None
         self._silent: float | None = None
-        self._asked = {0: Asked(), OURS: Asked()}
+        self._asked = {0: StopRequests(), OURS: StopRequests()}
         self._left = b""
 
     @property

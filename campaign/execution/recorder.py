@@ -20,7 +20,7 @@ from campaign.channels import missing
 from campaign.errors import ArchiveError
 from campaign.execution.sample_checks import (
     STEP,
-    Announced,
+    ArchivedChannels,
     Verdict,
     announced,
     make_watch,
@@ -67,7 +67,7 @@ class SupervisingRecorder:
         self._supervision = supervision
         self._ends_trials = supervision.source is not Source.RECORDING
         self._subscribers: list[Subscriber] = list(supervision.subscribers)
-        self._announced = Announced()
+        self._announced = ArchivedChannels()
         self._channels: tuple[ChannelInfo, ...] | None = None
         self._watch: LimitWatch | None = None
         self._samples = 0

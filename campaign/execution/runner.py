@@ -21,13 +21,13 @@ from campaign.execution.executors import OpenExecutor, thread_executor
 from campaign.execution.operator_prompts import UNATTENDED, Attendance
 from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Display, Ledger
-from campaign.execution.safety import Ended, safe_afterwards, unsafe_first
+from campaign.execution.safety import EarlyEnd, safe_afterwards, unsafe_first
 from campaign.execution.sequence import TrialSequence
 from campaign.execution.stages import Stages, no_stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
 from campaign.execution.writer import PlanWriter
-from campaign.policy import Keeping, Policy
+from campaign.policy import Policy, SampleRetention
 from campaign.recording import Outcome, PanicStop
 from campaign.stopwatch import Work
 from campaign.trial import Trial
@@ -74,7 +74,7 @@ def run_plan(
         Exception: a bug in a backend, after the archive has been sealed as a fault.
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
-    ended = Ended(kept=writer.folder)
+    ended = EarlyEnd(kept=writer.folder)
     stages, policy = stages or no_stages(), policy or Policy()
     waiting = stages.in_order(trial for trial in trials if trial.number not in finished)
     supervision = replace(supervision, subscribers=(*supervision.subscribers, ledger.reached))
@@ -92,7 +92,7 @@ def run_plan(
         stages,
         live=supervision.live,
     )
-    keeping = Keeping.of(policy.keep, trials)
+    keeping = SampleRetention.of(policy.keep, trials)
     conditions = Conditions(backend, writer, sequence.halted, supervision, measure, keeping)
     opened = (
         thread_executor(workers, conditions) if executor is None else executor(conditions, writer)
@@ -115,7 +115,7 @@ def run_plan(
 
 
 def _verdict(
-    ledger: Ledger, ended: Ended, stop: StopSwitch, outside: PanicStop | None, stages: Stages
+    ledger: Ledger, ended: EarlyEnd, stop: StopSwitch, outside: PanicStop | None, stages: Stages
 ) -> tuple[RunStatus, str]:
     """How the run stands, and every reason there is for it."""
     cut = stop() and (ledger.left or stages.left or Outcome.INTERRUPTED in ledger.outcomes)

@@ -32,7 +32,7 @@ class NotSafeError(CampaignError):
 
 
 @dataclass
-class Ended:
+class EarlyEnd:
     """What ended the run early, and how the bench was left.
 
     Attributes:
@@ -52,7 +52,7 @@ class Ended:
 
 
 @contextmanager
-def unsafe_first(ended: Ended) -> Iterator[None]:
+def unsafe_first(ended: EarlyEnd) -> Iterator[None]:
     """Whatever ends the block: a bench not known to be safe is said first, with its own code."""
     try:
         yield
@@ -64,7 +64,7 @@ def unsafe_first(ended: Ended) -> Iterator[None]:
 
 
 @contextmanager
-def safe_afterwards(backend: Backend, ended: Ended) -> Iterator[None]:
+def safe_afterwards(backend: Backend, ended: EarlyEnd) -> Iterator[None]:
     """Bring the bench to rest however the block ends, and note whether that was seen."""
     try:
         yield
@@ -79,7 +79,7 @@ def safe_afterwards(backend: Backend, ended: Ended) -> Iterator[None]:
 @contextmanager
 def safe_when_broken_off(backend: Backend) -> Iterator[None]:
     """Bring a connected bench to rest when the block raises, before any trial was begun."""
-    ended = Ended()
+    ended = EarlyEnd()
     with unsafe_first(ended):
         try:
             yield
@@ -116,12 +116,12 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
 
 def safe_at_once(backend: Backend) -> ExitCode:
     """Bring the bench to rest, whatever other threads do meanwhile, before the program is left."""
-    ended = Ended()
+    ended = EarlyEnd()
     make_safe(backend, ended)
     return ExitCode.NOT_SAFE if ended.unsafe else ExitCode.INTERRUPTED
 
 
-def make_safe(backend: Backend, ended: Ended) -> None:
+def make_safe(backend: Backend, ended: EarlyEnd) -> None:
     """Tell the bench to come to rest; afterwards `ended` says whether it was seen to."""
     ended.safe_state = SafeState.NOT_CONFIRMED
     ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off

@@ -38,7 +38,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Announced:
+class ArchivedChannels:
     """The channels of a trial as they are archived.
 
     Attributes:
@@ -51,7 +51,7 @@ class Announced:
     converted: tuple[str, ...] = ()
 
 
-def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> Announced:
+def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> ArchivedChannels:
     """`channels` with storable texts, and those of the vocabulary in its units.
 
     Raises ValueError saying which channel cannot be archived.
@@ -76,7 +76,7 @@ def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> Announced:
             raise ValueError(f"{channel.name}: its own rate is {storable_tree(rate)!r} Hz")
     sides, mode = sides_in(trial.bench), trial.task.mode
     found = [in_known_unit(channel, mode, sides) for channel in given]
-    return Announced(
+    return ArchivedChannels(
         tuple(channel for channel, _ in found),
         np.array([[times] for _, times in found]),
         tuple(

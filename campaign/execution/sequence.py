@@ -12,14 +12,14 @@ from queue import Empty, SimpleQueue
 
 from campaign.archive.layout.journal import Entry
 from campaign.backends.interface import Backend
-from campaign.execution.attempt import Executed
+from campaign.execution.attempt import AttemptEnd
 from campaign.execution.batches import Batches
 from campaign.execution.decisions import Responses, Rests, extremes
 from campaign.execution.executors import BatchExecutor, WorkerLostError
 from campaign.execution.external_stop import OutsideWatch
 from campaign.execution.operator_prompts import Attendance, SetUp
 from campaign.execution.progress import Ledger
-from campaign.execution.safety import Ended, make_safe
+from campaign.execution.safety import EarlyEnd, make_safe
 from campaign.execution.stages import Stages
 from campaign.execution.stop import StopSwitch
 from campaign.execution.writer import PlanWriter
@@ -33,7 +33,7 @@ ENDING = 10.0
 """s that the other trials may take to end when the run cannot go on."""
 MOST_LOST = 3
 """Worker processes that may die before the run ends: the trials themselves may be the cause."""
-_Ended = tuple[Trial, Executed, Sequence[Entry]]
+_Ended = tuple[Trial, AttemptEnd, Sequence[Entry]]
 
 
 class TrialSequence:
@@ -51,7 +51,7 @@ class TrialSequence:
         writer: PlanWriter,
         workers: int,
         ledger: Ledger,
-        ended: Ended,
+        ended: EarlyEnd,
         stop: StopSwitch,
         policy: Policy,
         attendance: Attendance,
@@ -204,7 +204,7 @@ class TrialSequence:
         self._attendance.wait(rest.pause, self.outside)
         self._rests.taken()
 
-    def _settle(self, trial: Trial, executed: Executed) -> None:
+    def _settle(self, trial: Trial, executed: AttemptEnd) -> None:
         """What follows from a trial's end: is the bench safe, is it tried again, does it go on."""
         ending = executed.ending
         self._under_way.pop(trial.number, None)
@@ -223,14 +223,14 @@ class TrialSequence:
             self._ledger.end(trial, ending)
             self._stages.ended(trial)
 
-    def _say_remarks(self, trial: Trial, executed: Executed) -> None:
+    def _say_remarks(self, trial: Trial, executed: AttemptEnd) -> None:
         """Once for each test."""
         for remark in executed.remarks:
             if (trial.test, remark) not in self._said:
                 self._said.add((trial.test, remark))
                 self._ledger.remark(f"{trial.test}: {remark}")
 
-    def _say_unmeasured(self, trial: Trial, executed: Executed) -> None:
+    def _say_unmeasured(self, trial: Trial, executed: AttemptEnd) -> None:
         if executed.unmeasured:
             self._writer.decision("no metrics", executed.unmeasured, trial.number)
             self._ledger.remark(f"{trial.name}: no metrics are archived: {executed.unmeasured}")

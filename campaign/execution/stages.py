@@ -32,7 +32,7 @@ from campaign.experiments.interface import (
     bench_of,
     options_of,
 )
-from campaign.protocol.stage_trials import Followed, Refusal, TooMuchError, follow
+from campaign.protocol.stage_trials import Refusal, StageTrials, TooMuchError, follow
 from campaign.protocol.stages import PlannedStage, place_of
 from campaign.reason import Cause
 from campaign.trial import Role, Trial, canonical_json
@@ -141,7 +141,7 @@ class Stages:
         Whatever goes wrong in it costs the stage only. Raises ArchiveError when it cannot be kept.
         """
         stage = self._waiting[0]
-        found, reason = Followed(()), ""
+        found, reason = StageTrials(()), ""
         try:
             found = self._follow(stage)
         except (TooMuchError, CampaignError) as error:
@@ -158,7 +158,7 @@ class Stages:
             self._failures.append(text)
         return found.trials, _remarks(entry)
 
-    def _follow(self, stage: PlannedStage) -> Followed:
+    def _follow(self, stage: PlannedStage) -> StageTrials:
         trials = self._trials[stage.place]
         first = trials[0]
         experiment = self._experiments[first.kind]

@@ -33,7 +33,7 @@ from campaign.execution.guardian import (
     REST,
     STOPPER,
     VARIABLE,
-    Asked,
+    StopRequests,
 )
 from campaign.execution.safety import NOT_SAFE, SAFE
 from campaign.plain_text import printable
@@ -201,7 +201,7 @@ class StopSwitch:
 
     def _watch(self, come: int) -> None:
         """Count what each of those has heard who listen: the largest number is true."""
-        heard = {0: Asked(), OURS: Asked(), _OWN: Asked()}
+        heard = {0: StopRequests(), OURS: StopRequests(), _OWN: StopRequests()}
         while data := os.read(come, _PIECE):
             for byte in data:
                 number = byte % OURS

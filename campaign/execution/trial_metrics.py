@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import campaign
-from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
 from campaign.backends.calls import Call
@@ -34,7 +34,7 @@ LIMIT = 60.0
 
 
 @dataclass(frozen=True)
-class Measuring:
+class TrialMeasurement:
     """Measures completed measurements of the experiments that say how; a `Measure`.
 
     Any thread may use it.
@@ -48,38 +48,42 @@ class Measuring:
     limit: float = LIMIT
     _authors: dict[str, str] = field(default_factory=dict)  # by kind
 
-    def __call__(self, data: ArchivedTrial) -> Measured:
+    def __call__(self, data: ArchivedTrial) -> ArchivedMetrics:
         if data.ending.outcome is not Outcome.COMPLETED or data.trial.role is not Role.MEASUREMENT:
-            return Measured()
+            return ArchivedMetrics()
         with self.timing.span(Work.MEASURING):
             return self._in_time(data)
 
-    def _in_time(self, data: ArchivedTrial) -> Measured:
+    def _in_time(self, data: ArchivedTrial) -> ArchivedMetrics:
         """In a thread of its own, since nothing else can be left behind when it hangs."""
         call = Call(partial(self._measured, data), "measuring")
         if call.has_ended(self.limit):
             return call.answer()
-        return Measured(problem=f"measuring did not end within {self.limit:g} s")
+        return ArchivedMetrics(problem=f"measuring did not end within {self.limit:g} s")
 
-    def _measured(self, data: ArchivedTrial) -> Measured:
+    def _measured(self, data: ArchivedTrial) -> ArchivedMetrics:
         began = time.thread_time()  # of a thread that no span knows
         try:
             return self._found(data)
         finally:
             self.timing.add(Work.MEASURING, time.thread_time() - began)
 
-    def _found(self, data: ArchivedTrial) -> Measured:
+    def _found(self, data: ArchivedTrial) -> ArchivedMetrics:
         try:
             experiment = self.experiments.get(data.trial.kind)
             if experiment is None or experiment.measure is None:
-                return Measured()
+                return ArchivedMetrics()
             estimates = checked(measured(experiment, data))
-            return Measured(estimates, self._by(data.trial.kind)) if estimates else Measured()
+            return (
+                ArchivedMetrics(estimates, self._by(data.trial.kind))
+                if estimates
+                else ArchivedMetrics()
+            )
         except (ValueError, UsageError) as error:
             with axis_terms(sides_in(data.trial.bench)):
-                return Measured(problem=in_axis_terms(_one_line(str(error))))
+                return ArchivedMetrics(problem=in_axis_terms(_one_line(str(error))))
         except BaseException as error:  # noqa: BLE001 - a plug-in must not cost the trial
-            return Measured(problem=_one_line(f"measuring failed: {describe(error)}"))
+            return ArchivedMetrics(problem=_one_line(f"measuring failed: {describe(error)}"))
 
     def _by(self, kind: str) -> str:
         if kind not in self._authors:

@@ -10,7 +10,7 @@ from campaign.archive.layout.header import RunStatus
 from campaign.archive.layout.journal import Entry
 from campaign.archive.reading.archived_metrics import Measure
 from campaign.estimate import Estimate
-from campaign.policy import KEEP_ALL, Keeping
+from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import Array, ChannelInfo, Ending, Event, SafeState
 from campaign.trial import Trial
 
@@ -40,7 +40,7 @@ class TrialWriter(Protocol):
 class Begins(Protocol):
     """Opens a file for each attempt at a trial."""
 
-    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
+    def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> TrialWriter:
         """Open the next attempt at a trial for its samples."""
 
 

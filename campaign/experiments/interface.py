@@ -33,7 +33,7 @@ from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
 from campaign.result import RecordingDoubt, Result
-from campaign.trial import Most, Offered, Tree, Trial, TrialRequest, canonical_json
+from campaign.trial import Most, OfferedRecording, Tree, Trial, TrialRequest, canonical_json
 
 NOT_TOLD = Cause("not in the recording", "the recording does not tell it")
 
@@ -115,7 +115,7 @@ def with_samples(trials: Iterable[TrialData]) -> list[TrialData]:
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenValue:
     """A value (SI) that an experiment chose for an option that a test does not write, and why."""
 
     value: Any
@@ -224,13 +224,13 @@ class Experiment:
     analyse: Callable[[TestData], Result]
     measure: Callable[[TrialData], Sequence[Estimate]] | None = None
     needs_samples: bool = True
-    fit: Callable[[Any, Bench], Mapping[str, Chosen]] | None = None
+    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
     requires: Mapping[str, str] = field(default_factory=dict)
     can_use: Mapping[str, str] = field(default_factory=dict)
     seeks_instability: bool = False
     perturbs_bench: bool = False
     stages: tuple[Stage, ...] = ()
-    recorded: Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None = None
+    recorded: Callable[[Any, Bench, OfferedRecording], Iterable[TrialRequest]] | None = None
     windows: tuple[str, ...] = ()
     warnings: Callable[[Any, Bench], Iterable[str]] | None = None
     most_samples: int | None = None

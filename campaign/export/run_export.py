@@ -23,7 +23,7 @@ TABLE = "trials.csv"
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportResult:
     """What came of an export.
 
     Attributes:
@@ -43,7 +43,7 @@ def export_run(
     folder: Path,
     tests: Sequence[str] = (),
     numbers: Sequence[int] = (),
-) -> Exported:
+) -> ExportResult:
     """Write the trials of a run into a new folder; all of them when none are chosen.
 
     The folder appears when everything is in it; after an error there is none.
@@ -74,7 +74,7 @@ def export_run(
         raise UsageError(f"{folder}: cannot be written: {error.strerror or error}") from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
-    return Exported(folder, files, damaged)
+    return ExportResult(folder, files, damaged)
 
 
 def _chosen(run: RunView, tests: Sequence[str], numbers: Sequence[int]) -> list[TrialView]:

@@ -7,7 +7,7 @@ from itertools import combinations
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Section
-from campaign.identify.tables import told
+from campaign.identify.tables import parameter_text
 from campaign.text import words
 
 SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
@@ -43,10 +43,10 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
         if gap <= 0 or one is None or other is None:
             continue
         yield (
-            f"Methods disagree about {words(name)}: {one[0]} finds {told(one[1], one[2])}, "
-            f"{other[0]} {told(other[1], other[2])}. At least one model lacks something of this "
-            "rig (look at what is left over), or the motion confuses place with direction: slide "
-            "over the same travel in both."
+            f"Methods disagree about {words(name)}: {one[0]} finds "
+            f"{parameter_text(one[1], one[2])}, {other[0]} {parameter_text(other[1], other[2])}. "
+            "At least one model lacks something of this rig (look at what is left over), or the "
+            "motion confuses place with direction: slide over the same travel in both."
         )
 
 

@@ -21,13 +21,13 @@ from campaign.experiments.interface import (
     say_at,
     suitable,
 )
-from campaign.identify.material import Chosen, same_recordings
-from campaign.parameter import NOTHING_IDENTIFIED, Identified, Parameter
+from campaign.identify.material import ChosenRun, same_recordings
+from campaign.parameter import NOTHING_IDENTIFIED, IdentifiedRig, Parameter
 from campaign.physics.bench import Bench
 from campaign.protocol.files import Overridden
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
-from campaign.references.verdict import Judged, with_verdicts
+from campaign.references.verdict import JudgedNumber, with_verdicts
 from campaign.result import Result
 
 FRICTION = "friction."
@@ -50,7 +50,7 @@ class Section:
     trials: tuple[int, ...] = ()
     result: Result | None = None
     problem: str = ""
-    changes: tuple[Judged, ...] = ()
+    changes: tuple[JudgedNumber, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -58,7 +58,7 @@ class Section:
         return self.experiment.model
 
     @property
-    def identified(self) -> Identified:
+    def identified(self) -> IdentifiedRig:
         """Of a section without a result, nothing."""
         return self.result.identified if self.result is not None else NOTHING_IDENTIFIED
 
@@ -73,9 +73,9 @@ class Identification:
         sections: one for each model, those that found nothing last.
     """
 
-    chosen: Chosen
-    validation: Chosen | None
-    compared: Chosen | None
+    chosen: ChosenRun
+    validation: ChosenRun | None
+    compared: ChosenRun | None
     bench: Bench
     sections: tuple[Section, ...]
 
@@ -86,12 +86,12 @@ class Identification:
 
 
 def identify(
-    chosen: Chosen,
+    chosen: ChosenRun,
     known: Mapping[str, Experiment],
     *,
     models: Sequence[str] = (),
-    validation: Chosen | None = None,
-    compared: Chosen | None = None,
+    validation: ChosenRun | None = None,
+    compared: ChosenRun | None = None,
     settings: Sequence[str] = (),
     say: Callable[[str], None] = no_progress,
 ) -> Identification:
@@ -125,7 +125,7 @@ def identify(
     return Identification(chosen, validation, compared, bench, tuple(_judged(sections)))
 
 
-def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
+def _refuse_same(chosen: ChosenRun, other: ChosenRun, option: str) -> None:
     """Raises UsageError where recordings would be held against themselves."""
     both, what = [], "trials that the model is fitted to"
     if chosen.run.identity == other.run.identity:
@@ -142,7 +142,7 @@ def _refuse_same(chosen: Chosen, other: Chosen, option: str) -> None:
         )
 
 
-def _bench(chosen: Chosen) -> Bench:
+def _bench(chosen: ChosenRun) -> Bench:
     tests: dict[str, dict[str, None]] = {}
     for each in chosen.trials:
         tests.setdefault(str(each.trial.bench.get("name", "")), {})[each.trial.test] = None
@@ -193,8 +193,8 @@ def _section(
     experiment: Experiment,
     options: Any,
     bench: Bench,
-    chosen: Chosen,
-    validation: Chosen | None,
+    chosen: ChosenRun,
+    validation: ChosenRun | None,
     say: Callable[[str], None],
 ) -> Section:
     told = f"{experiment.model.name}, {chosen.name}"
@@ -228,7 +228,7 @@ def _section(
 
 
 def fitted_again(
-    section: Section, bench: Bench, chosen: Chosen, say: Callable[[str], None] = no_progress
+    section: Section, bench: Bench, chosen: ChosenRun, say: Callable[[str], None] = no_progress
 ) -> Section:
     """The model that a section settled on, fitted to other trials of the same rig."""
     options = section.options.model_copy(update=dict(section.identified.again))
@@ -243,7 +243,7 @@ def _with_place(result: Result, bench: Bench) -> Result:
     return replace(result, identified=found, notes=tuple(notes))
 
 
-def _with_whole_tables(found: Identified, bench: Bench, notes: list[str]) -> Identified:
+def _with_whole_tables(found: IdentifiedRig, bench: Bench, notes: list[str]) -> IdentifiedRig:
     """Without keys of a table that the bench has not, and that would lack others."""
     told = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
     for table, keys in WHOLE.items():
@@ -260,7 +260,7 @@ def _with_whole_tables(found: Identified, bench: Bench, notes: list[str]) -> Ide
     return found
 
 
-def _with_own_friction(found: Identified, bench: Bench, notes: list[str]) -> Identified:
+def _with_own_friction(found: IdentifiedRig, bench: Bench, notes: list[str]) -> IdentifiedRig:
     """Friction of all interfaces together is that of none: it goes to no bench with several.
 
     What compensates it has a model of all together, and takes it.
@@ -291,7 +291,7 @@ def _lumped(parameter: Parameter) -> Parameter:
 def _compared(
     section: Section,
     bench: Bench,
-    compared: Chosen,
+    compared: ChosenRun,
     say: Callable[[str], None],
 ) -> Section:
     """The same model of another run, and how its parameters differ."""
@@ -300,7 +300,7 @@ def _compared(
         return replace(section, problem=f"{compared.name}: {other.problem}")
     after = {each.estimate.name: each.estimate for each in other.identified.parameters}
     changes = (
-        Judged.of(
+        JudgedNumber.of(
             each.estimate,
             after[each.estimate.name],
             shared=_shared(each.estimate),

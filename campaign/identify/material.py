@@ -16,7 +16,7 @@ from campaign.trial import Outcome, Role
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenRun:
     """A run, and the trials of it that are meant.
 
     Attributes:
@@ -38,7 +38,7 @@ class Chosen:
         return tuple(t for t in self.trials if t.trial.bench.get("name") == bench)
 
 
-def choose(results: Path, named: str) -> Chosen:
+def choose(results: Path, named: str) -> ChosenRun:
     """What `RUN` or `RUN:TEST` means. Raises UsageError where there is no such test or trial."""
     path, test = _split(results, named)
     run = open_run(path)
@@ -57,10 +57,10 @@ def choose(results: Path, named: str) -> Chosen:
     if not trials:
         of = f"of {test!r} " if test else ""
         raise UsageError(f"{run.name}: no trial {of}was completed; there is nothing to identify")
-    return Chosen(run, test, trials)
+    return ChosenRun(run, test, trials)
 
 
-def same_recordings(chosen: Chosen, other: Chosen) -> list[int]:
+def same_recordings(chosen: ChosenRun, other: ChosenRun) -> list[int]:
     """Numbers of trials of `other` whose samples are those of a trial of `chosen`.
 
     A recording that is imported twice is in two runs, and is one recording: channels that both

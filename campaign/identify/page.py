@@ -18,11 +18,11 @@ from campaign.identify.identification import Identification, Section, widest
 from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
 from campaign.report.article import write_article
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import draw, series_of
 from campaign.report.formats.interface import Format
 from campaign.report.page.article import Article, Part, problems_part
-from campaign.report.page.article_page import Making
+from campaign.report.page.article_page import PageParts
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.pieces import Items, Paragraph, Piece
 from campaign.report.palette import Look, looks_of_page
@@ -48,7 +48,7 @@ PAGE = f"{NAME}.html"
 
 
 @dataclass
-class _Making(Making):
+class _Making(PageParts):
     looks: Mapping[str, Look] = field(default_factory=dict)
     """Of the series of all figures: the same series looks the same all over the page."""
 
@@ -191,7 +191,7 @@ def _looks(found: Identification) -> Mapping[str, Look]:
 
 
 def _drawn(figure: Figure, name: str, making: _Making) -> ShownFigure:
-    drawn = Drawn.of(draw(figure, chosen=making.looks), figure)
+    drawn = DrawingFiles.of(draw(figure, chosen=making.looks), figure)
     return making.folder.figure(figure, drawn, (), f"{name}-{figure.key}", trials=figure.trials)
 
 

@@ -9,7 +9,7 @@ from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.family import RATE
 from campaign.identify.identification import Section
-from campaign.references.verdict import Judged
+from campaign.references.verdict import JudgedNumber
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit, words
 from campaign.units import convert
@@ -22,7 +22,7 @@ def parameters_table(sections: Sequence[Section]) -> Table:
     rows: list[Mapping[str, Cell]] = [
         {
             "parameter": words(parameter.estimate.name),
-            "value": told(parameter.estimate, parameter.display),
+            "value": parameter_text(parameter.estimate, parameter.display),
             "unit": pretty_unit(parameter.display or parameter.estimate.unit),
             "origin": parameter.estimate.origin.value,
             "systematic": systematic(parameter.estimate, parameter.display),
@@ -74,20 +74,20 @@ def changes_table(before: str, after: str, section: Section) -> Table:
     )  # fmt: skip
 
 
-def _change_row(change: Judged) -> Mapping[str, Cell]:
+def _change_row(change: JudgedNumber) -> Mapping[str, Cell]:
     p = change.adjusted
     return {
         "parameter": words(change.quantity),
         "unit": pretty_unit(change.reference.unit),
-        "before": told(change.reference),
-        "after": told(change.other),
-        "change": told(change.found.difference),
+        "before": parameter_text(change.reference),
+        "after": parameter_text(change.other),
+        "change": parameter_text(change.found.difference),
         "p": "" if p is None else f"{p:.2g}",
         "verdict": change.outcome,
     }
 
 
-def told(estimate: Estimate, display: str = "") -> str:
+def parameter_text(estimate: Estimate, display: str = "") -> str:
     """`20.14 ± 0.41`; a bound, or that it is not determined."""
     if estimate.origin is Origin.NOT_DETERMINED:
         return "not determined"

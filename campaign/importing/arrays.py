@@ -24,7 +24,7 @@ OPAQUE = (
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedArray:
     """An array of one or two dimensions with a name, read in parts.
 
     Attributes:
@@ -51,7 +51,7 @@ class Named:
         return 1 if len(self.shape) == 1 else min(self.shape)
 
 
-def named(name: str, array: np.ndarray, unit: str = "") -> Named | None:
+def named(name: str, array: np.ndarray, unit: str = "") -> NamedArray | None:
     """An array that is in memory; None where it is nothing that is recorded over time."""
     array = np.squeeze(array)
     if array.ndim not in (1, 2) or array.dtype.kind not in "fiub" or array.size < 2:
@@ -65,10 +65,10 @@ def named(name: str, array: np.ndarray, unit: str = "") -> Named | None:
     def part(start: int, stop: int) -> Array:
         return array[start:stop].astype(np.float64)
 
-    return Named(name, array.shape, part, unit, by_rows)
+    return NamedArray(name, array.shape, part, unit, by_rows)
 
 
-def tables_of(arrays: Sequence[Named]) -> list[Table]:
+def tables_of(arrays: Sequence[NamedArray]) -> list[Table]:
     """A table for each length, the longest first."""
     lengths = sorted({each.length for each in arrays}, reverse=True)
     return [
@@ -80,10 +80,10 @@ def tables_of(arrays: Sequence[Named]) -> list[Table]:
     ]
 
 
-def table_of(arrays: Sequence[Named], name: str) -> Table:
+def table_of(arrays: Sequence[NamedArray], name: str) -> Table:
     """Arrays of one length as one table."""
     columns: list[Column] = []
-    where: list[tuple[Named, int]] = []
+    where: list[tuple[NamedArray, int]] = []
     for array in arrays:
         for k in range(array.width):
             of = f"({k + 1},:)" if array.by_rows else f"(:,{k + 1})"
@@ -95,7 +95,7 @@ def table_of(arrays: Sequence[Named], name: str) -> Table:
 
 
 def _read(
-    where: Sequence[tuple[Named, int]], length: int, places: Sequence[int]
+    where: Sequence[tuple[NamedArray, int]], length: int, places: Sequence[int]
 ) -> Iterator[Array]:
     for start in range(0, length, ROWS):
         stop = min(start + ROWS, length)

@@ -21,7 +21,7 @@ from campaign.channels import (
     Quantity,
     info,
 )
-from campaign.importing.description import Cells, Made
+from campaign.importing.description import Cells, ChannelSource
 from campaign.importing.mapping import ChannelColumn
 from campaign.recording import ChannelInfo
 from campaign.unit_grammar import ONE, Unit, parse_unit
@@ -61,7 +61,7 @@ class RigFacts:
 
 def made_of_column(
     name: str, entry: ChannelColumn, cells: Cells, stated: str, rig: RigFacts
-) -> Made:
+) -> ChannelSource:
     """The channel that a column is.
 
     Args:
@@ -92,7 +92,9 @@ def made_of_column(
     )
 
 
-def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts) -> Made:
+def made_of_channel(
+    name: str, entry: ChannelColumn, source: ChannelSource, rig: RigFacts
+) -> ChannelSource:
     """The channel that is derived from another, as the mapping says.
 
     Raises ValueError where nothing leads from one to the other.
@@ -125,8 +127,8 @@ def made_of_channel(name: str, entry: ChannelColumn, source: Made, rig: RigFacts
     )
 
 
-def _made(name: str, what: ChannelInfo, **of: Any) -> Made:
-    return Made(
+def _made(name: str, what: ChannelInfo, **of: Any) -> ChannelSource:
+    return ChannelSource(
         name=name, unit=what.unit, label=what.label, display_unit=what.display_unit, **of
     )  # fmt: skip
 
@@ -169,8 +171,8 @@ def sufficient(have: Collection[str], rig: RigFacts) -> frozenset[str]:
 
 
 def following(
-    wanted: Collection[str], have: Mapping[str, Made], rig: RigFacts
-) -> Iterator[tuple[Made, str]]:
+    wanted: Collection[str], have: Mapping[str, ChannelSource], rig: RigFacts
+) -> Iterator[tuple[ChannelSource, str]]:
     """Channels that are wanted and not there, made of others, and what to remark; in their order.
 
     A channel on the way to a wanted one comes before it.

@@ -18,7 +18,7 @@ from campaign.options import Options
 from campaign.recording import ChannelInfo
 
 
-class FileUsed(Options):
+class FileSnapshot(Options):
     """A file as it was when the plan was made."""
 
     name: str
@@ -59,7 +59,7 @@ class ClockUsed(Options):
     """Time of row 0 by such a clock (s)."""
 
 
-class Made(Options):
+class ChannelSource(Options):
     """A channel: factor * (column - offset), read `shift` samples later; or from another channel.
 
     `how` = column, copy, derivative or integral; where it is made from another channel, that one
@@ -100,13 +100,13 @@ class Made(Options):
         )
 
 
-class Described(Options):
+class RecordingDescription(Options):
     """A recording that a trial is served from.
 
     The trial's time is 0 at its first row, and its samples are at k / sample_rate.
     """
 
-    files: tuple[FileUsed, ...] = Field(min_length=1)
+    files: tuple[FileSnapshot, ...] = Field(min_length=1)
     table: tuple[int, int]
     """File and table whose rows are the trial's samples."""
     first: int
@@ -122,7 +122,7 @@ class Described(Options):
     """Samples at the beginning that only serve channels which are put back by less."""
     repairs: tuple[str, ...] = ()
     """What is done to the times."""
-    channels: tuple[Made, ...]
+    channels: tuple[ChannelSource, ...]
     remarks: tuple[str, ...] = ()
     """What was done, and what was seen, in sentences."""
 
@@ -132,14 +132,14 @@ class Described(Options):
         return label(self.files, self.first)
 
 
-def label(files: Sequence[FileUsed], first: int = 0) -> str:
+def label(files: Sequence[FileSnapshot], first: int = 0) -> str:
     """Files from a row on, for people."""
     names = " and ".join(each.name for each in files)
     return f"{names} from row {first + 1}" if first else names
 
 
-def file_used(path: Path, name: str) -> FileUsed:
+def file_used(path: Path, name: str) -> FileSnapshot:
     """A file with its digest. Raises RecordingError when it cannot be read."""
     with regular(path) as file:
         digest, size = hashlib.file_digest(file, "sha256"), file.tell()
-    return FileUsed(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)
+    return FileSnapshot(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

@@ -21,10 +21,10 @@ from campaign.importing.derived_channels import (
 )
 from campaign.importing.description import (
     Cells,
+    ChannelSource,
     ClockUsed,
-    Described,
-    FileUsed,
-    Made,
+    FileSnapshot,
+    RecordingDescription,
     file_used,
     label,
 )
@@ -60,7 +60,7 @@ def describe(
     names: Sequence[str],
     rig: RigFacts,
     wanted: Collection[str],
-) -> tuple[OpenedFiles, tuple[tuple[Described, Stretch], ...]]:
+) -> tuple[OpenedFiles, tuple[tuple[RecordingDescription, Stretch], ...]]:
     """The trials that an entry's files hold; the files are left open.
 
     Args:
@@ -95,9 +95,9 @@ class _Finding:
     layout: Layout
     rig: RigFacts
     wanted: frozenset[str]
-    used: tuple[FileUsed, ...]
+    used: tuple[FileSnapshot, ...]
 
-    def trials(self) -> list[tuple[Described, Stretch]]:
+    def trials(self) -> list[tuple[RecordingDescription, Stretch]]:
         """Raises MappingError with everything that is wrong."""
         faults: list[MappingError] = []
         remarks: list[str] = []
@@ -111,7 +111,7 @@ class _Finding:
         for table in sorted({each.rows_of for each in cells.values()}):
             with _collected(faults):
                 clocks[table] = self._clock(*table)
-        made: dict[str, Made] = {}
+        made: dict[str, ChannelSource] = {}
         for name in (*cells, *(name for name in channels if channels[name].derive)):
             with _collected(faults):
                 self._make(name, cells, made, remarks)
@@ -135,7 +135,11 @@ class _Finding:
         return found
 
     def _make(
-        self, name: str, cells: Mapping[str, Cells], made: dict[str, Made], remarks: list[str]
+        self,
+        name: str,
+        cells: Mapping[str, Cells],
+        made: dict[str, ChannelSource],
+        remarks: list[str],
     ) -> None:
         """Add a channel to those that are `made`; one whose source is wrong is left out."""
         channel = self.layout.channels[name]
@@ -263,10 +267,10 @@ class _Finding:
         self,
         main: tuple[int, int],
         stretch: Stretch,
-        columns: dict[str, Made],
+        columns: dict[str, ChannelSource],
         clocks: dict[tuple[int, int], ClockUsed],
         told: Sequence[str],
-    ) -> Described:
+    ) -> RecordingDescription:
         clock = clocks[main]
         repairs = self.layout.time.repair if self.layout.time is not None else ()
         with self._told(("file",), stretch.first):
@@ -279,7 +283,7 @@ class _Finding:
         if (left := even.samples - skip - cut) < SHORTEST:
             what = f"its delays and repairs leave {counted(max(left, 0), 'sample')}, and {NEEDED}"
             raise self._wrong(what, ("file",))
-        described = Described(
+        described = RecordingDescription(
             files=self.used,
             table=main,
             first=stretch.first,
@@ -294,7 +298,7 @@ class _Finding:
         )
         return self._checked(described)
 
-    def _checked(self, described: Described) -> Described:
+    def _checked(self, described: RecordingDescription) -> RecordingDescription:
         """With what its channels show remarked, and scales that begin anew made continuous.
 
         Raises MappingError for the defects that nobody has accepted.
@@ -323,12 +327,12 @@ class _Finding:
 
     def _placed(
         self,
-        made: dict[str, Made],
+        made: dict[str, ChannelSource],
         main: tuple[int, int],
         clocks: dict[tuple[int, int], ClockUsed],
         even: EvenClock,
         remarks: list[str],
-    ) -> Iterator[Made]:
+    ) -> Iterator[ChannelSource]:
         """The channels over an even clock: late ones put back, those of slower tables held."""
         for name, one in made.items():
             if one.cells is not None:

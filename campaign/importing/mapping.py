@@ -112,7 +112,7 @@ class ChannelColumn(ColumnPlace):
     was meant to be at its limit. A reader is told of them."""
 
 
-class Where(Options):
+class RowCondition(Options):
     """Rows in which a column has a value."""
 
     column: str | int
@@ -146,7 +146,7 @@ class RecordingEntry(Options):
     """Begin here, by the file's own time..."""
     stop: Time | None = None
     """... and end here."""
-    where: Where | None = None
+    where: RowCondition | None = None
     """Only the rows in which a column has a value; each stretch of them is a trial."""
     each: str | int | None = None
     """A column that tells trials apart: a trial for each stretch in which it does not change."""

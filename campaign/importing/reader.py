@@ -12,7 +12,13 @@ import numpy as np
 from campaign.importing.defects import Defect, find
 from campaign.importing.defects.clock import EvenClock, even_clock
 from campaign.importing.defects.samples import continuous
-from campaign.importing.description import Cells, ClockUsed, Described, Made, file_used
+from campaign.importing.description import (
+    Cells,
+    ChannelSource,
+    ClockUsed,
+    RecordingDescription,
+    file_used,
+)
 from campaign.importing.interface import ROWS, Array, RecordingError
 from campaign.importing.open_files import OpenedFiles
 from campaign.recording import Channel, Recording
@@ -27,7 +33,7 @@ class RecordingReader:
     Raises RecordingError where its files are no longer what they were.
     """
 
-    def __init__(self, described: Described, opened: OpenedFiles) -> None:
+    def __init__(self, described: RecordingDescription, opened: OpenedFiles) -> None:
         self.described = described
         self._opened = opened
         self._made = {each.name: each for each in described.channels}
@@ -82,7 +88,7 @@ class RecordingReader:
                     found.add((each.kind, each.channels))
                     yield replace(each, rows=(each.rows[0] + first, each.rows[1] + first))
 
-    def _channel(self, made: Made, first: int, stop: int) -> Array:
+    def _channel(self, made: ChannelSource, first: int, stop: int) -> Array:
         if made.period is not None or made.how == "integral":
             return self._all_of(made)[first:stop]
         if made.cells is not None:
@@ -96,7 +102,7 @@ class RecordingReader:
         cut: Array = slope[first - before : first - before + stop - first]
         return made.factor * self.described.sample_rate * cut
 
-    def _all_of(self, made: Made) -> Array:
+    def _all_of(self, made: ChannelSource) -> Array:
         """All of a channel of which no part stands alone; it is kept.
 
         One whose scale begins anew; or an integral, by trapezoids: behind a lost sample nothing of
@@ -114,7 +120,7 @@ class RecordingReader:
             self._whole[made.name] = values
         return self._whole[made.name]
 
-    def _column(self, made: Made, cells: Cells, first: int, stop: int) -> Array:
+    def _column(self, made: ChannelSource, cells: Cells, first: int, stop: int) -> Array:
         if made.clock is not None:
             return self._held(made, cells, made.clock, first, stop)
         places = np.arange(first, stop) + self.described.skip + made.shift
@@ -131,7 +137,9 @@ class RecordingReader:
             values[there] = np.interp(at[there] - low, np.arange(len(rows)), rows)
         return values
 
-    def _held(self, made: Made, cells: Cells, clock: ClockUsed, first: int, stop: int) -> Array:
+    def _held(
+        self, made: ChannelSource, cells: Cells, clock: ClockUsed, first: int, stop: int
+    ) -> Array:
         """Of another clock: the last value that was known at each time."""
         count = self._opened.rows(*cells.rows_of)
         times = self._opened.times(clock, 0, count)
@@ -165,7 +173,7 @@ class RecordingReader:
             raise RecordingError.of(path, str(error)) from None
 
 
-def paths_unchanged(described: Described) -> Sequence[Path]:
+def paths_unchanged(described: RecordingDescription) -> Sequence[Path]:
     """The files of a recording. Raises RecordingError where one is not what it was."""
     paths = []
     for used in described.files:

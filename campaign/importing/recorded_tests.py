@@ -16,7 +16,7 @@ from pydantic import JsonValue
 from campaign.errors import Problem, ProtocolError
 from campaign.estimate import Window
 from campaign.importing.derived_channels import RigFacts, sufficient
-from campaign.importing.description import Described
+from campaign.importing.description import RecordingDescription
 from campaign.importing.interface import RecordingError
 from campaign.importing.mapped_trials import describe
 from campaign.importing.mapping import Layout, MappingError, RecordingEntry, layouts, recordings_of
@@ -28,7 +28,7 @@ from campaign.protocol.files import Origin, Within
 from campaign.protocol.problems import allowed, shown
 from campaign.protocol.schema import ExperimentKind, Protocol, Test
 from campaign.text import nearest
-from campaign.trial import Offered, Task, TrialRequest
+from campaign.trial import OfferedRecording, Task, TrialRequest
 from campaign.units import to_si
 
 ROUNDING = 1e-9
@@ -88,7 +88,7 @@ class TestRecording:
     """One recording of a test: what its entry says, and what its files hold."""
 
     entry: RecordingEntry
-    described: Described
+    described: RecordingDescription
     stretch: Stretch
     opened: OpenedFiles
 
@@ -275,7 +275,7 @@ def _offered(
     if experiment.recorded is not None:
         can = sufficient([each.name for each in told.channels], RigFacts.of(bench))
         read = RecordingReader(told, found.opened).recording
-        offered = Offered(duration, told.sample_rate, can, conditions, windows, read)
+        offered = OfferedRecording(duration, told.sample_rate, can, conditions, windows, read)
         try:
             requests = list(experiment.recorded(options, bench, offered))
         except ValueError as error:
@@ -286,7 +286,10 @@ def _offered(
 
 
 def _served(
-    found: TestRecording, request: TrialRequest, told: Described, point: Mapping[str, JsonValue]
+    found: TestRecording,
+    request: TrialRequest,
+    told: RecordingDescription,
+    point: Mapping[str, JsonValue],
 ) -> TrialRequest:
     """The trial that is served from what is told of a recording."""
     rate = told.sample_rate
@@ -299,7 +302,7 @@ def _served(
     )
 
 
-def _part(told: Described, part: tuple[float, float] | None) -> Described:
+def _part(told: RecordingDescription, part: tuple[float, float] | None) -> RecordingDescription:
     """The samples of a part of a recording (s)."""
     if part is None:
         return told

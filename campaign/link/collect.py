@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import JsonValue
 
 from campaign.link.errors import RefusedError, SilenceError, ViolationError
-from campaign.link.records import Missing, RecordOrder
+from campaign.link.records import MissingRecords, RecordOrder
 from campaign.link.session import Session, Traffic
 from campaign.plain_text import printable
 from campaign.recording import Array, Ending, Fault, Outcome, Recorder, SafeState
@@ -20,7 +20,7 @@ from campaign.wire.messages import (
     Channel,
     End,
     Event,
-    Lost,
+    LostRecords,
     Resend,
     Samples,
     State,
@@ -117,11 +117,11 @@ class Collector:
             "bytes_received": traffic.received,
         }
 
-    def _arrived(self, record: Samples | Event | End | Lost) -> None:
+    def _arrived(self, record: Samples | Event | End | LostRecords) -> None:
         if record.trial != self._trial:
             return
         self._moved = time.monotonic()
-        if isinstance(record, Lost):
+        if isinstance(record, LostRecords):
             self._order.lost(record.first, record.count)
         else:
             self._order.add(record, self._moved)
@@ -165,7 +165,7 @@ class Collector:
 
     def _write(self) -> None:
         for item in self._order.take():
-            if isinstance(item, Missing):
+            if isinstance(item, MissingRecords):
                 self.lost += item.count
                 self._note(f"{item.count} records of the controller were lost")
             elif isinstance(item, Samples):

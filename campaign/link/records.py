@@ -26,7 +26,7 @@ FARTHEST = 1_000_000
 
 
 @dataclass(frozen=True)
-class Missing:
+class MissingRecords:
     """Records `first` to `first + count - 1` cannot be had."""
 
     first: int
@@ -89,19 +89,19 @@ class RecordOrder:
                 self._lost.add(number)
                 self._wanted.pop(number, None)
 
-    def take(self) -> list[Record | Missing]:
+    def take(self) -> list[Record | MissingRecords]:
         """What can be taken in order; a run of lost records as one Missing."""
-        taken: list[Record | Missing] = []
+        taken: list[Record | MissingRecords] = []
         while True:
             if self.next in self._come:
                 taken.append(self._come.pop(self.next))
             elif self.next in self._lost:
                 self._lost.remove(self.next)
                 last = taken[-1] if taken else None
-                if isinstance(last, Missing):
-                    taken[-1] = Missing(last.first, last.count + 1)
+                if isinstance(last, MissingRecords):
+                    taken[-1] = MissingRecords(last.first, last.count + 1)
                 else:
-                    taken.append(Missing(self.next, 1))
+                    taken.append(MissingRecords(self.next, 1))
             else:
                 return taken
             self.next += 1

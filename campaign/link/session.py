@@ -35,7 +35,7 @@ from campaign.wire.messages import (
     Event,
     Hello,
     Latch,
-    Lost,
+    LostRecords,
     Message,
     Nak,
     Release,
@@ -123,7 +123,7 @@ class Session:
         self.status: Status | None = None
         self.latch: Latch | None = None
         self._echoed = -math.inf  # when the controller last echoed a heartbeat of ours
-        self.records: Callable[[Samples | Event | End | Lost], None] = lambda record: None
+        self.records: Callable[[Samples | Event | End | LostRecords], None] = lambda record: None
         self.traffic = Traffic()
 
     @property
@@ -327,7 +327,7 @@ class Session:
         return True
 
     def _take(self, message: Message, now: float) -> None:
-        if isinstance(message, Samples | Event | End | Lost):
+        if isinstance(message, Samples | Event | End | LostRecords):
             self.records(message)
         elif isinstance(message, Status):
             self._check_boot(message.boot)

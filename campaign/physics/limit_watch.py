@@ -47,7 +47,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Watched:
+class WatchedLimit:
     """A limit that is watched in motion, and the channel that it is watched in.
 
     Units are those of a rotary axis.
@@ -60,10 +60,10 @@ class Watched:
 
 
 WATCHED = (
-    Watched("angle", "relative_angle", "rad", "deg"),
-    Watched("rate", "relative_rate", "rad/s", "deg/s"),
-    Watched("torque", "drive_torque", "N m", "N m"),
-    Watched("current", "motor_current", "A", "A"),
+    WatchedLimit("angle", "relative_angle", "rad", "deg"),
+    WatchedLimit("rate", "relative_rate", "rad/s", "deg/s"),
+    WatchedLimit("torque", "drive_torque", "N m", "N m"),
+    WatchedLimit("current", "motor_current", "A", "A"),
 )
 """In this order: of several limits that break at one sample, the first is named."""
 
@@ -177,14 +177,14 @@ class LimitWatch:
         self._rates = joined[len(joined) - kept :].copy()
 
     def _violation(
-        self, watched: Watched, index: int, value: float, bound: float, time: float
+        self, watched: WatchedLimit, index: int, value: float, bound: float, time: float
     ) -> Violation:
         with axis_terms(self._sides):
             text = self._text(watched, value, bound, time)
         sample = self._seen + index
         return Violation(sample, index, watched.limit, watched.channel, value, bound, text)
 
-    def _text(self, watched: Watched, value: float, bound: float, time: float) -> str:
+    def _text(self, watched: WatchedLimit, value: float, bound: float, time: float) -> str:
         shown, limit = (in_words(x, watched.unit, watched.display, ".6g") for x in (value, bound))
         mean = ""
         if watched.limit == "rate" and self._count > 1:

@@ -47,7 +47,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Made:
+class CompiledPart:
     """A part that is there now; seconds on the clock, and whether it had to be compiled."""
 
     name: str
@@ -78,13 +78,13 @@ def engine(width: int, bench: CompleteBench) -> Part:
     return Part(f"engine, {_side_by_side(width)}", partial(_simulate, empty, "rate", width))
 
 
-def make(part: Part) -> Made:
+def make(part: Part) -> CompiledPart:
     """Make one part, and say what it took."""
     compiling = _Compiling()
     began = time.perf_counter()
     with event.install_listener("numba:run_pass", compiling):
         part.make()
-    return Made(part.name, time.perf_counter() - began, compiling.seen)
+    return CompiledPart(part.name, time.perf_counter() - began, compiling.seen)
 
 
 def is_made(width: int) -> bool:

@@ -8,12 +8,14 @@ from typing import Any
 
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
-from campaign.protocol.expand import Expanded, place_hash
+from campaign.protocol.expand import ExpandedTest, place_hash
 from campaign.protocol.schema import Check
 from campaign.trial import Role, Trial
 
 
-def with_checks(tests: Sequence[Expanded], named: int, check: Check, seed: int) -> list[Expanded]:
+def with_checks(
+    tests: Sequence[ExpandedTest], named: int, check: Check, seed: int
+) -> list[ExpandedTest]:
     """The same tests with the checks among them, all numbered in the order of execution.
 
     After every `check.every` measurements of the whole plan comes the first measurement of the test
@@ -53,7 +55,7 @@ def nothing_to_check(check: Check) -> Problem:
     return check.origin.problem(("check", "test"), "value", message)
 
 
-def _first(test: Expanded) -> tuple[Trial, Bench]:
+def _first(test: ExpandedTest) -> tuple[Trial, Bench]:
     index = test.first_measurement
     if index is None:
         raise ValueError("no measurement to repeat")  # the plan has looked before

@@ -12,7 +12,7 @@ from campaign.protocol.files import (
     MOST_VALUES,
     TOO_MANY,
     Origin,
-    Patched,
+    PatchedTree,
     Source,
     UnreadableError,
     Within,
@@ -57,7 +57,7 @@ class Draft:
 
     @property
     def origin(self) -> Origin:
-        return Patched(Within(self.source, ("test", self.index)), self.patches)
+        return PatchedTree(Within(self.source, ("test", self.index)), self.patches)
 
     def apply(self, override: Override) -> None:
         """Change what `--set name.…` says; setting a swept path ends its sweep."""
@@ -77,7 +77,7 @@ class Draft:
 
 
 @dataclass
-class Collected:
+class Collection:
     """Everything read so far, and everything wrong with it."""
 
     drafts: list[Draft] = field(default_factory=list)
@@ -87,7 +87,7 @@ class Collected:
     values: int = 0
 
 
-def collect(path: Path, collected: Collected) -> Source | None:
+def collect(path: Path, collected: Collection) -> Source | None:
     """Read the protocol at `path` and its includes into `collected`; the main file's source."""
     try:
         return _collect(path, path.name, (), collected)
@@ -96,7 +96,7 @@ def collect(path: Path, collected: Collected) -> Source | None:
         return None
 
 
-def apply_overrides(overrides: list[Override], collected: Collected) -> None:
+def apply_overrides(overrides: list[Override], collected: Collection) -> None:
     """Change the drafts as `--set` says; top-level keys are the caller's."""
     names = [draft.name for draft in collected.drafts if draft.name]
     for override in overrides:
@@ -126,7 +126,7 @@ def top_level(source: Source, overrides: list[Override]) -> tuple[dict[str, Any]
         if key in settable and key not in named:
             tree = replaced(tree, override.keys, override.value)
             patches.append((override.keys, override.origin))
-    return tree, Patched(Within(source), patches)
+    return tree, PatchedTree(Within(source), patches)
 
 
 def sibling(source: Source, written: str) -> tuple[Path, str]:
@@ -141,7 +141,7 @@ def sibling(source: Source, written: str) -> tuple[Path, str]:
     return source.file.parent / written, str(PurePosixPath(*parts))
 
 
-def _collect(file: Path, name: str, chain: tuple[str, ...], collected: Collected) -> Source | None:
+def _collect(file: Path, name: str, chain: tuple[str, ...], collected: Collection) -> Source | None:
     source = read_source(file, name, "protocol")
     if not isinstance(source, Source):
         collected.problems += source
@@ -169,7 +169,7 @@ def _collect(file: Path, name: str, chain: tuple[str, ...], collected: Collected
 
 
 def _include(
-    source: Source, index: int, written: str, chain: tuple[str, ...], collected: Collected
+    source: Source, index: int, written: str, chain: tuple[str, ...], collected: Collection
 ) -> None:
     file, name = sibling(source, written)
 

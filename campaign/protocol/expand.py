@@ -20,7 +20,7 @@ from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_
 from campaign.protocol.points import Point, PointError, incomplete, points_of
 from campaign.protocol.schema import ExperimentKind, Test
 from campaign.protocol.stages import PlannedStage, most_of, planned_stages
-from campaign.protocol.swept_value_text import told_point
+from campaign.protocol.swept_value_text import point_text
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 Names = tuple[str, ...]
@@ -36,7 +36,7 @@ _ALL_GIVEN = set(Trial.model_fields)
 
 
 @dataclass(frozen=True)
-class Expanded:
+class ExpandedTest:
     """The trials of one test in order of execution, each with its bench as an object.
 
     `first_measurement` is the index of the first as written, whatever the order; None without one.
@@ -69,7 +69,7 @@ class _Place:
 
 def expand(
     test: Test, seed: int, before: int, allow_large: bool, left: int = memory.MOST
-) -> Expanded:
+) -> ExpandedTest:
     """The trials of `test`, numbered from `before` + 1, in `left` bytes. Raises PointError."""
     places: list[_Place] = []
     if memory.least(test) > left:
@@ -120,7 +120,7 @@ def expand(
     at = next((i for i, place in enumerate(ordered) if place is first), None)
     of_places = tuple(place.bench for place in ordered)
     told = tuple(dict.fromkeys(line for point in points for line in _warnings(test, point)))
-    return Expanded(trials, of_places, at, tuple(stages), spent + later, truths.plants, told)
+    return ExpandedTest(trials, of_places, at, tuple(stages), spent + later, truths.plants, told)
 
 
 def _setup(test: Test, point: Point) -> tuple[str, ...]:
@@ -267,7 +267,7 @@ def _trial(
         requires, can_use = channels_of(test.experiment, request)
         with axis_terms(sides_in(place.bench_tree)):
             note = in_axis_terms(request.note)
-            told = told_point(test.experiment.options, test.options, request.point)
+            told = point_text(test.experiment.options, test.options, request.point)
         known[key] = {
             "point": {**place.point.values, **request.point},
             "told": {**place.point.told, **told},

@@ -108,7 +108,7 @@ class Overridden:
 
 
 @dataclass(frozen=True)
-class Patched:
+class PatchedTree:
     """A tree of which some values come from elsewhere; the latest patch wins."""
 
     base: Origin

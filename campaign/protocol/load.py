@@ -16,7 +16,7 @@ from campaign.protocol.attachments import Read, attach, attach_values
 from campaign.protocol.axes import is_large, make_axis, value_problems
 from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.collect import (
-    Collected,
+    Collection,
     Draft,
     apply_overrides,
     collect,
@@ -26,7 +26,7 @@ from campaign.protocol.collect import (
 from campaign.protocol.files import (
     Kind,
     Origin,
-    Patched,
+    PatchedTree,
     Source,
     UnreadableError,
     Within,
@@ -75,7 +75,7 @@ def load_protocol(
 
     Raises ProtocolError with every mistake found in any of the files.
     """
-    collected = Collected()
+    collected = Collection()
     settings, collected.problems = parse_overrides(overrides)
     source = collect(path, collected)
     if source is None:
@@ -116,7 +116,7 @@ def load_protocol(
     )
 
 
-def _failed(collected: Collected) -> ProtocolError:
+def _failed(collected: Collection) -> ProtocolError:
     return ProtocolError(list(dict.fromkeys(collected.problems)))
 
 
@@ -124,7 +124,7 @@ def _failed(collected: Collected) -> ProtocolError:
 class _Loader:
     """Validates what was collected; problems go to `collected.problems`."""
 
-    collected: Collected
+    collected: Collection
     experiments: Mapping[str, ExperimentKind]
     truths: Truths
 
@@ -198,7 +198,7 @@ class _Loader:
             return None
         tree = _patched(bench.tree, draft.bench_patches) if bench is not None else None
         patches = [(patch.keys, patch.origin) for patch in draft.bench_patches]
-        bench_origin = Patched(Within(bench), patches) if bench is not None else draft.origin
+        bench_origin = PatchedTree(Within(bench), patches) if bench is not None else draft.origin
         valid = validate(Bench, tree, bench_origin) if tree is not None else None
         if isinstance(valid, list):
             self._report(*valid)
@@ -362,7 +362,7 @@ class _Loader:
             if not axis.of_bench:
                 tree = replaced(tree, axis.keys, axis.value(0))
                 patches.append((axis.keys, axis.value_origin(0)))
-        origin = Patched(draft.origin, patches)
+        origin = PatchedTree(draft.origin, patches)
         valid = validate(experiment.options, tree, origin, also=TestEntry.model_fields)
         if isinstance(valid, list):
             self._report(*valid)

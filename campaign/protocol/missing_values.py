@@ -12,7 +12,7 @@ from campaign.errors import Problem, ProtocolError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, lacking
 from campaign.physics.limits import unpredicted
-from campaign.protocol.expand import Expanded
+from campaign.protocol.expand import ExpandedTest
 from campaign.protocol.schema import Protocol, Test
 
 
@@ -43,7 +43,7 @@ def _problems(test: Test, needs: Sequence[str], who: str) -> Iterator[Problem]:
         yield test.bench_origin.problem((), "value", message)
 
 
-def not_predicted(expanded: Expanded) -> tuple[str, ...]:
+def not_predicted(expanded: ExpandedTest) -> tuple[str, ...]:
     """What a plan cannot tell of a test's trials for what their benches do not say; sentences."""
     told: dict[str, None] = {}
     seen: set[tuple[int, str]] = set()

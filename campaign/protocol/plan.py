@@ -20,7 +20,7 @@ from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.check_trials import nothing_to_check, with_checks
 from campaign.protocol.expand import (
     CHANNELS,
-    Expanded,
+    ExpandedTest,
     expand,
     memory_problem,
     samples_of,
@@ -237,9 +237,9 @@ def make_plan(
 
 def _expanded(
     protocol: Protocol, chosen: Sequence[Test], master: int, allow_large: bool
-) -> list[Expanded]:
+) -> list[ExpandedTest]:
     """Every chosen test's trials, the checks among them. Raises ProtocolError."""
-    expansions: list[Expanded] = []
+    expansions: list[ExpandedTest] = []
     problems: list[Problem] = []
     before, left = 0, memory.MOST
     for test in chosen:
@@ -262,7 +262,9 @@ def _expanded(
     return with_checks(expansions, named, check, seed_of(chosen[named], master))
 
 
-def _too_many(tests: Sequence[Test], expansions: Sequence[Expanded], allow: bool) -> list[Problem]:
+def _too_many(
+    tests: Sequence[Test], expansions: Sequence[ExpandedTest], allow: bool
+) -> list[Problem]:
     """Problems of a plan that its later stages make too large."""
     following = [most_of(expanded.stages).trials for expanded in expansions]
     total = sum(following) + sum(len(expanded.trials) for expanded in expansions)
@@ -288,7 +290,7 @@ def _size_of_stages(plan: Plan) -> int:
     return most.samples * BYTES + most.trials * each
 
 
-def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
+def _all_margins(expanded: ExpandedTest) -> Iterator[tuple[Trial, Margin]]:
     known: dict[tuple[int, Task], tuple[Margin, ...]] = {}
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
         if trial.recording:  # it has been executed, and broke what it broke
@@ -299,7 +301,9 @@ def _all_margins(expanded: Expanded) -> Iterator[tuple[Trial, Margin]]:
         yield from ((trial, margin) for margin in known[key])
 
 
-def _planned(test: Test, expanded: Expanded, uses: Sequence[LimitUse], master: int) -> PlannedTest:
+def _planned(
+    test: Test, expanded: ExpandedTest, uses: Sequence[LimitUse], master: int
+) -> PlannedTest:
     closest = _worst(use for use in uses if not use.margin.sensor)
     coarse = _worst(use for use in uses if use.margin.sensor and use.margin.fraction > CLOSE)
     first = first_point(test)

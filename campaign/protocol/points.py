@@ -13,7 +13,7 @@ from campaign.errors import Problem
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError
-from campaign.protocol.files import Patched
+from campaign.protocol.files import PatchedTree
 from campaign.protocol.matrix import Axis, points
 from campaign.protocol.positions import Keys
 from campaign.protocol.problems import validate
@@ -108,7 +108,7 @@ class _Cache:
             for axis, index in swept:
                 tree = replaced(tree, axis.keys, axis.value(index))
             patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
-            origin = Patched(self.test.origin, patches)
+            origin = PatchedTree(self.test.origin, patches)
             with axis_terms(sides_in(self.test.bench)):
                 valid = validate(self.test.experiment.options, tree, origin)
             if isinstance(valid, list):
@@ -168,7 +168,7 @@ class _Cache:
             raw = dict(self.test.bench)
             for axis, index in swept:
                 raw = replaced(raw, axis.keys, axis.value(index))
-            again = validate(Bench, raw, Patched(self.test.bench_origin, patches))
+            again = validate(Bench, raw, PatchedTree(self.test.bench_origin, patches))
             if isinstance(again, Bench):
                 return again
             raise PointError(again) from None

@@ -21,7 +21,7 @@ from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.files import Origin
 from campaign.protocol.matrix import Axis
 from campaign.protocol.positions import Keys
-from campaign.trial import Most, Offered, Tree, TrialRequest
+from campaign.trial import Most, OfferedRecording, Tree, TrialRequest
 
 Slug = Annotated[
     str,
@@ -89,7 +89,9 @@ class ExperimentKind(typing.Protocol):
     def stages(self) -> Sequence[StageKind]: ...
 
     @property
-    def recorded(self) -> Callable[[Any, Bench, Offered], Iterable[TrialRequest]] | None: ...
+    def recorded(
+        self,
+    ) -> Callable[[Any, Bench, OfferedRecording], Iterable[TrialRequest]] | None: ...
 
     @property
     def windows(self) -> tuple[str, ...]: ...

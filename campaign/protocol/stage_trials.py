@@ -22,7 +22,7 @@ from campaign.protocol.limit_check import in_display_units, one_count
 from campaign.protocol.loop_check import in_words
 from campaign.protocol.schema import ExperimentKind
 from campaign.protocol.stages import PlannedStage
-from campaign.protocol.swept_value_text import told_point
+from campaign.protocol.swept_value_text import point_text
 from campaign.trial import Most, Trial, TrialRequest, canonical_json
 
 ROUNDING = 1e-9
@@ -37,7 +37,7 @@ class TooMuchError(Exception):
 
 
 @dataclass(frozen=True)
-class Followed:
+class StageTrials:
     """The trials of a stage.
 
     Attributes:
@@ -56,7 +56,7 @@ def follow(
     planned: Trial,
     first: int,
     refusal: Refusal,
-) -> Followed:
+) -> StageTrials:
     """The trials for which a stage asks; one that may not be executed is refused by itself.
 
     Args:
@@ -91,7 +91,7 @@ def follow(
             refused.append((trial.label, why))
         else:
             trials.append(trial)
-    return Followed(tuple(trials), tuple(refused))
+    return StageTrials(tuple(trials), tuple(refused))
 
 
 def _check_size(most: Most, asked: Sequence[TrialRequest]) -> None:
@@ -123,7 +123,7 @@ def _trial(
     requires, can_use = channels_of(experiment, request)
     with axis_terms(sides_in(planned.bench)):
         note = in_axis_terms(request.note)
-        told = told_point(experiment.options, {}, request.point)
+        told = point_text(experiment.options, {}, request.point)
     return Trial.model_construct(  # as in a plan: what there is to check of it, `_check` does
         number=number,
         test=planned.test,

@@ -23,7 +23,7 @@ def as_written(value: Any) -> str:
     return f"{number:.{DIGITS}g} {unit}" if unit else ""
 
 
-def told_point(
+def point_text(
     options: type[Options], written: Mapping[str, Any], point: Mapping[str, Any]
 ) -> dict[str, str]:
     """What an experiment distinguishes its trials by, of what is a quantity.

@@ -21,7 +21,7 @@ FOLDER = "calibration"
 LEVEL = 0.95
 
 
-class Propagated(Options):
+class PropagationTable(Options):
     """`[propagation]` of a calibration's result."""
 
     protocol: str = ""
@@ -81,7 +81,7 @@ def calibration_part(sources: Mapping[str, str], fingerprint: str) -> Calibratio
         if PurePosixPath(name).parent.name != FOLDER:
             continue
         try:
-            found = Propagated.model_validate(tomllib.loads(text).get("propagation"))
+            found = PropagationTable.model_validate(tomllib.loads(text).get("propagation"))
         except (tomllib.TOMLDecodeError, ValidationError):
             continue
         if fingerprint and found.fingerprint == fingerprint:

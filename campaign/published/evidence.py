@@ -106,7 +106,7 @@ def with_cells(test: Evidence, published: Published) -> Evidence:
     return replace(test, cells=(*test.cells, *_covered(published, patterns)))
 
 
-def speaks_to(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
+def concerns(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
     """Whether a finding is of the cell's quantity and states each of the cell's conditions."""
     stated = {**known, **finding.conditions}
     return finding.quantity == cell.quantity and all(

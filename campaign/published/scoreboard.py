@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from campaign.estimate import Estimate, Origin
 from campaign.published.attempts import in_vain
 from campaign.published.draws import SEED, place_in, together, without_seed
-from campaign.published.evidence import Evidence, speaks_to, with_cells
+from campaign.published.evidence import Evidence, concerns, with_cells
 from campaign.published.provenance import OF_A_TRUTH
 from campaign.published.status import Status, status_of
 from campaign.published.values import Cell, Published
 from campaign.published.verdicts import (
-    Reproduced,
+    ReproducedNumber,
     Verdict,
     deviation,
     half_digit,
@@ -64,7 +64,7 @@ class Line:
     cell: Cell
     verdict: Verdict
     status: Status | None = None
-    found: Reproduced | None = None
+    found: ReproducedNumber | None = None
     test: str = ""
     source: str = ""
     why: str = ""
@@ -195,7 +195,7 @@ def _why_not(cell: Cell, test: Evidence) -> str:
     ours = {name: test.known[name] for name in test.known.keys() & cell.conditions.keys()}
     if not all(same_value(value, cell.conditions[name]) for name, value in ours.items()):
         return ""  # a bench with a sampled controller, and a column of simulations
-    if any(speaks_to(finding, cell, test.known) for finding in test.findings):
+    if any(concerns(finding, cell, test.known) for finding in test.findings):
         return f"{test.test}: the analysis found no number"
     if test.failed:
         return f"{test.test}: its analysis failed or trials are damaged, and any cell may need them"
@@ -212,7 +212,7 @@ def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterat
     for test in tests:
         places: dict[str, list[Finding]] = {}
         for finding in test.findings:
-            if speaks_to(finding, cell, test.known):
+            if concerns(finding, cell, test.known):
                 place = canonical_json(without_seed(finding.conditions))
                 places.setdefault(place, []).append(finding)
         for findings in places.values():

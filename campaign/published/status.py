@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 
-from campaign.published.evidence import Evidence, speaks_to
+from campaign.published.evidence import Evidence, concerns
 from campaign.published.patterns import covers, overlap
 from campaign.published.values import Cell
 from campaign.published.verdicts import rounds_to_print
@@ -62,7 +62,7 @@ def _is_among(cell: Cell, finding: Finding, test: Evidence, patterns: Sequence[s
     return any(covers(pattern, cell.path) for pattern in patterns) or any(
         any(covers(pattern, other.path) for pattern in patterns)
         for other in test.cells
-        if _print_alike(cell, other) and speaks_to(finding, other, test.known)
+        if _print_alike(cell, other) and concerns(finding, other, test.known)
     )
 
 

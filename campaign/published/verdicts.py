@@ -40,7 +40,7 @@ GOOD = frozenset({Verdict.AGREES, Verdict.COMPATIBLE, Verdict.MET})
 
 
 @dataclass(frozen=True)
-class Reproduced:
+class ReproducedNumber:
     """A number that was found, in the unit of the published one.
 
     Attributes:
@@ -86,7 +86,7 @@ class Reproduced:
 
 def reproduced(
     finding: Finding, unit: str, calibration: float | None = None, *, lost: bool = False
-) -> Reproduced:
+) -> ReproducedNumber:
     """A finding in `unit`; ValueError when it measures something else.
 
     Args:
@@ -100,9 +100,9 @@ def reproduced(
         None if end is None else float(convert(end, finding.unit, unit)) for end in known.combined
     )
     if lost:
-        return Reproduced(value, None, None, known.kind, Origin.NOT_DETERMINED, LOST())
+        return ReproducedNumber(value, None, None, known.kind, Origin.NOT_DETERMINED, LOST())
     if known.kind in ("at least", "at most"):
-        return Reproduced(value, low, high, known.kind, known.origin, known.reason)
+        return ReproducedNumber(value, low, high, known.kind, known.origin, known.reason)
     alone = calibration is not None and low is None and high is None
     if calibration is not None:
         low, high = (value, value) if alone else (low, high)
@@ -110,10 +110,10 @@ def reproduced(
         high = None if high is None else value + math.hypot(high - value, calibration)
     elif known.reason in OF_ONE_TRIAL:
         low = high = None
-    return Reproduced(value, low, high, known.kind, known.origin, known.reason, alone)
+    return ReproducedNumber(value, low, high, known.kind, known.origin, known.reason, alone)
 
 
-def judge(cell: Cell, found: Reproduced) -> Verdict:
+def judge(cell: Cell, found: ReproducedNumber) -> Verdict:
     """The verdict on a published cell for which something was found."""
     if found.is_bound:
         return Verdict.MISSED if _excludes(found, cell) else Verdict.NOT_REACHED
@@ -134,7 +134,7 @@ def judge(cell: Cell, found: Reproduced) -> Verdict:
     return Verdict.COMPATIBLE if narrow else Verdict.UNDECIDED
 
 
-def _claim(cell: Cell, found: Reproduced) -> Verdict:
+def _claim(cell: Cell, found: ReproducedNumber) -> Verdict:
     """The verdict on "at most" or "at least": of the whole interval, or of a number without one."""
     low, high = found.ends if found.has_interval else (found.value, found.value)
     if cell.relation == "at most":
@@ -146,7 +146,7 @@ def _claim(cell: Cell, found: Reproduced) -> Verdict:
     return Verdict.MISSED if missed else Verdict.UNDECIDED
 
 
-def _excludes(bound: Reproduced, cell: Cell) -> bool:
+def _excludes(bound: ReproducedNumber, cell: Cell) -> bool:
     """Whether a bound alone says that a claim is not met. None says that one is met: the value
     itself, a threshold for one, was never seen.
     """
@@ -167,7 +167,7 @@ def half_digit(cell: Cell) -> float:
     return 0.0 if cell.decimals is None else 0.5 * 10.0**-cell.decimals * (1 + 1e-9)
 
 
-def deviation(cell: Cell, found: Reproduced, verdict: Verdict) -> float | None:
+def deviation(cell: Cell, found: ReproducedNumber, verdict: Verdict) -> float | None:
     """Percent of the published value by which the reproduced one is off.
 
     None where percent mean nothing: of a rank or a mark, of a claim that is not missed, of a bound,

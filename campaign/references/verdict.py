@@ -29,7 +29,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class JudgedNumber:
     """A number beside its reference.
 
     Attributes:
@@ -93,7 +93,7 @@ class Judged:
         return str(self.reason if self.verdict is Verdict.NOT_JUDGED else self.verdict)
 
 
-J = TypeVar("J", bound=Judged)
+J = TypeVar("J", bound=JudgedNumber)
 
 
 def _of_wrong_model(reference: Estimate, other: Estimate) -> Reason:

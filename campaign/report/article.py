@@ -9,7 +9,7 @@ from pathlib import Path
 
 from campaign.report.drawing.pdf import also_as_pdf
 from campaign.report.formats.as_json import article_json
-from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.interface import Format, WrittenPage
 from campaign.report.output import refuse_other, replaced_folder, write_files
 from campaign.report.page.article import Article
 from campaign.report.page.names import slug
@@ -40,7 +40,7 @@ def write_article(
         write_files(new, chain(files.items(), article.folder.files.items()))
         pieces, pdfs = tuple(article.pieces()), article.folder.pdfs
         for each in formats:
-            each.write(Written(name, slug(article.title), pieces, new, pdfs))
+            each.write(WrittenPage(name, slug(article.title), pieces, new, pdfs))
     return output / page
 
 

@@ -17,17 +17,17 @@ from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import NO_FILES, Document, document_of
 from campaign.report.content.references import Files
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.pdf import also_as_pdf, keeps_pdf
 from campaign.report.formats.as_json import report_json
-from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.interface import Format, WrittenPage
 from campaign.report.formats.outline import outline
 from campaign.report.output import replaced_folder, write_files
-from campaign.report.page.damage_notice import Notice, told_on_page
+from campaign.report.page.damage_notice import Notice, notice_on_page
 from campaign.report.page.drawings import Drawable, Key
 from campaign.report.page.folder import Folder
 from campaign.report.page.interactive import interactive
-from campaign.report.page.layout import Layout, drawn_here, lay_out
+from campaign.report.page.layout import Layout, draw_on_demand, lay_out
 from campaign.report.page.names import slug
 from campaign.report.page.policy import policy
 from campaign.report.page.templates import Templates
@@ -134,7 +134,7 @@ def _write_formats(kinds: Formats, report: Report, folder: Path) -> dict[str, se
     layout, run = report.layout, report.layout.document.run
     pieces = tuple(outline(layout, report.notice)) if kinds.all else ()
     bibtex, pdfs = citation_of(run).bibtex, layout.folder.pdfs
-    written = Written("report", slug(run.header.name), pieces, folder, pdfs, bibtex)
+    written = WrittenPage("report", slug(run.header.name), pieces, folder, pdfs, bibtex)
     added: dict[str, set[str]] = {}
     for each in kinds.all:
         there = _files(written.folder)
@@ -192,15 +192,15 @@ def render(
         files=references,
     )
 
-    def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+    def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
         # Sheets are kept as PDF where they are drawn.
-        begun = drawn_here(drawings) if keeps_pdf() else at_work.draw(drawings)
+        begun = draw_on_demand(drawings) if keeps_pdf() else at_work.draw(drawings)
         when_found(document)
         return begun
 
     layout = lay_out(document, begin_to_draw, command)
     damage = listed(document.damaged, DAMAGED)
-    notice = told_on_page(run, document.damaged, layout.folder) if document.damaged else None
+    notice = notice_on_page(run, document.damaged, layout.folder) if document.damaged else None
     added = interactive(layout.figures) if zoom else None
     script = (packaged_templates / "report.js").read_text(encoding="utf-8").strip()
     script += f"\n{added.script}" if added else ""

@@ -21,7 +21,7 @@ from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import leading_figure, most_telling
 from campaign.report.drawing.figures import Column, in_column
 from campaign.report.drawing.pdf import also_as_pdf
-from campaign.report.page.damage_notice import told_on_page
+from campaign.report.page.damage_notice import notice_on_page
 from campaign.report.page.drawings import drawings_of
 from campaign.report.page.layout import lay_out
 from campaign.text import nearest
@@ -64,7 +64,7 @@ def write_figures(
             drawing.enter_context(also_as_pdf())
         layout = lay_out(document)
     if document.damaged:
-        told_on_page(run, document.damaged, layout.folder)
+        notice_on_page(run, document.damaged, layout.folder)
     figures = {
         f"{section.test.name}/{figure.data.key}": figure
         for section in layout.sections

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 from campaign import processes
 from campaign.archive import RunReader
-from campaign.archive.reading.global_heap_check import Looked, known_heaps, told_of_heaps
+from campaign.archive.reading.global_heap_check import Looked, add_known_heaps, known_heaps
 from campaign.trial import Tree
 
 if TYPE_CHECKING:
     from campaign.api.analysis import TestAnalysis
-    from campaign.report.drawing.drawing_files import Drawn
+    from campaign.report.drawing.drawing_files import DrawingFiles
     from campaign.report.page.drawings import Drawable, Key
 
 WORTHWHILE = 200
@@ -78,7 +78,7 @@ class Workers:
             self._begun({name: (_find, tests[name], self.measure_anew) for name in names})
         )
 
-    def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+    def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
         """Begin to draw; what is returned waits for a drawing, and has none that cannot be made."""
         longest_first = sorted(drawings.items(), key=lambda item: -item[1].work)
         begun = self._begun({key: (_draw, drawing) for key, drawing in longest_first})
@@ -145,7 +145,7 @@ _run: RunReader | None = None
 def _begin(handed: tuple[RunReader, Mapping[Looked, bool]]) -> None:
     global _run
     _run, heaps = handed
-    told_of_heaps(heaps)
+    add_known_heaps(heaps)
     gc.freeze()
 
 
@@ -158,7 +158,7 @@ def _find(test: Tree, measure_anew: bool) -> TestAnalysis:
     return find(_run, test, experiments(), measure_anew=measure_anew)
 
 
-def _draw(drawing: Drawable) -> Drawn | None:
+def _draw(drawing: Drawable) -> DrawingFiles | None:
     try:
         return drawing.made()
     except Exception:  # noqa: BLE001 - it is drawn again where that is told

@@ -23,7 +23,7 @@ _KEY = re.compile(r"with (\S+) key (\S+)\s*$")
 
 
 @dataclass(frozen=True)
-class Done:
+class ToolResult:
     """What ssh-keygen printed, and its exit status."""
 
     code: int
@@ -43,7 +43,7 @@ def check_tool() -> str:
     return found
 
 
-def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> Done:
+def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> ToolResult:
     """Run it with `text` as its input; with `ask` it may wait for a person at the terminal.
 
     Without, it has no terminal, and must not take a passphrase from its input either. Raises
@@ -73,7 +73,7 @@ def ssh_keygen(arguments: Sequence[str], text: str, *, ask: bool = False) -> Don
         raise UsageError(
             f"{tool} is too old: it knows no such signatures (`-Y`); OpenSSH 8.2 or newer does"
         )
-    return Done(process.returncode, out.decode("utf-8", "replace"), told)
+    return ToolResult(process.returncode, out.decode("utf-8", "replace"), told)
 
 
 def _environment(*, ask: bool) -> dict[str, str]:

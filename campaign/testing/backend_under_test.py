@@ -28,7 +28,7 @@ class BackendUnderTest:
         live: whether it moves something in the time of the wall clock, as its `BackendKind` says;
             `possible` then has to take as long as it says.
         stop_outside: stops the bench as a person beside the program would, e.g. by
-            `campaign stop`, and returns once that is confirmed; of a `StoppedOutside` only.
+            `campaign stop`, and returns once that is confirmed; of a `SupportsExternalStop` only.
     """
 
     open: Callable[[], Backend]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from campaign.backends.interface import Backend, StoppedOutside
+from campaign.backends.interface import Backend, SupportsExternalStop
 from campaign.errors import BackendError
 from campaign.recording import Ending, Outcome, PanicStop
 from campaign.testing.backend_under_test import BackendUnderTest, CheckFailedError, require
@@ -13,7 +13,7 @@ from campaign.trial import Trial
 def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
     """Once stopped it says by whom, and moves again only after just that stop was cleared."""
     with under_test.open() as backend:
-        if not isinstance(backend, StoppedOutside):
+        if not isinstance(backend, SupportsExternalStop):
             told = "a way to stop it is given (stop_outside), but it cannot tell of a stop"
             require(under_test.stop_outside is None, told)
             return
@@ -49,14 +49,14 @@ def _moves_nothing(trial: Trial, backend: Backend) -> None:
     require(ending.outcome is Outcome.INTERRUPTED, told)
 
 
-def _found(backend: StoppedOutside) -> PanicStop:
+def _found(backend: SupportsExternalStop) -> PanicStop:
     found = backend.panic_stop()
     if found is None or not found.by.strip():
         raise CheckFailedError(f"panic_stop() answered {found!r} on a stopped bench")
     return found
 
 
-def _does_not_clear(backend: StoppedOutside, count: int) -> None:
+def _does_not_clear(backend: SupportsExternalStop, count: int) -> None:
     try:
         backend.clear_stop(count)
     except BackendError:

@@ -15,7 +15,7 @@ from campaign.backends.interface import Backend, StopFlag
 from campaign.execution.attempt import Conditions, execute_once
 from campaign.execution.supervision import Supervision
 from campaign.physics.limit_watch import WATCHED
-from campaign.policy import KEEP_ALL, Keeping
+from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import (
     Array,
     ChannelInfo,
@@ -37,7 +37,7 @@ Disturb = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass
-class Supervised:
+class SupervisedEnd:
     """What came of a trial under supervision.
 
     Attributes:
@@ -56,7 +56,7 @@ def supervised(
     *,
     watched: Trial | None = None,
     disturb: Disturb = lambda time, block: (time, block),
-) -> Supervised:
+) -> SupervisedEnd:
     """Execute the possible trial as a run does.
 
     The supervision is handed `watched` in its place, whose limits the backend itself does not know,
@@ -71,7 +71,7 @@ def supervised(
     ending, file = archive.ending, archive.file
     if ending is None:
         raise CheckFailedError("the trial was not archived")
-    return Supervised(ending, file.recording(ending), between.after, between.made_safe)
+    return SupervisedEnd(ending, file.recording(ending), between.after, between.made_safe)
 
 
 def with_narrow_limit(under_test: BackendUnderTest, recording: Recording) -> tuple[Trial, str]:
@@ -196,7 +196,7 @@ class _Memory:
     file: MemoryRecorder = field(default_factory=MemoryRecorder)
     folder: Path = Path("memory")
 
-    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> _File:
+    def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> _File:
         file = _File(self)
         self.file = file
         return file

@@ -12,7 +12,7 @@ from campaign.estimation.difference import in_unit
 from campaign.estimation.intervals import LEVEL
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.trends.covariates import Covariate
-from campaign.trends.rig_trends import Followed, Trends, Verdict
+from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
 from campaign.units import convert
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ TITLE = 38
 """Letters of a small panel's title."""
 
 
-def declared_figure(each: Followed, trends: Trends, headline: str, place: int) -> Figure:
+def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int) -> Figure:
     """One number that was declared to change."""
     return Figure(
         f"declared-{place}",
@@ -38,7 +38,7 @@ def declared_figure(each: Followed, trends: Trends, headline: str, place: int) -
     )  # fmt: skip
 
 
-def small_multiples(rest: Sequence[Followed], covariate: Covariate) -> Figure | None:
+def small_multiples(rest: Sequence[TrendSeries], covariate: Covariate) -> Figure | None:
     """What was judged and shows nothing, the smallest p values first; None without any."""
     shown = rest[:SMALL]
     if not shown:
@@ -55,7 +55,7 @@ def small_multiples(rest: Sequence[Followed], covariate: Covariate) -> Figure | 
     )
 
 
-def _panel(each: Followed, covariate: Covariate, *, small: bool) -> Panel:
+def _panel(each: TrendSeries, covariate: Covariate, *, small: bool) -> Panel:
     series = each.series
     found = [in_unit(point.estimate, series.display) for point in series.points]
     curves = [Curve.of(each.x, found, "" if small else "runs", "measured")]
@@ -81,7 +81,7 @@ def _short(covariate: Covariate) -> str:
     return "Time" if covariate.label.startswith("Time since") else covariate.label
 
 
-def _line(each: Followed, label: str) -> Curve:
+def _line(each: TrendSeries, label: str) -> Curve:
     assert each.change is not None and each.change.trend is not None  # noqa: S101, PT018
     trend = each.change.trend
     x = np.linspace(float(np.min(each.x)), float(np.max(each.x)), ALONG)
@@ -93,7 +93,7 @@ def _line(each: Followed, label: str) -> Curve:
     return Curve(x, y, label, "fit", "line", low=low, high=high)
 
 
-def _levels(each: Followed) -> list[Curve]:
+def _levels(each: TrendSeries) -> list[Curve]:
     """The mean of each stretch between jumps, weighed as in the search for them."""
     values = np.array([
         in_unit(point.estimate, each.series.display).value for point in each.series.points
@@ -107,7 +107,7 @@ def _levels(each: Followed) -> list[Curve]:
     return curves
 
 
-def _mark(each: Followed, place: int) -> Mark:
+def _mark(each: TrendSeries, place: int) -> Mark:
     before, behind = float(each.x[place - 1]), float(each.x[place])
     number = each.series.points[place].member.number
     return Mark(f"before run {number}", x=0.5 * (before + behind), series="alternative")

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, bench_of
 from campaign.identify.identification import Section, fitted_again, identify
-from campaign.identify.material import Chosen
+from campaign.identify.material import ChosenRun
 from campaign.trends.members import Member
 from campaign.trends.series import TWIN, Point, Series, add_point, made
 from campaign.trial import Outcome, Role
 
 
 @dataclass(frozen=True)
-class Fitted:
+class TrendFit:
     """What one method made of the runs.
 
     Attributes:
@@ -29,7 +29,7 @@ class Fitted:
 
 def fit_models(
     members: Sequence[Member], known: Mapping[str, Experiment], models: Sequence[str]
-) -> tuple[Fitted, ...]:
+) -> tuple[TrendFit, ...]:
     """Each method's parameters over the runs.
 
     Raises UsageError for names that no method has.
@@ -40,7 +40,7 @@ def fit_models(
     return tuple(_fitted(members, known, name) for name in dict.fromkeys(models))
 
 
-def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> Fitted:
+def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> TrendFit:
     first: Section | None = None
     found: dict[str, tuple[Section, list[Point], list[str]]] = {}
     problems: list[str] = []
@@ -74,7 +74,7 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
         )
         for each, (section, points, left_out) in found.items()
     )
-    return Fitted(name, series, tuple(problems))
+    return TrendFit(name, series, tuple(problems))
 
 
 def _section(
@@ -88,7 +88,7 @@ def _section(
     )
     if not trials:
         return "no trial was completed", None
-    chosen = Chosen(member.run, "", trials)
+    chosen = ChosenRun(member.run, "", trials)
     try:
         if first is not None:
             section = fitted_again(first, bench_of(trials[0].trial), chosen)

@@ -15,16 +15,16 @@ from campaign.estimation.family import RATE
 from campaign.estimation.trends.family import POWER
 from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import draw
 from campaign.report.formats.interface import Format
-from campaign.report.page.article import Article, Part, damage_told, problems_part
-from campaign.report.page.article_page import Making
+from campaign.report.page.article import Article, Part, damage_text, problems_part
+from campaign.report.page.article_page import PageParts
 from campaign.report.page.folder import Folder, ShownFigure
 from campaign.report.page.pieces import Files, Items, Paragraph, Piece
 from campaign.result import Figure
 from campaign.trends.figures import declared_figure, small_multiples
-from campaign.trends.rig_trends import WITHIN, Followed, Trends, Verdict
+from campaign.trends.rig_trends import WITHIN, Trends, TrendSeries, Verdict
 from campaign.trends.tables import (
     beside_the_jump,
     circumstances_table,
@@ -59,11 +59,11 @@ def write_trends(
 
 def article_of(trends: Trends, command: str) -> Article:
     """What the trends say."""
-    making = Making()
+    making = PageParts()
     making.problems += [problem for member in trends.members for problem in member.problems]
     making.problems += [problem for fitted in trends.fitted for problem in fitted.problems]
     parts = tuple(_parts(trends, making))
-    told = [damage_told(each.name, each.damaged) for each in trends.members if each.damaged]
+    told = [damage_text(each.name, each.damaged) for each in trends.members if each.damaged]
     first, last = trends.members[0], trends.members[-1]
     header = first.run.header
     return Article(
@@ -90,7 +90,7 @@ def article_of(trends: Trends, command: str) -> Article:
     )
 
 
-def _parts(trends: Trends, making: Making) -> Iterator[Part]:
+def _parts(trends: Trends, making: PageParts) -> Iterator[Part]:
     folder = making.folder
     declared = trends.declared[:HEADLINES]
     shown = [_declared(each, trends, making, n) for n, each in enumerate(declared, start=1)]
@@ -184,7 +184,7 @@ def title_of(trends: Trends) -> str:
 
 
 def _declared(
-    each: Followed, trends: Trends, making: Making, place: int
+    each: TrendSeries, trends: Trends, making: PageParts, place: int
 ) -> tuple[str, tuple[Piece, ...]]:
     """A declared number: its headline, and what is shown of it."""
     told = headline(each, trends)
@@ -197,10 +197,10 @@ def _declared(
     return f"{told}{caution}.", tuple(pieces)
 
 
-def _drawn(figure: Figure, making: Making) -> ShownFigure | None:
+def _drawn(figure: Figure, making: PageParts) -> ShownFigure | None:
     return making.attempt(
         figure.key,
-        lambda: making.folder.figure(figure, Drawn.of(draw(figure), figure), (), figure.key),
+        lambda: making.folder.figure(figure, DrawingFiles.of(draw(figure), figure), (), figure.key),
     )
 
 
@@ -228,7 +228,7 @@ def content_of(trends: Trends) -> dict[str, Any]:
     }
 
 
-def _tree(each: Followed, trends: Trends) -> dict[str, Any]:
+def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
     series = each.series
     tree: dict[str, Any] = {
         "test": series.test,
@@ -276,7 +276,7 @@ def _tree(each: Followed, trends: Trends) -> dict[str, Any]:
     }
 
 
-def _detectable(each: Followed) -> dict[str, float]:
+def _detectable(each: TrendSeries) -> dict[str, float]:
     from campaign.units import convert
 
     own = float(convert(1.0, each.series.unit, each.series.display))

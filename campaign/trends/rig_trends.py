@@ -38,7 +38,7 @@ from campaign.trends.members import (
     members_of,
     with_exchanged,
 )
-from campaign.trends.models import Fitted, fit_models
+from campaign.trends.models import TrendFit, fit_models
 from campaign.trends.series import SAME_IN_ALL, Series, series_of
 from campaign.units import convert
 
@@ -69,7 +69,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Followed:
+class TrendSeries:
     """One number, and what became of it.
 
     Attributes:
@@ -150,17 +150,17 @@ class Trends:
 
     members: tuple[Member, ...]
     covariate: Covariate
-    followed: tuple[Followed, ...]
+    followed: tuple[TrendSeries, ...]
     level: float
     circumstances: tuple[tuple[Circumstance, ...], ...]
-    fitted: tuple[Fitted, ...] = ()
+    fitted: tuple[TrendFit, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def of(self, *verdicts: Verdict) -> tuple[Followed, ...]:
+    def of(self, *verdicts: Verdict) -> tuple[TrendSeries, ...]:
         return tuple(each for each in self.followed if each.verdict in verdicts)
 
     @property
-    def declared(self) -> tuple[Followed, ...]:
+    def declared(self) -> tuple[TrendSeries, ...]:
         """The surest first."""
         return self.of(Verdict.DRIFTS, Verdict.JUMPED, Verdict.CHANGED)
 
@@ -194,7 +194,7 @@ def follow(
     """
     members = with_exchanged(members_of(runs, experiments), exchanged)
     series = series_of(members)
-    fitted: tuple[Fitted, ...] = ()
+    fitted: tuple[TrendFit, ...] = ()
     if models and known is not None:
         fitted = fit_models(members, known, models)
         series += [each for one in fitted for each in one.series]
@@ -208,10 +208,10 @@ def follow(
     return Trends(members, covariate, tuple(judged), level, changes_before(members), fitted, notes)
 
 
-def _followed(series: Series, covariate: Covariate) -> Followed:
+def _followed(series: Series, covariate: Covariate) -> TrendSeries:
     x = np.array([covariate.at(point.member, point.test) for point in series.points])
     if series.reason:
-        return Followed(series, x, reason=series.reason)
+        return TrendSeries(series, x, reason=series.reason)
     known = np.isfinite(x)
     if not known.all():
         missing = [p.member.name for p, k in zip(series.points, known, strict=True) if not k]
@@ -220,12 +220,12 @@ def _followed(series: Series, covariate: Covariate) -> Followed:
         series = replace(series, points=points, left_out=(*series.left_out, *told))
         x = x[known]
         if len(points) >= LEAST and np.ptp(series.values) == 0:
-            return Followed(series, x, reason=SAME_IN_ALL())
+            return TrendSeries(series, x, reason=SAME_IN_ALL())
     n = len(x)
     if n < LEAST:
-        return Followed(series, x, reason=TOO_FEW_KNOWN(covariate=covariate.name, runs=n))
+        return TrendSeries(series, x, reason=TOO_FEW_KNOWN(covariate=covariate.name, runs=n))
     if np.ptp(x) <= 1e-9 * np.max(np.abs(x)):
-        return Followed(series, x, reason=NOT_VARYING(covariate=covariate.name))
+        return TrendSeries(series, x, reason=NOT_VARYING(covariate=covariate.name))
     own, cancelled, unknown = series.own()
     with axis_terms(series.points[0].member.sides):
         told_of = map(in_axis_terms, unknown)
@@ -234,11 +234,11 @@ def _followed(series: Series, covariate: Covariate) -> Followed:
     try:
         found = change(x, series.values, own, jumps=covariate.ordered)
     except (ValueError, np.linalg.LinAlgError) as error:
-        return Followed(series, x, reason=NO_CHANGE_MODEL(error=str(error)))
-    return Followed(series, x, found, cancelled=cancelled, notes=tuple(notes))
+        return TrendSeries(series, x, reason=NO_CHANGE_MODEL(error=str(error)))
+    return TrendSeries(series, x, found, cancelled=cancelled, notes=tuple(notes))
 
 
-def _judged(found: Sequence[Followed], *, ordered: bool) -> tuple[list[Followed], float]:
+def _judged(found: Sequence[TrendSeries], *, ordered: bool) -> tuple[list[TrendSeries], float]:
     """With verdicts: all p values are one family, whichever shape they ask for."""
     tested = [(i, name, p) for i, each in enumerate(found) for name, p in each.p.items()]
     ps = [p for _, _, p in tested]
@@ -253,8 +253,8 @@ def _judged(found: Sequence[Followed], *, ordered: bool) -> tuple[list[Followed]
 
 
 def _with(
-    each: Followed, change: Change, adjusted: Mapping[str, float], level: float, *, ordered: bool
-) -> Followed:
+    each: TrendSeries, change: Change, adjusted: Mapping[str, float], level: float, *, ordered: bool
+) -> TrendSeries:
     verdict = Verdict.NOT_SHOWN
     jumps: tuple[Jump, ...] = ()
     if min(adjusted.values()) <= RATE:
@@ -274,7 +274,7 @@ def _with(
     return replace(found, notes=notes)
 
 
-def _within(each: Followed) -> bool:
+def _within(each: TrendSeries) -> bool:
     """Whether all that a number changes by is less than what a single run leaves open of it."""
     if each.series.bare or each.change is None or each.change.trend is None:
         return False

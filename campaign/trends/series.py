@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from campaign.api.analysis import AnalysedTest
 from campaign.comparison.not_judged import DERIVED, FOLLOWS
-from campaign.comparison.quantity_words import condition_words, display_unit, name_here
+from campaign.comparison.quantity_words import axis_quantity_name, condition_words, display_unit
 from campaign.comparison.same_quantity import pair_tests
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.contrast import is_student
@@ -195,7 +195,7 @@ def made(
 def _series(found: _Collected) -> Series:
     test, finding = found.test, found.finding
     words = condition_words(test, finding.conditions)
-    name = name_here(test, finding.quantity)
+    name = axis_quantity_name(test, finding.quantity)
     reason = FOLLOWS() if finding.quantity in DERIVED else NONE
     if not reason and 2 * len(found.wrong) > len(found.points):
         reason = WRONG_MODEL(side="most of it", why=found.wrong[0])

@@ -15,7 +15,7 @@ from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit
 from campaign.trends.covariates import ORDER, TIME, Covariate
-from campaign.trends.rig_trends import JUMP, TREND, Followed, Trends, Verdict
+from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
 from campaign.units import convert
 
 MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
@@ -23,7 +23,9 @@ CIRCUMSTANCES = 4
 """Most changes beside a jump that a sentence names; the table has them all."""
 
 
-def followed_table(key: str, title: str, rows: Sequence[Followed], covariate: Covariate) -> Table:
+def followed_table(
+    key: str, title: str, rows: Sequence[TrendSeries], covariate: Covariate
+) -> Table:
     """A row per number, in the unit of the row."""
     per = covariate.per
     columns = [
@@ -57,7 +59,7 @@ def followed_table(key: str, title: str, rows: Sequence[Followed], covariate: Co
     return Table(key, title, tuple(columns), tuple(_row(each, covariate) for each in rows))
 
 
-def page_table(rows: Sequence[Followed], covariate: Covariate) -> Table:
+def page_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
     """The same for a page, which has less room: an effect and its share in one cell."""
     columns = [
         Column("test", "Test"),
@@ -79,7 +81,7 @@ def page_table(rows: Sequence[Followed], covariate: Covariate) -> Table:
     ))  # fmt: skip
 
 
-def _page_row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
+def _page_row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
     mean, effects = each.mean, effect(each, covariate)
     row: dict[str, Cell] = {
         "test": each.series.test,
@@ -179,7 +181,7 @@ def runs_table(trends: Trends) -> Table:
     return Table("runs", "The runs", columns, tuple(rows))
 
 
-def effect(each: Followed, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
+def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
     """The trend per `covariate.per`, in the unit that is shown and as a share of the mean."""
     if each.change is None or each.change.trend is None:
         return None
@@ -190,7 +192,7 @@ def effect(each: Followed, covariate: Covariate) -> tuple[Estimate, Estimate] | 
     )
 
 
-def jump_of(each: Followed, jump: Jump) -> tuple[Estimate, Estimate]:
+def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
     """A jump in the unit that is shown, and as a share of the mean."""
     return (
         each.estimate("jump", jump.size, each.series.display),
@@ -198,7 +200,7 @@ def jump_of(each: Followed, jump: Jump) -> tuple[Estimate, Estimate]:
     )
 
 
-def headline(each: Followed, trends: Trends) -> str:
+def headline(each: TrendSeries, trends: Trends) -> str:
     """A declared number in one sentence, without a full stop."""
     name = each.series.name[:1].upper() + each.series.name[1:]
     told = [f"{name} ({each.series.test})"]
@@ -217,7 +219,7 @@ def headline(each: Followed, trends: Trends) -> str:
     return f"{told[0]} {', '.join(told[1:])}"
 
 
-def beside_the_jump(each: Followed, jump: Jump, trends: Trends) -> str:
+def beside_the_jump(each: TrendSeries, jump: Jump, trends: Trends) -> str:
     """What else changed where a number jumped; "" for nothing."""
     first, last = _runs_around(each, jump)
     found = [c for gap in trends.circumstances[first - 1 : last - 1] for c in gap]
@@ -264,7 +266,9 @@ def not_judged(trends: Trends) -> Iterator[str]:
         yield f"{count}: {reason}"
 
 
-def detectable_words(each: Followed, name: str, covariate: Covariate, *, per: bool = True) -> str:
+def detectable_words(
+    each: TrendSeries, name: str, covariate: Covariate, *, per: bool = True
+) -> str:
     """`0.12 N·m per month (1.3 %)`: the smallest effect that would have been seen."""
     size = _detectable(each, name, covariate)
     if size is None:
@@ -276,7 +280,7 @@ def detectable_words(each: Followed, name: str, covariate: Covariate, *, per: bo
     return f"{number(size, 2)} {unit}".rstrip() + f"{along}{part}"
 
 
-def _row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
+def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
     row: dict[str, Cell] = {
         "test": each.series.test,
         "quantity": each.series.name,
@@ -315,7 +319,7 @@ def _row(each: Followed, covariate: Covariate) -> dict[str, Cell]:
     }
 
 
-def _detectable(each: Followed, name: str, covariate: Covariate) -> float | None:
+def _detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
     size = (each.detectable or {}).get(name)
     if size is None:
         return None
@@ -323,7 +327,7 @@ def _detectable(each: Followed, name: str, covariate: Covariate) -> float | None
     return size * own * (covariate.step if name == TREND else 1.0)
 
 
-def _shared(each: Followed, estimate: Estimate) -> Estimate:
+def _shared(each: TrendSeries, estimate: Estimate) -> Estimate:
     """As a share of the mean; without any where the mean may be 0."""
     share = each.share
     if not math.isfinite(share):
@@ -332,13 +336,13 @@ def _shared(each: Followed, estimate: Estimate) -> Estimate:
     return replace(estimate, value=share * estimate.value, unit="", low=ends[0], high=ends[1])
 
 
-def _short(size: Estimate, share: Estimate, each: Followed) -> str:
+def _short(size: Estimate, share: Estimate, each: TrendSeries) -> str:
     """`+1.53 (1.38 to 1.70) N·m, 5.9 %`."""
     part = f", {number(100 * share.value, 2)} %" if math.isfinite(share.value) else ""
     return f"{_words(size, each)}{part}"
 
 
-def _effect_words(each: Followed, covariate: Covariate) -> str:
+def _effect_words(each: TrendSeries, covariate: Covariate) -> str:
     effects = effect(each, covariate)
     if effects is None:
         return "–"
@@ -346,13 +350,13 @@ def _effect_words(each: Followed, covariate: Covariate) -> str:
     return f"{_words(size, each)} per {covariate.per}{_percent(share)}"
 
 
-def _jump_words(each: Followed, jump: Jump, trends: Trends) -> str:
+def _jump_words(each: TrendSeries, jump: Jump, trends: Trends) -> str:
     size, share = jump_of(each, jump)
     first, last = _runs_around(each, jump)
     return f"by {_words(size, each)}{_percent(share)} between runs {first} and {last}"
 
 
-def _words(size: Estimate, each: Followed, *, sign: bool = True) -> str:
+def _words(size: Estimate, each: TrendSeries, *, sign: bool = True) -> str:
     plus = "+" if sign and size.value > 0 else ""
     unit = pretty_unit(each.series.display)
     return f"{plus}{interval(size.value, size.low, size.high)} {unit}".rstrip()
@@ -364,11 +368,11 @@ def _percent(share: Estimate) -> str:
     return f" ({interval(100 * share.value, 100 * share.low, 100 * share.high)} %)"
 
 
-def _before(each: Followed, jumps: Sequence[Jump]) -> str:
+def _before(each: TrendSeries, jumps: Sequence[Jump]) -> str:
     return ", ".join(str(each.series.points[jump.place].member.number) for jump in jumps)
 
 
-def _runs_around(each: Followed, jump: Jump) -> tuple[int, int]:
+def _runs_around(each: TrendSeries, jump: Jump) -> tuple[int, int]:
     """Numbers of the runs between which the number jumped, as far as the points say."""
     points = each.series.points
     low, high = jump.between

@@ -180,7 +180,7 @@ class End:
 
 
 @dataclass(frozen=True)
-class Lost:
+class LostRecords:
     """Records `first` to `first + count - 1` are no longer held and can never be had again."""
 
     trial: int

@@ -35,7 +35,7 @@ from campaign.wire.device import (
     Event,
     Holder,
     Latch,
-    Lost,
+    LostRecords,
     Nak,
     Samples,
     Status,
@@ -72,7 +72,7 @@ from campaign.wire.parameters import (
 __all__ = [
     "COMMANDS", "MAX_BODY", "VERSION", "Ack", "Arm", "ArraySlice", "Bye", "Capabilities", "Channel",
     "Channels", "Clear", "End", "Event", "Fault", "Format", "Heartbeat", "Hello", "Holder", "Item",
-    "Kind", "Latch", "LatchCause", "Lost", "Message", "Nak", "NakCode", "Outcome", "Query",
+    "Kind", "Latch", "LatchCause", "LostRecords", "Message", "Nak", "NakCode", "Outcome", "Query",
     "Record", "Release", "Resend", "Safe", "Samples", "Set", "Start", "State", "Status", "Stop",
     "Unlatch", "Value", "WireError", "assembled",
     "channels_messages", "clipped", "configuration_crc", "decode", "encode", "items",
@@ -83,7 +83,8 @@ Record = Samples | Event | End
 Message = (
     Hello | Set | Arm | Start | Heartbeat | Resend | Release | Stop | Safe | Clear | Query
     | Unlatch | Bye
-    | Capabilities | Ack | Nak | Channels | Status | Samples | Event | End | Lost | Latch | Holder
+    | Capabilities | Ack | Nak | Channels | Status | Samples | Event | End | LostRecords | Latch
+    | Holder
 )  # fmt: skip
 
 
@@ -260,7 +261,7 @@ LAYOUTS: Mapping[Kind, tuple[type[Any], tuple[tuple[str, Layout], ...]]] = {
             ("reason", LONG),
         ),
     ),
-    Kind.LOST: (Lost, (("trial", U32), ("first", U32), ("count", U32))),
+    Kind.LOST: (LostRecords, (("trial", U32), ("first", U32), ("count", U32))),
     Kind.LATCH: (
         Latch,
         (("latched", FLAG), ("count", U32), ("cause", CAUSE), ("age", OPTIONAL), ("by", SHORT)),
@@ -327,7 +328,10 @@ def _check(message: Message) -> None:
         raise WireError("sessions are counted from 1: 0 means nobody's")
     elif isinstance(message, Start) and not message.trial:
         raise WireError("trials are counted from 1: 0 means none")
-    elif isinstance(message, Resend | Lost) and not 1 <= message.count <= 2**32 - message.first:
+    elif (
+        isinstance(message, Resend | LostRecords)
+        and not 1 <= message.count <= 2**32 - message.first
+    ):
         raise WireError(f"{message.count} records from {message.first}")
 
 

@@ -1,8 +1,8 @@
 """Reactions of a device to commands: tables and pure functions, as in `firmware/`.
 
 States change by a command (`after`, `after_hello`), by the end of a trial (`after_end`) and by
-silence of the host (`after_silence`); nothing else changes them. `Numbering` tells a new command
-from a repeated one.
+silence of the host (`after_silence`); nothing else changes them. `SequenceNumbers` tells a new
+command from a repeated one.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Turn(Enum):
     OUT_OF_ORDER = "out of order"  # refuse it; nothing else changes
 
 
-class Numbering:
+class SequenceNumbers:
     """Sequence numbers of commands: each is the last one plus 1, modulo 65536.
 
     An accepted HELLO begins anew with its own number; SAFE is outside: always new, and remembered

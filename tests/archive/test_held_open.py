@@ -87,7 +87,7 @@ def test_what_is_known_of_heaps_is_told_another_process(
     assert looked == [path]
     known = global_heap_check.known_heaps()
     global_heap_check._known.clear()  # as in a process that has just begun
-    global_heap_check.told_of_heaps(known)
+    global_heap_check.add_known_heaps(known)
     read_all(run)
     assert looked == [path]
     path.touch()  # it may be another file by now

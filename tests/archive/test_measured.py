@@ -15,10 +15,10 @@ import pytest
 
 from campaign.archive import ArchivedTrial, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.verification.verify_run import verify_run
 from campaign.estimate import Estimate, Systematic
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.reason import Cause, Reason
 from campaign.recording import Ending, Outcome
 from tests.archive import forging
@@ -26,7 +26,7 @@ from tests.archive import forging
 TOP = Estimate("top", 0.25, "rad/s", 0.21, 0.29, 0.95, "the largest sample", freedom=7.0)
 FEW = Cause("few samples", "{samples} samples in {time:g} s")
 LAST = Estimate.without_interval("last", -1.5, "N m", FEW(samples=1, time=2.0, all_of_it=True))
-FOUND = Measured((TOP, LAST), "campaign 0.1.0")
+FOUND = ArchivedMetrics((TOP, LAST), "campaign 0.1.0")
 
 CRASH = """
 import os, signal, sys
@@ -65,7 +65,7 @@ def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None
     writer = begun(tmp_path, kit)
     seen: list[ArchivedTrial] = []
 
-    def measure(archived: ArchivedTrial) -> Measured:
+    def measure(archived: ArchivedTrial) -> ArchivedMetrics:
         (there,) = open_run(writer.folder).trials
         assert (archived.path, archived.entry) == (there.path, there.entry)
         assert archived.trial == there.trial == kit.trial(1)
@@ -74,7 +74,7 @@ def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None
         assert there.recording()["gyro_rate"].tobytes() == rate.tobytes()
         assert verify_run(writer.folder).sound
         seen.append(archived)
-        return Measured()
+        return ArchivedMetrics()
 
     assert finish(writer, kit).measure(measure) == ""
     assert seen
@@ -102,7 +102,7 @@ def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit
         standard_error=0.5, freedom=3.5,
         systematic=(Systematic("inertia", 0.1, of_rig=True), Systematic("alignment")),
     )  # fmt: skip
-    found = Measured((full, TOP, LAST), "a laboratory's 2.1")
+    found = ArchivedMetrics((full, TOP, LAST), "a laboratory's 2.1")
     writer = begun(tmp_path, kit)
     finish(writer, kit, 1).measure(lambda archived: FOUND)
     finish(writer, kit, 1).measure(lambda archived: found)
@@ -192,20 +192,20 @@ def test_what_cannot_be_kept_costs_the_metrics_only(tmp_path: Path, kit) -> None
     before = (writer.folder / JOURNAL).read_bytes()
     recorder = finish(writer, kit)
     after = (writer.folder / JOURNAL).read_bytes()
-    said = recorder.measure(lambda archived: Measured((strange,), "x"))
+    said = recorder.measure(lambda archived: ArchivedMetrics((strange,), "x"))
     assert "cannot be kept" in said
     assert (writer.folder / JOURNAL).read_bytes() == after != before
     alien = SimpleNamespace(name="top", value=1.0)  # of a plug-in: no estimate at all
-    assert "cannot be kept" in recorder.measure(lambda archived: Measured((alien,), "x"))
+    assert "cannot be kept" in recorder.measure(lambda archived: ArchivedMetrics((alien,), "x"))
     assert (writer.folder / JOURNAL).read_bytes() == after
-    assert recorder.measure(lambda archived: Measured(problem="no samples")) == "no samples"
+    assert recorder.measure(lambda archived: ArchivedMetrics(problem="no samples")) == "no samples"
     writer.close()
 
 
 def test_without_samples_nobody_looks(tmp_path: Path, kit) -> None:
     """Where they were not kept, or the trial failed before there were any."""
 
-    def measure(archived: ArchivedTrial) -> Measured:
+    def measure(archived: ArchivedTrial) -> ArchivedMetrics:
         raise AssertionError
 
     writer = begun(tmp_path, kit)
@@ -219,12 +219,12 @@ def test_samples_that_are_not_kept_are_measured_before_they_go(tmp_path: Path, k
     time, block = kit.samples(9000)  # more than one chunk
     read = []
 
-    def measure(archived: ArchivedTrial) -> Measured:
+    def measure(archived: ArchivedTrial) -> ArchivedMetrics:
         read.append(archived.recording())
         return FOUND
 
     writer = begun(tmp_path, kit)
-    dropped = writer.begin(kit.trial(1), Keeping("none"))
+    dropped = writer.begin(kit.trial(1), SampleRetention("none"))
     dropped.start(kit.CHANNELS)
     for part in (slice(0, 4000), slice(4000, 9000)):
         dropped.append(time[part], block[:, part])

@@ -11,7 +11,7 @@ import h5py
 from campaign.archive import RunStatus, RunWriter
 from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.long_text import SHORT
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.recording import Ending, Event, Outcome
 from tests.archive.forging import canonical, sha256
 
@@ -27,7 +27,7 @@ def begun(folder: Path, kit, count: int) -> RunWriter:
     header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
     writer = RunWriter.create(folder, header, trials)
     for trial in trials:
-        recorder = writer.begin(trial, Keeping("none"))
+        recorder = writer.begin(trial, SampleRetention("none"))
         recorder.start(kit.CHANNELS)
         recorder.append(*kit.samples(10, trial.number))
         recorder.event(Event(0.0, "x" * LONG))

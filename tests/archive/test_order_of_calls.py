@@ -16,7 +16,7 @@ import pytest
 from campaign.archive import ArchivedTrial, RunWriter
 from campaign.archive.layout.files import PART, write_atomically
 from campaign.archive.layout.journal import JOURNAL
-from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason
@@ -108,7 +108,9 @@ def test_a_trial_is_reported_before_it_is_measured(
     """File, name and line are on the disk; what is found is one more line, and no other call."""
     writer = begun(tmp_path, trials)
     journal = writer.folder / JOURNAL
-    found = Measured((Estimate("x", 1.0, "", reason=Reason("test", "one sample")),), "campaign")
+    found = ArchivedMetrics(
+        (Estimate("x", 1.0, "", reason=Reason("test", "one sample")),), "campaign"
+    )
     before: list[int] = []
     with recorded() as calls:
         recorder = writer.begin(trials[0])
@@ -116,7 +118,7 @@ def test_a_trial_is_reported_before_it_is_measured(
         recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
         recorder.finish(Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED), AT, AT)
 
-        def measure(archived: ArchivedTrial) -> Measured:
+        def measure(archived: ArchivedTrial) -> ArchivedMetrics:
             before.append(end_of(calls))
             return found
 

@@ -21,7 +21,7 @@ from campaign.archive.layout.record import (
 )
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeState
 
@@ -168,7 +168,7 @@ def test_windows_and_estimates_come_back_from_a_folder_and_from_a_sealed_run(tmp
 def test_samples_that_were_not_kept_have_their_digests_and_say_why(tmp_path, kit):
     trials = [kit.trial(1), kit.trial(2)]
     writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], Keeping("none"))
+    recorder = writer.begin(trials[0], SampleRetention("none"))
     recorder.start(kit.CHANNELS)
     time, block = kit.samples(100)
     recorder.append(time, block)

@@ -16,7 +16,7 @@ import pytest
 from campaign.archive import RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.forging import put_text, text_of
 
@@ -225,7 +225,7 @@ def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit)
     """So a damaged index costs such a trial, and that is said."""
     trials = [kit.trial(number) for number in (1, 2)]
     writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], Keeping("none"))
+    recorder = writer.begin(trials[0], SampleRetention("none"))
     recorder.start(kit.CHANNELS)
     recorder.append(*kit.samples(20, 1))
     recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)

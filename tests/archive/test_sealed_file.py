@@ -16,7 +16,7 @@ from campaign.archive.verification.verify_run import verify_run
 from campaign.archive.writing.nexus import REQUIRED
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.errors import ArchiveError
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
 from campaign.trial import Role
 from tests.archive.forging import sha256, text_of
@@ -209,7 +209,7 @@ def test_without_any_samples_it_opens_nothing(tmp_path, kit):
 def test_of_samples_that_are_not_kept_the_run_says_why(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
     for trial in trials[:2]:
-        recorder = writer.begin(trial, Keeping("none"))
+        recorder = writer.begin(trial, SampleRetention("none"))
         recorder.start(kit.CHANNELS)
         recorder.append(*kit.samples(20))
         recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from campaign.archive import RunWriter
 from campaign.archive.layout.storage import CHUNK, pack
-from campaign.archive.reading.archived_metrics import Measured
+from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.reading.packed_trial_reader import read_packed
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
@@ -44,7 +44,7 @@ def test_metrics_see_every_sample_of_a_recording(kit, tmp_path, count):
 
     def measure(data):
         seen.append(data.recording())
-        return Measured()
+        return ArchivedMetrics()
 
     recorder.measure(measure)
     for recording in (*seen, writer.archived(1).recording()):
@@ -70,7 +70,7 @@ def test_metrics_of_a_worker_process_see_every_sample_before_the_batch_is_publis
     def measure(data):
         recording = data.recording()
         seen.append([recording.time, *(recording[each.name] for each in kit.CHANNELS)])
-        return Measured()
+        return ArchivedMetrics()
 
     assert recorder.measure(measure) == ""
     assert [row.tobytes() for row in seen[0]] == [row.tobytes() for row in (time, *block)]

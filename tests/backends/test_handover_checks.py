@@ -12,7 +12,7 @@ from campaign.backends.handover.checks import (
     wrong_length,
     wrong_motion,
 )
-from campaign.backends.handover.returned_recording import Returned
+from campaign.backends.handover.returned_recording import ReturnedRecording
 from campaign.channels import info
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task, Trial
@@ -185,13 +185,15 @@ def test_a_drive_that_is_off_is_not_clipped() -> None:
     assert not clip(torque)
 
 
-def came_back(**series: np.ndarray) -> Returned:
+def came_back(**series: np.ndarray) -> ReturnedRecording:
     """A recording of `TASK`'s rate, of nothing but these channels."""
     samples = np.array(list(series.values()))
     count = samples.shape[1]
     channels = tuple(info(name) for name in series)
     lost = np.zeros(count, dtype=bool)
-    return Returned(channels, np.arange(count) / RATE, samples, lost, RATE, count / RATE, ())
+    return ReturnedRecording(
+        channels, np.arange(count) / RATE, samples, lost, RATE, count / RATE, ()
+    )
 
 
 def test_noise_of_a_differenced_position_ends_no_trial() -> None:

@@ -16,7 +16,7 @@ from campaign.calibration.targets import (
     weight_of,
 )
 from campaign.published.values import Cell, thesis
-from campaign.published.verdicts import Reproduced, deviation, judge
+from campaign.published.verdicts import ReproducedNumber, deviation, judge
 
 GAIN_MARGIN = next(c for c in thesis()["5.3"].cells if c.path == "5.3/gain_margin/none")
 ERROR = next(c for c in thesis()["5.11"].cells if c.path == "5.11/0.8/static")
@@ -79,7 +79,7 @@ def test_percent_mean_what_they_mean_on_the_scoreboard(
         math.nan if percent is None else percent, nan_ok=True
     )
     if found is not None:
-        again = Reproduced(found)
+        again = ReproducedNumber(found)
         assert deviation(cell, again, judge(cell, again)) == (percent and pytest.approx(percent))
     zero = Target(replace(cell, value=0.0), 0.1, relative=False)
     assert math.isnan(zero.percent(0.1))

@@ -11,7 +11,7 @@ from campaign.estimate import Origin
 from campaign.estimation.intervals import with_error
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause
-from campaign.references.verdict import WRONG_MODEL, Judged
+from campaign.references.verdict import WRONG_MODEL, JudgedNumber
 from campaign.result import Finding
 from tests.comparison.test_judging import made_up
 
@@ -30,7 +30,7 @@ def test_of(finding: Finding, bench: Bench) -> AnalysedTest:
 test_of.__test__ = False  # type: ignore[attr-defined]
 
 
-def pair_of(findings: list[Finding], bench: Bench) -> Judged:
+def pair_of(findings: list[Finding], bench: Bench) -> JudgedNumber:
     own, other = (test_of(each, bench) for each in findings)
     (pair,) = pairs_of(PairedTest(own, other, ((findings[0], findings[1]),), (), ()))
     return pair

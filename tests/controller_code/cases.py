@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.controller_code.compensation import Sampled
+from campaign.controller_code.compensation import SampledCompensation
 from campaign.physics.bench import Bench
 from campaign.physics.compilation import called
 from campaign.physics.complete import CompleteBench, complete
@@ -43,7 +43,7 @@ def with_friction(*friction: dict[str, Any], gain: float = 0.8) -> CompleteBench
     return complete(Bench.model_validate(tree, context={"si": True}))
 
 
-def of_model(name: str, **options: Any) -> Sampled:
+def of_model(name: str, **options: Any) -> SampledCompensation:
     """With a ripple, with directions of their own, on either side of the gear."""
     draw = np.random.default_rng(sum(name.encode()))
     tree = {"model": name, **TRIES[name], **options}
@@ -55,7 +55,7 @@ def of_model(name: str, **options: Any) -> Sampled:
     motor = {**tree, "side": "motor", "velocity": "motor", "coulomb_torque": 0.03}
     motor |= {"static_torque": 0.04} if "static_torque" in tree else {}
     motor |= {"viscous_friction": 1e-4}  # or all is at the limit
-    return Sampled.of(with_friction(plain, plain, rippled, motor), "tried")
+    return SampledCompensation.of(with_friction(plain, plain, rippled, motor), "tried")
 
 
 @called
@@ -94,7 +94,7 @@ def branching(parameters: Any, state: Any, motion: Motion) -> tuple[float, float
     return state[2], 0.0
 
 
-def of_a_plug_in() -> Sampled:
+def of_a_plug_in() -> SampledCompensation:
     """A compensation with the step function `branching`."""
     made = of_model("coulomb")
     lane = made.lanes.trials[0]
@@ -104,17 +104,17 @@ def of_a_plug_in() -> Sampled:
     return replace(made, lanes=together([replace(lane, compensation=(own,))], 1))
 
 
-def of_an_evil_name() -> Sampled:
+def of_an_evil_name() -> SampledCompensation:
     """A compensation and a bench whose names would be code."""
     tree = with_friction(TRIES["coulomb"] | {"model": "coulomb"}).model_dump()
     name = f"../{EVIL[:25]}"
     tree["name"], tree["compensation"] = EVIL, {name: tree["compensation"]["tried"]}
     tree.pop("plant", None)
     bench = complete(Bench.model_validate(tree, context={"si": True}))
-    return Sampled.of(bench, name)
+    return SampledCompensation.of(bench, name)
 
 
-def hurting(made: Sampled) -> np.ndarray:
+def hurting(made: SampledCompensation) -> np.ndarray:
     """Reversals in every sample, rest, zeros of both signs, denormals, jumps, and fast motion."""
     draw = np.random.default_rng(3)
     pieces = [

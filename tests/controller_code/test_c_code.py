@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets.c import c_code, vectors_code
 from campaign.protocol.bench_file import simulable
 from tests.controller_code.cases import (
@@ -34,7 +34,9 @@ COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler on the PATH")
 
 
-def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler: str) -> str:
+def ended(
+    folder: Path, made: SampledCompensation, inputs: np.ndarray, *flags: str, compiler: str
+) -> str:
     """What the compiled test says; it must end with 0."""
     name = f"compensation_{made.name}"
     (folder / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
@@ -53,7 +55,7 @@ def ended(folder: Path, made: Sampled, inputs: np.ndarray, *flags: str, compiler
 def test_shipped_compensations_have_the_bits_of_the_engine(
     tmp_path: Path, bench: str, name: str, compiler: str
 ) -> None:
-    made = Sampled.of(simulable(bench), name)
+    made = SampledCompensation.of(simulable(bench), name)
     said = ended(tmp_path, made, trial_inputs(made), *SANITIZED[compiler], compiler=compiler)
     assert said == "0 of 2000 samples differ\n"
 
@@ -86,7 +88,7 @@ def test_every_model_has_the_bits_of_the_engine(tmp_path: Path, name: str) -> No
 
 
 def test_a_reading_that_is_none_leaves_the_torque_and_the_limit_is_one(tmp_path: Path) -> None:
-    made = Sampled.of(simulable("platform"), "observer")
+    made = SampledCompensation.of(simulable("platform"), "observer")
     name, limit = "compensation_observer", made.bench.limits.torque
     (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
     (tmp_path / "main.c").write_text(f'''
@@ -142,7 +144,7 @@ def test_names_of_a_bench_stay_words_in_comments_and_identifiers(tmp_path: Path)
 
 
 def test_contracted_arithmetic_is_noticed(tmp_path: Path) -> None:
-    made = Sampled.of(simulable("platform"), "observer")
+    made = SampledCompensation.of(simulable("platform"), "observer")
     name = "compensation_observer"
     (tmp_path / f"{name}.c").write_text(c_code(made, ["a test"]), encoding="utf-8")
     (tmp_path / f"{name}_test.c").write_text(

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets.matlab import m_code, script
 from campaign.protocol.bench_file import simulable
 from tests.controller_code.cases import (
@@ -65,12 +65,15 @@ def not_within_the_bound(folder: Path, cases: Iterable[Case]) -> list[str]:
     return [line for line in told if line not in right]
 
 
-def case_of(name: str, made: Sampled, inputs: np.ndarray) -> Case:
+def case_of(name: str, made: SampledCompensation, inputs: np.ndarray) -> Case:
     return name, made.identifier, m_code(made, ["a test"]), script(made, inputs)
 
 
 def test_shipped_compensations_are_within_the_bound(tmp_path: Path) -> None:
-    shipped = [(f"{bench}-{name}", Sampled.of(simulable(bench), name)) for bench, name in SHIPPED]
+    shipped = [
+        (f"{bench}-{name}", SampledCompensation.of(simulable(bench), name))
+        for bench, name in SHIPPED
+    ]
     cases = [case_of(case, made, trial_inputs(made)[:500]) for case, made in shipped]
     assert not_within_the_bound(tmp_path, cases) == []
 
@@ -96,7 +99,7 @@ def test_every_model_is_within_the_bound(tmp_path: Path) -> None:
 
 
 def test_a_reading_that_is_none_leaves_the_torque_and_the_limit_is_one(tmp_path: Path) -> None:
-    made = Sampled.of(simulable("platform"), "observer")
+    made = SampledCompensation.of(simulable("platform"), "observer")
     name, limit = made.identifier, made.bench.limits.torque
     (tmp_path / f"{name}.m").write_text(m_code(made, ["a test"]), encoding="utf-8")
     calls = HURTS.format(name)

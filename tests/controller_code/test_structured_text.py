@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.controller_code.compensation import Sampled, trial_inputs
+from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets.structured_text import BOUND, st_code
 from campaign.protocol.bench_file import simulable
 from tests.controller_code.cases import (
@@ -81,7 +81,7 @@ def torques(folder: Path, inputs: np.ndarray, reset: np.ndarray | None = None) -
     return np.array(list(map(float.fromhex, done.stdout.split())))
 
 
-def off_by(folder: Path, made: Sampled, inputs: np.ndarray) -> float:
+def off_by(folder: Path, made: SampledCompensation, inputs: np.ndarray) -> float:
     """The largest difference, as a share of the largest torque."""
     right = made.torques(inputs)
     return float(np.max(np.abs(torques(folder, inputs) - right)) / np.max(np.abs(right)))
@@ -89,7 +89,7 @@ def off_by(folder: Path, made: Sampled, inputs: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("bench", "name"), SHIPPED)
 def test_shipped_compensations_are_within_the_bound(tmp_path: Path, bench: str, name: str) -> None:
-    made = Sampled.of(simulable(bench), name)
+    made = SampledCompensation.of(simulable(bench), name)
     built(tmp_path, made.identifier, st_code(made, ["a test"]))
     assert off_by(tmp_path, made, trial_inputs(made)) <= BOUND
 
@@ -110,7 +110,7 @@ def test_a_step_function_of_a_plug_in_is_within_the_bound(tmp_path: Path) -> Non
 
 
 def test_a_reading_that_is_none_leaves_the_torque_and_the_limit_is_one(tmp_path: Path) -> None:
-    made = Sampled.of(simulable("platform"), "observer")
+    made = SampledCompensation.of(simulable("platform"), "observer")
     built(tmp_path, made.identifier, st_code(made, ["a test"]))
     inputs = np.tile([0.1, 0.0, 0.0, 1.0], (7, 1))
     inputs[1, 0], inputs[2, 1], inputs[3:5, 0] = np.nan, -np.inf, (-1e6, 1e7)

@@ -30,7 +30,7 @@ from campaign.wire.device import (
     Event,
     Holder,
     Latch,
-    Lost,
+    LostRecords,
     Nak,
     Samples,
     Status,
@@ -266,11 +266,13 @@ def test_records_are_had_again_until_they_are_released() -> None:
     rig.send(Heartbeat(3, 9, 5, OURS), sequence=0)
     rig.said.clear()
     rig.send(Resend(9, 3, 4), sequence=0)
-    assert rig.said[0][1] == Lost(9, 3, 2)
+    assert rig.said[0][1] == LostRecords(9, 3, 2)
     assert rig.records() == sent[5:7]
     rig.said.clear()
     rig.send(Resend(8, 3, 4), sequence=0)
-    assert [said[1] for said in rig.said] == [Lost(8, 3, 4)]  # of another trial nothing is held
+    assert [said[1] for said in rig.said] == [
+        LostRecords(8, 3, 4)
+    ]  # of another trial nothing is held
     assert rig.send(Release(8)).code is NakCode.WRONG_TRIAL
     assert isinstance(rig.send(Release(9)), Ack)
     assert rig.controller.state is State.IDLE

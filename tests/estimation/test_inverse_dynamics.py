@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from campaign.estimation.inverse.delay import find_delay
 from campaign.estimation.inverse.instruments import by_instruments
 from campaign.estimation.inverse.motion import (
-    Filtering,
+    FilterSettings,
     Motion,
     decimated,
     later,
@@ -40,13 +40,13 @@ from campaign.estimation.inverse.validation import (
     relative_error,
 )
 from campaign.experiments.any_motion.inverse_fit import find
-from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from tests.estimation.coverage import holds, rejected
 from tests.estimation.rigs import Rig, random_rigs
 
 Array = NDArray[np.float64]
 EMPS = Path(__file__).parents[3] / "shared" / "data" / "emps"
-PUBLISHED = Filtering(100.0, decimation=10, skip=49)
+PUBLISHED = FilterSettings(100.0, decimation=10, skip=49)
 
 
 def emps(name: str) -> Motion:
@@ -187,7 +187,7 @@ def test_pieces_without_gaps() -> None:
 
 def test_what_stands_still_is_left_out_with_its_neighbours() -> None:
     motion = smooth_motion()
-    filtering = Filtering(100.0, 1, 0, slowest=0.2)
+    filtering = FilterSettings(100.0, 1, 0, slowest=0.2)
     kept = moving(motion, filtering) > 0
     assert np.abs(motion.rate[kept]).min() >= 0.2
     piece = rows(motion, [TERMS["inertia"]], filtering)
@@ -259,7 +259,7 @@ def test_columns_that_cannot_be_told_apart_are_refused() -> None:
     force = force_of(motion, inertia=2.0)
     names = [*DIRECTIONAL, "coulomb"]
     with pytest.raises(ValueError, match="not distinguishable"):
-        structure([driven(motion, force)], [TERMS[n] for n in names], Filtering(100.0))
+        structure([driven(motion, force)], [TERMS[n] for n in names], FilterSettings(100.0))
 
 
 def test_a_column_of_nothing_is_refused() -> None:
@@ -293,7 +293,9 @@ def test_blocks_left_out_are_those_of_fits_without_them() -> None:
     draw = np.random.default_rng(4)
     force = force_of(motion, inertia=2.0, viscous=0.3, coulomb=1.0, offset=0.1)
     terms = [TERMS[name] for name in SYMMETRIC]
-    piece = rows(driven(motion, force + draw.standard_normal(len(force))), terms, Filtering(100.0))
+    piece = rows(
+        driven(motion, force + draw.standard_normal(len(force))), terms, FilterSettings(100.0)
+    )
     by_block, _ = held_out([piece])
     for (error, count), block in zip(by_block, in_blocks([piece], 10)[0], strict=True):
         seen = np.ones(len(piece.force), dtype=bool)
@@ -317,10 +319,12 @@ def test_terms_are_chosen_that_are_there_and_no_others(count: int) -> None:
     extra = 0
     for _ in range(count):
         noise = 0.3 * draw.standard_normal(len(plain))
-        tried, chosen = choose([driven(motion, plain + noise)], start, groups, Filtering(100.0))
+        tried, chosen = choose(
+            [driven(motion, plain + noise)], start, groups, FilterSettings(100.0)
+        )
         extra += len(tried[chosen].terms) > len(start)
         bent = plain + noise + 0.5 * TERMS["spring"].column(motion)
-        tried, chosen = choose([driven(motion, bent)], start, groups, Filtering(100.0))
+        tried, chosen = choose([driven(motion, bent)], start, groups, FilterSettings(100.0))
         assert "spring" in tried[chosen].names
     assert extra <= count / 8
 
@@ -331,7 +335,7 @@ def test_two_terms_of_one_family_are_never_chosen() -> None:
     force = force + 0.01 * np.random.default_rng(1).standard_normal(len(force))
     groups = [[TERMS["square_root"]], [TERMS["quadratic"]]]
     start = [TERMS[name] for name in SYMMETRIC]
-    tried, chosen = choose([driven(motion, force)], start, groups, Filtering(100.0))
+    tried, chosen = choose([driven(motion, force)], start, groups, FilterSettings(100.0))
     assert len({"square_root", "quadratic"} & set(tried[chosen].names)) == 1
 
 
@@ -341,7 +345,9 @@ def test_a_delay_is_found_to_parts_of_a_sample(delay: float) -> None:
     force = force_of(motion, inertia=2.0, viscous=0.5, coulomb=1.0)
     draw = np.random.default_rng(9)
     early = later(force, -delay, motion.sample_rate) + 0.2 * draw.standard_normal(len(force))
-    found = find_delay([driven(motion, early)], [TERMS[n] for n in SYMMETRIC], Filtering(100.0))
+    found = find_delay(
+        [driven(motion, early)], [TERMS[n] for n in SYMMETRIC], FilterSettings(100.0)
+    )
     assert holds(found, delay)
     assert found.half_width < 0.002
 
@@ -352,7 +358,7 @@ def test_a_delay_that_nothing_tells_is_not_determined() -> None:
     found = find_delay(
         [driven(motion, draw.standard_normal(len(motion.time)))],
         [TERMS[name] for name in SYMMETRIC],
-        Filtering(100.0),
+        FilterSettings(100.0),
     )
     assert np.isnan(found.value) or found.half_width > 0.005
 
@@ -480,12 +486,12 @@ def test_a_simulated_axis_stays_where_dry_friction_holds_it() -> None:
 # Rigs that nobody knew ----------------------------------------------------------------------------
 
 
-def moved(rig: Rig, filtering: Filtering) -> Moved:
+def moved(rig: Rig, filtering: FilterSettings) -> MotionPiece:
     made = [
         motion_of_position(rig.time, angle, rig.force, filtering.low_pass)
         for angle in (rig.angle, rig.wanted)
     ]
-    return Moved(1, made[0], made[1])
+    return MotionPiece(1, made[0], made[1])
 
 
 @pytest.mark.slow
@@ -494,7 +500,7 @@ def test_intervals_hold_on_rigs_of_all_sizes(count: int) -> None:
     """Of 100 other rigs 96 to 99 % hold, each coefficient for itself, and 95 % of the delays."""
     held: dict[str, list[bool]] = {}
     for rig in random_rigs(count, seed=21):
-        filtering = Filtering.for_rate(1000.0)
+        filtering = FilterSettings.for_rate(1000.0)
         piece = moved(rig, filtering)
         filtering = with_slowest(filtering, [piece], None)
         found = find([piece], [], filtering, terms=[TERMS[name] for name in DIRECTIONAL])

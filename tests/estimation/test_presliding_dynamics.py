@@ -19,7 +19,7 @@ from campaign.estimation.presliding_dynamics.presliding_fit import (
     PreslidingDynamics,
     identify_presliding_dynamics,
 )
-from campaign.estimation.presliding_dynamics.record import Assumed, Record
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import ANSWER_MISSED
 from campaign.estimation.presliding_dynamics.simulation import (
     simulate,
@@ -36,7 +36,7 @@ from tests.estimation.bristle_plants import (
     multisine,
 )
 
-CURVE_1995 = Assumed(0.4, coulomb_share=1.0 / 1.5, stribeck_velocity=0.001)
+CURVE_1995 = Assumptions(0.4, coulomb_share=1.0 / 1.5, stribeck_velocity=0.001)
 SLOW = Truth(2.0, 0.0, (Interface(2000.0, 40.0, 5.0, 5.0, 1.0),))
 """5 Hz, damping ratio 0.32, a curve that does not fall."""
 TWO = Truth(
@@ -261,7 +261,7 @@ def test_an_elastic_part_that_nobody_tells_is_a_misfit_and_one_that_is_told_is_n
     assert alone.reason in MODEL_MISFIT
     assert alone.misfit.reason in ANSWER_MISSED
     assert all(not each.has_interval and each.reason for each in alone.estimates.values())
-    guess = Assumed(appendage=Appendage(0.15, 7.3, 0.03), appendage_free=True)
+    guess = Assumptions(appendage=Appendage(0.15, 7.3, 0.03), appendage_free=True)
     told = identify_presliding_dynamics(every, guess)
     assert not told.reason
     own = {
@@ -319,7 +319,7 @@ def test_slow_reversals_say_nothing_of_inertia_and_damping() -> None:
     def slow(time: Array) -> Array:
         return np.asarray(3.0 * np.sin(2.0 * np.pi * 0.05 * time))
 
-    found = identify_presliding_dynamics([_slow_motion(slow, 4000, 1.0)], Assumed(delay=0.0))
+    found = identify_presliding_dynamics([_slow_motion(slow, 4000, 1.0)], Assumptions(delay=0.0))
     assert held(_estimate(found, "bristle_stiffness"), 2000.0)
     for name in ("bristle_damping", "inertia"):
         assert _estimate(found, name).origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND), name
@@ -344,7 +344,7 @@ def test_both_dampings_cannot_be_told_apart_below_the_first_slip() -> None:
     every = records(SLOW, (0.2, 0.4), 0.02)
     sum_known = identify_presliding_dynamics(every)
     assert held(_estimate(sum_known, "bristle_damping"), 40.0)
-    free = identify_presliding_dynamics(every, Assumed(viscous_free=True))
+    free = identify_presliding_dynamics(every, Assumptions(viscous_free=True))
     assert _estimate(free, "viscous_friction").origin is not Origin.MEASURED
     assert held(_estimate(free, "bristle_damping"), 40.0)
     both = (_estimate(each, "bristle_damping").half_width for each in (sum_known, free))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Filtering, decimated, motion_of_position
+from campaign.estimation.inverse.motion import FilterSettings, decimated, motion_of_position
 from campaign.estimation.inverse.rows import moving
 from tests.estimation.test_inverse_dynamics import smooth_motion
 
@@ -16,7 +16,7 @@ def test_noise_at_the_end_of_a_recording_is_left_out() -> None:
     draw = np.random.default_rng(3)
     time = np.arange(3000) / 1000.0
     at_end, inside = [], []
-    filtering = Filtering(100.0, 10, 0, slowest=0.05)
+    filtering = FilterSettings(100.0, 10, 0, slowest=0.05)
     for _ in range(40):
         made = motion_of_position(time, 2.0 * time + draw.standard_normal(3000), time, 100.0)
         noise = decimated(made.acceleration[:, None], 10)[:, 0] ** 2

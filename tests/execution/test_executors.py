@@ -29,7 +29,7 @@ from campaign.execution.progress import Progress
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Supervision
-from campaign.execution.trial_metrics import Measuring
+from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.experiments import experiments
 from campaign.protocol import Plan
 from campaign.recording import Outcome
@@ -69,7 +69,7 @@ def run(
             workers=2,
             display=display,
             stop=stop or StopSwitch(),
-            measure=Measuring(experiments()),
+            measure=TrialMeasurement(experiments()),
             finished={n: o for n, o in writer.finished.items() if o is Outcome.COMPLETED},
             supervision=Supervision(timing=timing),
             executor=partial(process_executor, count=2) if in_processes else None,

@@ -15,7 +15,7 @@ from campaign.cli.compile_engine import COMPILING, compiling_meanwhile, wait_unt
 from campaign.execution import first_start
 from campaign.execution.first_start import FirstStart, Helpers, make_all
 from campaign.physics import machine_code
-from campaign.physics.machine_code import LANES, Made, Part
+from campaign.physics.machine_code import LANES, CompiledPart, Part
 from campaign.protocol.bench_file import load_bench
 from campaign.trial import Task, Trial
 
@@ -58,14 +58,14 @@ def helper(monkeypatch: pytest.MonkeyPatch, program: str) -> list[subprocess.Pop
 
 
 def test_what_a_helper_compiled_is_loaded_and_told_with_what_it_took(monkeypatch, small_engine):
-    line = json.dumps(asdict(Made(TOGETHER, 30.0, compiled=True)))
+    line = json.dumps(asdict(CompiledPart(TOGETHER, 30.0, compiled=True)))
     helper(monkeypatch, f"print({line!r})")
-    told: list[Made] = []
+    told: list[CompiledPart] = []
     with Helpers() as helpers:
         make_all(told.append, helpers)
     assert small_engine == [ALONE, 1, TOGETHER, LANES]
     assert [made.name for made in told] == [ALONE, TOGETHER]
-    assert told[1] == Made(TOGETHER, 30.0, compiled=True)
+    assert told[1] == CompiledPart(TOGETHER, 30.0, compiled=True)
 
 
 def test_a_helper_that_hangs_is_ended_and_what_it_had_to_make_is_made_here(
@@ -81,7 +81,7 @@ def test_a_helper_that_hangs_is_ended_and_what_it_had_to_make_is_made_here(
 
 def test_what_a_helper_did_not_make_is_made_here(monkeypatch, small_engine):
     helper(monkeypatch, "raise SystemExit(1)")
-    told: list[Made] = []
+    told: list[CompiledPart] = []
     with Helpers() as helpers:
         make_all(told.append, helpers)
     assert small_engine == [ALONE, 1, TOGETHER, LANES]

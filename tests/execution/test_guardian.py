@@ -24,8 +24,8 @@ from campaign.execution.guardian import (
     SILENCE,
     STOPPER,
     STUCK,
-    Asked,
     Guardian,
+    StopRequests,
 )
 
 INT, TERM = bytes((signal.SIGINT,)), bytes((signal.SIGTERM,))
@@ -34,7 +34,7 @@ on_posix = pytest.mark.skipif(sys.platform == "win32", reason="there is a guardi
 
 
 def asked(*numbers: int) -> int:
-    count = Asked()
+    count = StopRequests()
     for number in numbers:
         count.add(number)
     return count.times

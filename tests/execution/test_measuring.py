@@ -28,7 +28,7 @@ from campaign.entry_points import PlugIn
 from campaign.estimate import Estimate
 from campaign.execution.runner import run_plan
 from campaign.execution.stop import StopSwitch
-from campaign.execution.trial_metrics import LIMIT, Measuring, author
+from campaign.execution.trial_metrics import LIMIT, TrialMeasurement, author
 from campaign.experiments import experiments
 from campaign.experiments.friction_lag import cycle_windows
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
@@ -80,7 +80,7 @@ def run(folder: Path, asked: Sequence[Trial], limit: float = LIMIT) -> RunReader
         workers=1,
         display=lambda progress: None,
         stop=StopSwitch(),
-        measure=Measuring(experiments(), limit=limit),
+        measure=TrialMeasurement(experiments(), limit=limit),
     )
     assert outcome.status is RunStatus.COMPLETE
     return open_run(outcome.archive)
@@ -347,6 +347,6 @@ def test_why_nothing_was_measured_is_told_in_the_words_of_the_axis() -> None:
     (done,) = execute(trials("breakaway", bench(), asked))
     linear = {"name": "carriage", "axis": {"name": "x", "kind": "linear", "inertia": 9.0}}
     moved = replace(done, trial=done.trial.model_copy(update={"bench": linear}))
-    measuring = Measuring(experiments())
+    measuring = TrialMeasurement(experiments())
     assert "the rate never reached 0.005 rad/s" in measuring(done).problem
     assert "the rate never reached 0.005 m/s" in measuring(moved).problem

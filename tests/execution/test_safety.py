@@ -17,7 +17,7 @@ from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.safety import (
     NOT_SAFE,
     AbortedError,
-    Ended,
+    EarlyEnd,
     NotSafeError,
     connected,
     describe,
@@ -50,11 +50,11 @@ def raising(error: BaseException) -> Callable[[], SafeState]:
 
 
 def test_nothing_counts_as_safe_until_it_was_seen() -> None:
-    assert Ended() == Ended(None, "", None, SafeState.NOT_CONFIRMED, "")
+    assert EarlyEnd() == EarlyEnd(None, "", None, SafeState.NOT_CONFIRMED, "")
 
 
 def test_seen_safe_is_seen_safe_also_after_it_was_not() -> None:
-    ended = Ended(unsafe="not seen before")
+    ended = EarlyEnd(unsafe="not seen before")
     make_safe(FakeBackend(), ended)
     assert ended.safe_state is SafeState.CONFIRMED
     assert ended.unsafe == ""
@@ -80,7 +80,7 @@ FAKE = "tests.execution.fakes.FakeBackend"
     ],
 )
 def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState], why: str) -> None:
-    ended = Ended(safe_state=SafeState.CONFIRMED)
+    ended = EarlyEnd(safe_state=SafeState.CONFIRMED)
     make_safe(resting(rest), ended)
     assert ended.safe_state is SafeState.NOT_CONFIRMED
     assert ended.unsafe == why
@@ -93,7 +93,7 @@ def test_who_interrupts_making_safe_leaves_the_bench_unsafe() -> None:
         time.sleep(5.0)
         return SafeState.CONFIRMED
 
-    ended = Ended(safe_state=SafeState.CONFIRMED)
+    ended = EarlyEnd(safe_state=SafeState.CONFIRMED)
     with pytest.raises(KeyboardInterrupt):
         make_safe(resting(interrupted), ended)
     assert ended.safe_state is SafeState.NOT_CONFIRMED
@@ -101,7 +101,7 @@ def test_who_interrupts_making_safe_leaves_the_bench_unsafe() -> None:
 
 
 def test_an_error_of_a_safe_bench_is_its_own() -> None:
-    with pytest.raises(ArchiveError, match=r"^no space left$"), unsafe_first(Ended(kept=RUN)):
+    with pytest.raises(ArchiveError, match=r"^no space left$"), unsafe_first(EarlyEnd(kept=RUN)):
         raise ArchiveError("no space left")
 
 
@@ -116,17 +116,17 @@ def test_an_error_of_a_safe_bench_is_its_own() -> None:
 def test_an_unsafe_bench_is_said_first_then_why_then_what_is_kept(
     error: BaseException, why: str
 ) -> None:
-    with pytest.raises(NotSafeError) as said, unsafe_first(Ended(unsafe="nobody looked")):
+    with pytest.raises(NotSafeError) as said, unsafe_first(EarlyEnd(unsafe="nobody looked")):
         raise error
     assert str(said.value) == f"{NOT_SAFE}; nobody looked; and {why}"
     assert said.value.__cause__ is error
-    with pytest.raises(NotSafeError) as said, unsafe_first(Ended(RUN, unsafe="nobody looked")):
+    with pytest.raises(NotSafeError) as said, unsafe_first(EarlyEnd(RUN, unsafe="nobody looked")):
         raise error
     assert str(said.value).endswith(f"{why}; the finished trials are in {RUN}")
 
 
 def test_a_block_that_ends_well_ends_well() -> None:
-    ended, backend = Ended(unsafe="nobody looked"), FakeBackend()
+    ended, backend = EarlyEnd(unsafe="nobody looked"), FakeBackend()
     with unsafe_first(ended), safe_afterwards(backend, ended):
         assert backend.log == []
     assert backend.log == ["made safe"]
@@ -134,7 +134,7 @@ def test_a_block_that_ends_well_ends_well() -> None:
 
 
 def test_a_block_that_raises_is_made_safe_and_its_error_goes_on() -> None:
-    ended, backend = Ended(kept=RUN), FakeBackend()
+    ended, backend = EarlyEnd(kept=RUN), FakeBackend()
     with pytest.raises(ArchiveError), safe_afterwards(backend, ended):
         raise ArchiveError("no space left")
     assert backend.log == ["made safe"]
@@ -143,7 +143,7 @@ def test_a_block_that_raises_is_made_safe_and_its_error_goes_on() -> None:
 
 def test_a_stop_by_force_is_made_safe_and_says_what_is_kept_and_how_to_go_on() -> None:
     backend = FakeBackend()
-    with pytest.raises(AbortedError) as aborted, safe_afterwards(backend, Ended(kept=RUN)):
+    with pytest.raises(AbortedError) as aborted, safe_afterwards(backend, EarlyEnd(kept=RUN)):
         raise KeyboardInterrupt
     assert backend.log == ["made safe"]
     assert aborted.value.exit_code is ExitCode.INTERRUPTED
@@ -153,7 +153,7 @@ def test_a_stop_by_force_is_made_safe_and_says_what_is_kept_and_how_to_go_on() -
     )
     with (
         pytest.raises(AbortedError, match=r"^stopped at once$"),
-        safe_afterwards(FakeBackend(), Ended()),
+        safe_afterwards(FakeBackend(), EarlyEnd()),
     ):
         raise KeyboardInterrupt
 

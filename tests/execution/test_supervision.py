@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.archive.layout.header import RunStatus
-from campaign.archive.reading.archived_metrics import Measure, Measured
+from campaign.archive.reading.archived_metrics import ArchivedMetrics, Measure
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.backends import calls
 from campaign.backends.calls import HEARTBEAT, Heartbeat
@@ -203,9 +203,9 @@ def test_a_bench_that_was_not_seen_safe_is_made_safe_before_its_recording_is_mea
             raise BackendError("the port is gone")
         return Ending(Outcome.COMPLETED, safe_state=SafeState.NOT_CONFIRMED)
 
-    def measure(data: ArchivedTrial) -> Measured:
+    def measure(data: ArchivedTrial) -> ArchivedMetrics:
         bench.backend.log.append("measured")
-        return Measured()
+        return ArchivedMetrics()
 
     bench = lab(unsafe, 1)
     bench.run(measure=measure)

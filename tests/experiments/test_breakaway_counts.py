@@ -12,7 +12,7 @@ from campaign.experiments import experiments
 from campaign.physics.bench import Bench
 from campaign.protocol.bench_file import load_bench
 from campaign.recording import Channel, Recording
-from campaign.trial import Offered
+from campaign.trial import OfferedRecording
 from tests.experiments.laboratory import Done, Tree, execute, trials
 from tests.physics.benches import bench
 
@@ -49,7 +49,7 @@ def imported(done: Done, recording: Recording, **options: object) -> Done:
     assert experiment.recorded is not None
     rate = 1000.0
     chosen = experiment.options.model_validate(options)
-    offered = Offered(
+    offered = OfferedRecording(
         len(recording.time) / rate, rate, frozenset(recording.channels), {}, (), lambda _: recording
     )
     (request,) = experiment.recorded(chosen, bench(servo), offered)

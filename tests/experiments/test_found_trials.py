@@ -15,7 +15,7 @@ from campaign.experiments import experiments
 from campaign.experiments.frequency_response.experiment import _point
 from campaign.recording import Channel, Ending, Outcome, Recording
 from campaign.result import Result
-from campaign.trial import Offered, Trial
+from campaign.trial import OfferedRecording, Trial
 from tests.experiments.laboratory import Done, analyse, finding, table_of_estimates
 from tests.physics.benches import bench
 
@@ -50,7 +50,7 @@ def recorded(
     experiment = experiments()[kind]
     assert experiment.recorded is not None
     chosen, rig = experiment.options(), bench()
-    offered = Offered(duration, RATE, frozenset(signals), {}, windows, lambda _: recording)
+    offered = OfferedRecording(duration, RATE, frozenset(signals), {}, windows, lambda _: recording)
     (request,) = experiment.recorded(chosen, rig, offered)
     trial = Trial(
         number=1,

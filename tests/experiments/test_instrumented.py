@@ -11,7 +11,7 @@ import pytest
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import (
     Array,
-    Filtering,
+    FilterSettings,
     Motion,
     motion_of_position,
     motion_of_rate,
@@ -22,10 +22,10 @@ from campaign.experiments.any_motion.instrument_estimates import (
     Instruments,
     held_against,
     instruments,
-    told_delay,
+    judged_delay,
 )
 from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find
-from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.any_motion.tables import instruments_table
 from campaign.reason import Reason
 from tests.estimation.coverage import holds
@@ -53,7 +53,7 @@ def wanted_motion(size: float = 1.0) -> tuple[Array, Array]:
 
 def recorded(
     noise: float, shaking: float = 0.0, size: float = 1.0, seed: int = 1
-) -> tuple[Moved, Array]:
+) -> tuple[MotionPiece, Array]:
     """A rig with a tachometer that has `noise` (rad/s), shaken by `shaking` (N m); its true rate.
 
     The loop acts on the noise; it knows the true angle. The force acts half a sample late.
@@ -77,24 +77,24 @@ def recorded(
             new = rate + step * net / 2.0
             new = 0.0 if rate * new < 0.0 else new
             angle, rate = angle + 0.5 * step * (rate + new), new
-    filtering = Filtering.for_rate(RATE)
+    filtering = FilterSettings.for_rate(RATE)
     measured = motion_of_rate(TIME, seen, force, filtering.low_pass)
     wanted = motion_of_position(TIME, place, force, filtering.low_pass)
-    return Moved(1, measured, wanted, of_rate=True), true
+    return MotionPiece(1, measured, wanted, of_rate=True), true
 
 
-def identified(piece: Moved) -> InverseDynamics:
-    filtering = with_slowest(Filtering.for_rate(RATE), [piece], None)
+def identified(piece: MotionPiece) -> InverseDynamics:
+    filtering = with_slowest(FilterSettings.for_rate(RATE), [piece], None)
     return find([piece], [], filtering, terms=TERMS_OF_IT)
 
 
 @pytest.fixture(scope="module")
-def noisy() -> Moved:
+def noisy() -> MotionPiece:
     return recorded(noise=0.15)[0]
 
 
 @pytest.fixture(scope="module")
-def told(noisy: Moved) -> InverseDynamics:
+def told(noisy: MotionPiece) -> InverseDynamics:
     return identified(noisy)
 
 
@@ -119,7 +119,9 @@ def test_what_is_biased_is_said_and_instruments_are_told(told: InverseDynamics) 
     assert "along the wanted motion" in table.title
 
 
-def test_without_what_was_wanted_the_force_stands_in_and_decides_nothing(noisy: Moved) -> None:
+def test_without_what_was_wanted_the_force_stands_in_and_decides_nothing(
+    noisy: MotionPiece,
+) -> None:
     found = identified(replace(noisy, wanted=None))
     assert found.instruments is not None
     assert not found.instruments.of_wanted
@@ -148,7 +150,7 @@ def test_of_a_quiet_rate_both_say_the_same() -> None:
 def test_instruments_that_hardly_tell_a_term_are_refused() -> None:
     """What shakes the axis moves it; what was wanted is next to nothing."""
     piece, _ = recorded(noise=1e-3, shaking=30.0, size=0.02)
-    filtering = with_slowest(Filtering.for_rate(RATE), [piece], None)
+    filtering = with_slowest(FilterSettings.for_rate(RATE), [piece], None)
     values = np.array(list(TRUTH.values()))
     found, why = instruments([piece], TERMS_OF_IT, values, filtering, 0.0)
     assert "hardly tells" in why
@@ -205,9 +207,9 @@ def test_a_delay_without_instruments_may_be_what_a_loop_makes_of_noise() -> None
     late = Estimate.without_interval(
         "delay", 1e-3, "s", Reason("test", "stated"), origin=Origin.GIVEN
     )
-    assert told_delay(late, None) is late
+    assert judged_delay(late, None) is late
     found = Estimate("delay", 2e-3, "s", 1.5e-3, 2.5e-3, 0.95)
-    assert told_delay(found, None).combined[0] == pytest.approx(
+    assert judged_delay(found, None).combined[0] == pytest.approx(
         2e-3 - np.hypot(0.5e-3, 2e-3), rel=1e-3
     )
 
@@ -223,9 +225,9 @@ def test_shares_of_what_bends_have_no_interval_unless_somebody_states_them(state
     motion = Motion(np.arange(20_000) / 500.0, place, rate, change, np.zeros(20_000))
     names = ("inertia", "viscous", "coulomb", "square_root")
     force = sum(TERMS[n].column(motion) for n in names) + 0.05 * draw.standard_normal(20_000)
-    piece = Moved(1, replace(motion, force=np.asarray(force)), None)
+    piece = MotionPiece(1, replace(motion, force=np.asarray(force)), None)
     terms = [*(TERMS[name] for name in SYMMETRIC), TERMS["square_root"]] if stated else None
-    found = find([piece], [], Filtering(100.0, 5, 0, 0.05), terms=terms, linear=True)
+    found = find([piece], [], FilterSettings(100.0, 5, 0, 0.05), terms=terms, linear=True)
     assert "square_root" in found.estimates
     assert holds(found.estimates["inertia"], 1.0)
     for name, one in found.estimates.items():

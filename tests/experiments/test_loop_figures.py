@@ -10,7 +10,7 @@ from campaign.estimation.threshold import Threshold
 from campaign.experiments.observer_gain.figures import error_figure
 from campaign.experiments.observer_gain.metrics import Gain
 from campaign.experiments.sensitivity.figures import sensitivity_figure, thresholds_figure
-from campaign.experiments.sensitivity.results import Judged, Response, judge
+from campaign.experiments.sensitivity.results import Response, ResponseVerdict, judge
 from campaign.result import Figure, Mark, Panel
 from tests.experiments.laboratory import analyse, execute, trials
 from tests.physics.benches import bench
@@ -30,7 +30,7 @@ def response(below: float, above: float, deviation: float = 1e-6) -> Response:
     return Response(CHANGES, tuple(errors), np.column_stack([CHANGES, values]))
 
 
-def judged() -> tuple[Judged, ...]:
+def judged() -> tuple[ResponseVerdict, ...]:
     """Passed at -0.4, at +0.5, and by nothing."""
     return judge(
         {

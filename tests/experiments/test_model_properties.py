@@ -23,7 +23,7 @@ from campaign.experiments.model_properties.rules import (
     MET,
     PARTLY,
     RULES,
-    Judged,
+    ModelVerdict,
 )
 from campaign.experiments.model_properties.virtual_experiments import PULL
 from campaign.physics.bench import Bench
@@ -118,7 +118,7 @@ def test_marks_begin_at_their_thresholds() -> None:
 
 
 def test_a_mark_that_differs_between_sets_depends_on_the_parameters() -> None:
-    judged = Judged("m", {"a": {"coulomb_share": 1.0}, "b": {"coulomb_share": 0.1}}, {})
+    judged = ModelVerdict("m", {"a": {"coulomb_share": 1.0}, "b": {"coulomb_share": 0.1}}, {})
     assert judged.sign(RULES[0]) == DEPENDS
     assert judged.marks(RULES[0]) == [BLANK, MET]
 

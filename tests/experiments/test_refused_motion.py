@@ -11,11 +11,11 @@ import pytest
 from campaign.channels import DRIVE_TORQUE, RELATIVE_ANGLE, RELATIVE_RATE, TEMPERATURE
 from campaign.estimate import Origin
 from campaign.estimation import gate
-from campaign.estimation.inverse.motion import Filtering
+from campaign.estimation.inverse.motion import FilterSettings
 from campaign.experiments.any_motion.motions import moved
 from campaign.experiments.friction_map import steady_recordings
 from campaign.experiments.friction_map.stretches import points_of, slower
-from campaign.parameter import Identified
+from campaign.parameter import IdentifiedRig
 from campaign.trial import Channel, Recording
 from tests.experiments.asked import asked
 
@@ -61,7 +61,7 @@ def recorded(*made: Channel) -> Any:
     )
 
 
-def identified(angle: np.ndarray, torque: np.ndarray) -> Identified:
+def identified(angle: np.ndarray, torque: np.ndarray) -> IdentifiedRig:
     return asked("inverse_dynamics", [driven(angle, torque)]).identified
 
 
@@ -87,15 +87,15 @@ def test_a_rate_that_does_not_change_tells_nothing(rate: float) -> None:
     torque = Channel(DRIVE_TORQUE, "N m", "torque", "N m", 1.0 + 0.02 * NOISE[0])
     trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", measured), torque)
     with pytest.raises(ValueError, match="constant but for its sensor's noise"):
-        moved((trial,), Filtering.for_rate(RATE))
+        moved((trial,), FilterSettings.for_rate(RATE))
     swings = np.gradient(SWING, TIME) + measured
     trial = recorded(Channel(RELATIVE_RATE, "rad/s", "rate", "deg/s", swings), torque)
-    assert moved((trial,), Filtering.for_rate(RATE))
+    assert moved((trial,), FilterSettings.for_rate(RATE))
 
 
 def test_small_and_slow_motion_over_coarse_counts_is_none_of_these() -> None:
     counts = np.round(5.0 * np.sin(0.3 * TIME))
-    assert moved((driven(counts, NOISE[0]),), Filtering.for_rate(RATE))
+    assert moved((driven(counts, NOISE[0]),), FilterSettings.for_rate(RATE))
 
 
 def test_a_constant_load_is_no_friction() -> None:

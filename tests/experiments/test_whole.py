@@ -11,10 +11,10 @@ import pytest
 
 from benchmarks.model_choice import FITTED, INERTIA, TRUTHS, identified
 from campaign.estimate import Estimate, Origin, Systematic
-from campaign.estimation.inverse.motion import Filtering, Motion, motion_of_position
+from campaign.estimation.inverse.motion import FilterSettings, Motion, motion_of_position
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
-from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.whole_model.models import models
 from campaign.experiments.whole_model.whole_model_fit import (
     BASE_UNKNOWN,
@@ -112,10 +112,10 @@ def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
         "campaign.experiments.whole_model.whole_model_fit.models", lambda *told: models(*told)[1:2]
     )
     rig = random_rigs(16, seed=51, stribeck=True)[1]
-    filtering = Filtering.for_rate(1000.0)
+    filtering = FilterSettings.for_rate(1000.0)
     motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
     filtering = replace(filtering, slowest=0.005 * float(np.abs(motion.rate).max()))
-    [found] = find([Moved(1, motion, None)], [], filtering, starts=1).fits
+    [found] = find([MotionPiece(1, motion, None)], [], filtering, starts=1).fits
     assert found.values["delay"] - rig.truth["delay"] > 5e-4
     for name in ("viscous_positive", "viscous_negative"):
         estimate = found.fit.estimates[name]
@@ -145,7 +145,7 @@ def test_what_is_passed_faster_than_rows_show_is_refused(
     found = SimpleNamespace(unknowns=[Unknown(name, -1.0, 1e9, v) for name, v in told.items()])
     sure = {name: Estimate(name, v, "", v - 0.1, v + 0.1, 0.95) for name, v in told.items()}
     fit = ModelFit(found, sure, tuple(told.values()), (), None, np.ones(len(told), dtype=bool))
-    kept = resolved(fit, model, [motion], Filtering(100.0, 10)).estimates
+    kept = resolved(fit, model, [motion], FilterSettings(100.0, 10)).estimates
     assert {name for name, each in kept.items() if not each.has_interval} == refused
 
 
@@ -221,9 +221,9 @@ def test_intervals_hold_and_a_jump_of_friction_has_no_bristles(count: int) -> No
     """Rigs without bristles: stiffness is refused, whatever a filtered jump looks like."""
     held: list[bool] = []
     for rig in random_rigs(count, seed=31, stribeck=True, seconds=15.0):
-        filtering = Filtering.for_rate(1000.0)
+        filtering = FilterSettings.for_rate(1000.0)
         motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
-        piece = Moved(1, motion, None)
+        piece = MotionPiece(1, motion, None)
         slow = 0.25 * with_slowest(filtering, [piece], None).slowest
         found = find([piece], [], with_slowest(filtering, [piece], slow), starts=1)
         for name in ("coulomb_positive", "coulomb_negative", "viscous_positive"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from campaign.wire import messages as wire
 from campaign.wire.statemachine import (
-    Numbering,
+    SequenceNumbers,
     Turn,
     after,
     after_end,
@@ -49,7 +49,7 @@ class Model:
     """The axis of the console: it stops at once while `rest`."""
 
     state: State = State.IDLE
-    numbering: Numbering = field(default_factory=Numbering)
+    numbering: SequenceNumbers = field(default_factory=SequenceNumbers)
     last: State | NakCode | None = None
     bodies: list[bytes] = field(default_factory=list)
     trial: int = 0

@@ -118,9 +118,9 @@ def test_records_are_kept_until_released_and_sent_again(console: Console) -> Non
     status = heartbeat(console, following=3)
     assert (status.first_record, status.next_record, status.ring_used) == (3, 6, 3)
     answer = console.send(0, wire.Resend(TRIAL, 1, 3))
-    assert answer == [wire.Lost(TRIAL, 1, 2), live[3]]
+    assert answer == [wire.LostRecords(TRIAL, 1, 2), live[3]]
     assert console.send(4, wire.Release(TRIAL))[0].state is State.IDLE
-    assert console.send(0, wire.Resend(TRIAL, 3, 2)) == [wire.Lost(TRIAL, 3, 2)]
+    assert console.send(0, wire.Resend(TRIAL, 3, 2)) == [wire.LostRecords(TRIAL, 3, 2)]
 
 
 def test_what_a_full_ring_dropped_is_said_to_be_lost(console: Console) -> None:
@@ -129,8 +129,8 @@ def test_what_a_full_ring_dropped_is_said_to_be_lost(console: Console) -> None:
     assert [record.number for record in live] == list(range(10))
     assert heartbeat(console).first_record == 6
     answer = console.send(0, wire.Resend(TRIAL, 2, 6))
-    assert answer == [wire.Lost(TRIAL, 2, 4), live[6], live[7]]
-    assert console.send(0, wire.Resend(TRIAL, 0, 6)) == [wire.Lost(TRIAL, 0, 6)]
+    assert answer == [wire.LostRecords(TRIAL, 2, 4), live[6], live[7]]
+    assert console.send(0, wire.Resend(TRIAL, 0, 6)) == [wire.LostRecords(TRIAL, 0, 6)]
 
 
 def test_a_heartbeat_frees_nothing_of_the_future_or_of_another_trial(console: Console) -> None:

@@ -158,7 +158,7 @@ def essence(found: list[wire.Message], *, repeated: bool = False) -> list[object
                 ours = message.reason.startswith(("panic stop", "switched off"))
                 said.append((message.number, message.outcome, message.safe))
                 said.append(message.reason if ours else "")
-            case wire.Lost():
+            case wire.LostRecords():
                 said.append(message)
     return said
 

@@ -14,8 +14,8 @@ from campaign.estimate import Estimate
 from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method
 from campaign.identify.identification import Identification, Section, _with_place
-from campaign.identify.material import Chosen, choose
-from campaign.parameter import Identified, Parameter
+from campaign.identify.material import ChosenRun, choose
+from campaign.parameter import IdentifiedRig, Parameter
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.result import Result
@@ -70,7 +70,7 @@ def write(results: Path):  # type: ignore[no-untyped-def]
     run = next(results.glob("*-rig-mapping.nxs")).stem
     chosen = choose(results, f"{run}:monday")
 
-    def written(text: str, **sections: Identified) -> Bench:
+    def written(text: str, **sections: IdentifiedRig) -> Bench:
         name = str(chosen.run.header.tests[0]["bench"])
         header = SimpleNamespace(tests=chosen.run.header.tests, sources={name: text})
         run = SimpleNamespace(header=header, name=chosen.run.name, identity=chosen.run.identity)
@@ -84,7 +84,7 @@ def write(results: Path):  # type: ignore[no-untyped-def]
             for which, each in sections.items()
         )
         found = Identification(
-            Chosen(cast("Any", run), "monday", chosen.trials), None, None, bench, made
+            ChosenRun(cast("Any", run), "monday", chosen.trials), None, None, bench, made
         )
         bench = bench_of(bench_text(found, "campaign identify"))
         keys = {key for each in keys_by_method(found).values() for key in each}
@@ -99,7 +99,7 @@ def write(results: Path):  # type: ignore[no-untyped-def]
 
 @pytest.mark.slow
 def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # type: ignore[no-untyped-def]
-    bench = write(HEAD + LUGRE, friction_map=Identified(CURVE, settings=STRIBECK))
+    bench = write(HEAD + LUGRE, friction_map=IdentifiedRig(CURVE, settings=STRIBECK))
     load = bench.friction["load"]
     assert load.model == "lugre"
     assert load.bristle_stiffness == 15000.0
@@ -112,7 +112,7 @@ def test_a_curve_replaces_another_whole_and_leaves_bristles(write) -> None:  # t
 def test_a_curve_is_written_whatever_form_the_table_has(write, before: str) -> None:  # type: ignore[no-untyped-def]
     """An inline table, as of a bench whose friction is not known, holds inline tables only."""
     name, axis = HEAD.split("\n", 1)
-    bench = write(f"{name}\n{before}\n{axis}", friction_map=Identified(CURVE, settings=STRIBECK))
+    bench = write(f"{name}\n{before}\n{axis}", friction_map=IdentifiedRig(CURVE, settings=STRIBECK))
     assert bench.friction["load"].coulomb_torque == 10.0
 
 
@@ -134,7 +134,7 @@ def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(  # type: ignore[no
     write, before: str, measured: int
 ) -> None:
     """Nor does static friction of one direction, or without its Stribeck velocity."""
-    found = Identified(CURVE[:measured], settings=OPEN)
+    found = IdentifiedRig(CURVE[:measured], settings=OPEN)
     bench = write(HEAD + before, whole_model=found)
     load = bench.friction["load"]
     assert load.model == "coulomb"
@@ -146,7 +146,7 @@ def test_what_a_motion_leaves_open_makes_no_curve_of_a_bench(  # type: ignore[no
 
 
 def test_what_a_motion_leaves_open_stays_as_a_bench_with_bristles_has_it(write) -> None:  # type: ignore[no-untyped-def]
-    bench = write(HEAD + LUGRE, whole_model=Identified(CURVE[:2], settings=OPEN))
+    bench = write(HEAD + LUGRE, whole_model=IdentifiedRig(CURVE[:2], settings=OPEN))
     load = bench.friction["load"]
     assert (load.model, load.coulomb_torque, load.viscous_friction) == ("lugre", 10.0, 2.0)
     assert (load.static_torque, load.bristle_stiffness) == (20.0, 15000.0)
@@ -155,15 +155,15 @@ def test_what_a_motion_leaves_open_stays_as_a_bench_with_bristles_has_it(write) 
 def test_a_whole_curve_comes_before_a_later_one_that_is_open(write) -> None:  # type: ignore[no-untyped-def]
     bench = write(
         HEAD,
-        friction_map=Identified(CURVE, settings=STRIBECK),
-        whole_model=Identified(CURVE[:2], settings=OPEN),
+        friction_map=IdentifiedRig(CURVE, settings=STRIBECK),
+        whole_model=IdentifiedRig(CURVE[:2], settings=OPEN),
     )
     assert bench.friction["load"].model == "stribeck"
 
 
 def test_a_bench_gets_no_friction_of_which_nothing_is_told(write) -> None:  # type: ignore[no-untyped-def]
     inertia = replace(measured("inertia", 3.0, "kg m^2"), bench="axis.inertia")
-    bench = write(HEAD, whole_model=Identified((inertia,), settings=OPEN))
+    bench = write(HEAD, whole_model=IdentifiedRig((inertia,), settings=OPEN))
     assert bench.axis.inertia == 3.0
     assert not bench.friction
 
@@ -174,7 +174,7 @@ def test_directions_are_not_lost_to_one_number_and_an_offset(write) -> None:  # 
     apart = (CURVE[0], measured("negative.coulomb_torque", 14.0, "N m"))
     one = (measured("coulomb_torque", 12.0, "N m"),)
     for each in ((apart, one), (one, apart)):
-        first, last = (Identified(found, settings=coulomb) for found in each)
+        first, last = (IdentifiedRig(found, settings=coulomb) for found in each)
         load = write(HEAD, inverse_dynamics=first, whole_model=last).friction["load"]
         assert (load.coulomb_torque, load.negative.coulomb_torque) == (10.0, 14.0)
 
@@ -184,13 +184,13 @@ def test_what_another_model_does_not_have_goes(write) -> None:  # type: ignore[n
         "friction.load.model": ("lugre", "", "fitted"),
         "friction.load.bristle_stiffness": (1e4, "N m/rad", "assumed"),
     }
-    bench = write(HEAD + SMOOTH, whole_model=Identified(CURVE, settings=settings))
+    bench = write(HEAD + SMOOTH, whole_model=IdentifiedRig(CURVE, settings=settings))
     assert bench.friction["load"].model == "lugre"
 
 
 def test_a_number_without_a_unit_is_a_number(write) -> None:  # type: ignore[no-untyped-def]
     curve = (*CURVE, measured("stribeck_exponent", 0.7, ""))
-    bench = write(HEAD + LUGRE, friction_map=Identified(curve, settings=STRIBECK))
+    bench = write(HEAD + LUGRE, friction_map=IdentifiedRig(curve, settings=STRIBECK))
     assert bench.friction["load"].stribeck_exponent == 0.7
     assert bench.known.values["friction.load.stribeck_exponent"].interval == (0.63, 0.77)
 
@@ -199,9 +199,9 @@ def test_curves_of_two_methods_are_not_mixed(write) -> None:  # type: ignore[no-
     first = {**STRIBECK, "friction.load.negative.stribeck_velocity": (1e-3, "rad/s", "open")}
     bench = write(
         HEAD,
-        friction_map=Identified(CURVE, settings=first),
-        inverse_dynamics=Identified((measured("coulomb_torque", 9.0, "N m"),)),
-        whole_model=Identified(CURVE, settings=STRIBECK),
+        friction_map=IdentifiedRig(CURVE, settings=first),
+        inverse_dynamics=IdentifiedRig((measured("coulomb_torque", 9.0, "N m"),)),
+        whole_model=IdentifiedRig(CURVE, settings=STRIBECK),
     )
     assert bench.friction["load"].coulomb_torque == 10.0
     assert bench.friction["load"].negative.stribeck_velocity is None
@@ -210,18 +210,18 @@ def test_curves_of_two_methods_are_not_mixed(write) -> None:  # type: ignore[no-
 def test_friction_of_all_interfaces_goes_to_none(write) -> None:  # type: ignore[no-untyped-def]
     text = HEAD + LUGRE + SMOOTH.replace("friction.load", "friction.mesh")
     inertia = replace(measured("inertia", 3.0, "kg m^2"), bench="axis.inertia")
-    found = Identified((*CURVE, inertia), settings=STRIBECK)
+    found = IdentifiedRig((*CURVE, inertia), settings=STRIBECK)
     bench = write(text, whole_model=found)
     assert bench.friction["load"].coulomb_torque == 16.0
     assert bench.axis.inertia == 3.0
     assert "mesh" in _with_place(Result(identified=found), bench).notes[-1]
 
 
-def of_appendage(*keys: str) -> Identified:
+def of_appendage(*keys: str) -> IdentifiedRig:
     units = {"inertia": "kg m^2", "frequency": "Hz", "damping_ratio": ""}
     parts = (replace(measured(k, 0.3, units[k]), bench=f"appendage.{k}") for k in keys)
     inertia = replace(measured("total", 3.0, "kg m^2"), bench="axis.inertia")
-    return Identified((inertia, *parts))
+    return IdentifiedRig((inertia, *parts))
 
 
 def test_half_an_elastic_part_is_not_written(write) -> None:  # type: ignore[no-untyped-def]
@@ -251,7 +251,7 @@ correlations = [["axis.inertia", "friction.load.bristle_damping", 0.5]]
 "friction.load.bristle_damping" = {origin = "fitted"}
 """
     pair = {("coulomb_torque", "static_torque"): 0.4}
-    found = Identified(CURVE, settings=STRIBECK, correlations=pair)
+    found = IdentifiedRig(CURVE, settings=STRIBECK, correlations=pair)
     told = write(HEAD + LUGRE + known, friction_map=found).known.correlations
     assert len(told) == 2
     assert told[0] == ("axis.inertia", "friction.load.bristle_damping", 0.5)
@@ -264,7 +264,7 @@ def test_what_is_identified_stands_in_the_file_beside_the_compensation_it_is_for
     inertia = replace(measured("inertia", 3.0, "kg"), bench="axis.inertia")
     head = HEAD.replace("kg m^2", "kg").replace('"tilt"', '"x"\nkind = "linear"')
     for text in (head + observer, head + observer + old):
-        bench = write(text, whole_model=Identified((inertia,)))
+        bench = write(text, whole_model=IdentifiedRig((inertia,)))
         assert bench.compensation["observer"].inertia == 2.0
         assert bench.compensation["observer-identified"].inertia == 3.0
         assert bench.compensation["observer-identified"].gain == 5.0

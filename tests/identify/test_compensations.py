@@ -18,7 +18,7 @@ from campaign.identify.compensations import (
     without_identified,
 )
 from campaign.identify.identification import Identification, Section, _with_place
-from campaign.parameter import Identified, Parameter
+from campaign.parameter import IdentifiedRig, Parameter
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.result import Result
@@ -80,7 +80,7 @@ def entries(text: str, **sections: Sequence[Parameter]) -> Entries:
         Section(
             experiments_by_model()[name],
             None,
-            result=_with_place(Result(identified=Identified(tuple(own))), bench),
+            result=_with_place(Result(identified=IdentifiedRig(tuple(own))), bench),
         )
         for name, own in sections.items()
     )

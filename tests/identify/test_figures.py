@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-from campaign.estimation.inverse.motion import Filtering, motion_of_position
+from campaign.estimation.inverse.motion import FilterSettings, motion_of_position
 from campaign.experiments.any_motion.figures import figures, friction_figure
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics, predicted
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
-from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.frequency_response.model.figures import figures as response_figures
 from campaign.experiments.frequency_response.model.frequency_fit import Masses
 from campaign.experiments.whole_model.models import models
@@ -30,9 +30,9 @@ def rig() -> Rig:
 
 @pytest.fixture(scope="module")
 def regression(rig: Rig) -> InverseDynamics:
-    filtering = Filtering.for_rate(1000.0)
+    filtering = FilterSettings.for_rate(1000.0)
     motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
-    pieces = [Moved(1, motion, None)]
+    pieces = [MotionPiece(1, motion, None)]
     return find_inverse(pieces, [], with_slowest(filtering, pieces, None), linear=False)
 
 

@@ -16,7 +16,7 @@ from campaign.errors import UsageError
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, identify
-from campaign.identify.material import Chosen, choose
+from campaign.identify.material import ChosenRun, choose
 from campaign.identify.page import _looks, write_identification
 from campaign.protocol import as_tree
 from campaign.resources import protocols_folder, templates_folder
@@ -41,7 +41,7 @@ def run_of(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> list
     return list(chosen(folder, answer, first, count).trials)
 
 
-def chosen(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> Chosen:
+def chosen(folder: Path, answer: Answer, first: int = 0, count: int = 7) -> ChosenRun:
     folder.mkdir()
     commands = [random_phases(GRID, 5.0, first + k) for k in range(count)]
     made = trials(folder, commands, "torque", 16.0)

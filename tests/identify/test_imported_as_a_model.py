@@ -22,7 +22,7 @@ from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify
 from campaign.identify.material import choose
 from campaign.options import Options
-from campaign.parameter import Identified, Parameter
+from campaign.parameter import IdentifiedRig, Parameter
 from campaign.reason import Cause
 from campaign.result import Result
 from tests.estimation.rigs import Rig
@@ -87,7 +87,7 @@ def test_a_report_has_the_warnings_of_a_model() -> None:
     left = Cause("half", "half of it is left out")()
 
     def identify(data: TestData, options: Options) -> Result:
-        return Result(notes=("a note",), identified=Identified((), left_out=(left,)))
+        return Result(notes=("a note",), identified=IdentifiedRig((), left_out=(left,)))
 
     kind = of_any_motion("any", "", BreakawayOptions, lambda trials: (trials, ""), identify)
     assert kind.analyse(TestData("", "", {}, ramp())).notes == (left.text, "a note")
@@ -102,7 +102,7 @@ def test_metrics_of_another_kind_are_not_those_of_the_model() -> None:
 
     def analyse(data: TestData) -> Result:
         found = metrics(data.trials[0], lambda item: archived[1:])["torque"]
-        return Result(identified=Identified((Parameter(found, ""),)))
+        return Result(identified=IdentifiedRig((Parameter(found, ""),)))
 
     kind = Experiment("any", "", Options, nothing_to_plan, analyse)
     data: Any = TestData("", "", {}, (foreign,), model=Options())  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.estimation.inverse.motion import (
-    Filtering,
+    FilterSettings,
     LateRows,
     Motion,
     decimated,
@@ -20,7 +20,7 @@ from campaign.estimation.inverse.motion import (
 )
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import TERMS
-from campaign.experiments.any_motion.motions import Moved, with_slowest
+from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.whole_model import parts
 from campaign.experiments.whole_model.models import models
 from campaign.experiments.whole_model.parts import telling_parts
@@ -36,7 +36,7 @@ from tests.estimation.rigs import random_rigs
 @pytest.mark.parametrize("decimation", [1, 10])
 def test_a_delay_and_a_low_pass_may_be_exchanged(decimation: int) -> None:
     force = np.cumsum(np.random.default_rng(1).standard_normal(4000))
-    filtering = Filtering(100.0, decimation, skip=7)
+    filtering = FilterSettings(100.0, decimation, skip=7)
     kept = LateRows(force, 1000.0, filtering)
     inner = slice(40, -40)
     for delay in (0.0, 0.0031, -0.0047):
@@ -54,7 +54,7 @@ def test_a_column_is_filtered_once_for_each_motion() -> None:
         return of.rate
 
     term = replace(TERMS["viscous"], column=column)
-    filtering = Filtering(100.0, 10)
+    filtering = FilterSettings(100.0, 10)
     first = rows(motion, [term], filtering)
     again = rows(motion, [term], replace(filtering, slowest=0.1), delay=1e-3)
     assert seen == [motion]
@@ -70,7 +70,7 @@ def test_a_column_is_filtered_once_for_each_motion() -> None:
     ("decimation", "every"), [(1, 1), (10, 1), (20, 2), (25, 1), (50, 5), (100, 10)]
 )
 def test_rows_have_ten_simulated_steps_or_more(decimation: int, every: int) -> None:
-    assert steps_between(Filtering(100.0, decimation)) == every
+    assert steps_between(FilterSettings(100.0, decimation)) == every
 
 
 @pytest.mark.parametrize("skip", [0, 33])
@@ -81,7 +81,7 @@ def test_rows_are_the_same_with_fewer_simulated_steps(skip: int) -> None:
     model = models(Sizes((2.0, 2.4), (0.5, 0.6), 1.0, 0.4))[1]
     names = ["inertia", *(each.name for each in model.unknowns), "delay"]
     values = (0.2, *(each.start for each in model.unknowns), 0.0)
-    filtering = Filtering(100.0, 50, skip)
+    filtering = FilterSettings(100.0, 50, skip)
     fine, coarse = (
         Residuals(names, model, (), [motion], filtering, every).modelled(values)[0]
         for every in (1, 5)
@@ -91,12 +91,12 @@ def test_rows_are_the_same_with_fewer_simulated_steps(skip: int) -> None:
     assert coarse[5:-5] == pytest.approx(fine[5:-5], abs=0.02 * float(np.ptp(fine)))
 
 
-def sliding(seconds: float, slow: tuple[float, float]) -> Moved:
+def sliding(seconds: float, slow: tuple[float, float]) -> MotionPiece:
     """Sines at 100 Hz, and hardly any motion from `slow[0]` to `slow[1]` (s)."""
     time = np.arange(round(100 * seconds)) / 100.0
     size = np.where((time >= slow[0]) & (time < slow[1]), 0.02, 1.0)
     motion = motion_of_rate(time, size * np.sin(0.7 * time) + size * np.sin(2.9 * time), time, 20.0)
-    return Moved(1, motion, motion)
+    return MotionPiece(1, motion, motion)
 
 
 def test_of_a_long_motion_the_parts_that_slide_slowly_are_among_those_fitted(
@@ -104,7 +104,7 @@ def test_of_a_long_motion_the_parts_that_slide_slowly_are_among_those_fitted(
 ) -> None:
     monkeypatch.setattr(parts, "MOST_STEPS", 3000)
     long = sliding(300.0, (103.0, 112.0))
-    filtering = replace(with_slowest(Filtering(20.0), [long], None), slowest=1e-3)
+    filtering = replace(with_slowest(FilterSettings(20.0), [long], None), slowest=1e-3)
     found = telling_parts([long], filtering)
     begins = [float(each.motion.time[0]) for each in found]
     assert begins == sorted(set(begins))
@@ -123,9 +123,9 @@ def test_of_a_long_motion_the_parts_that_slide_slowly_are_among_those_fitted(
 @pytest.mark.slow
 def test_every_model_and_every_fit_of_it_is_told_as_it_begins() -> None:
     rig = random_rigs(1, seed=4, seconds=3.0)[0]
-    filtering = Filtering(20.0, 10)
+    filtering = FilterSettings(20.0, 10)
     motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
-    pieces = [Moved(1, motion, None)]
+    pieces = [MotionPiece(1, motion, None)]
     said: list[str] = []
     found = find(pieces, [], with_slowest(filtering, pieces, None), starts=2, say=said.append)
     names = [each.model.name for each in found.fits]

@@ -29,7 +29,7 @@ from campaign.wire.messages import (
     End,
     Event,
     Format,
-    Lost,
+    LostRecords,
     Resend,
     Samples,
     State,
@@ -212,7 +212,14 @@ def test_records_of_another_trial_are_nobodys(clock: list[float]) -> None:
     """A ring still holds what was before; so LOST of that, too."""
     other = Samples(TRIAL + 1, 0, 0, 1, bytes(10))
     ending, recording, mine = collected(
-        Line(clock, other, Lost(TRIAL - 1, 0, 1), samples(0, 0), Lost(TRIAL + 1, 1, 1), end(1, 10))
+        Line(
+            clock,
+            other,
+            LostRecords(TRIAL - 1, 0, 1),
+            samples(0, 0),
+            LostRecords(TRIAL + 1, 1, 1),
+            end(1, 10),
+        )
     )
     assert ending.outcome is Outcome.COMPLETED
     check(recording, 10)
@@ -240,7 +247,7 @@ def test_what_came_before_the_line_broke_is_recorded(clock: list[float]) -> None
 
 def test_lost_samples_are_nan_and_said_to_be(clock: list[float]) -> None:
     """Records 1 and 2 are gone for good: 20 samples in every channel, never zero or the last."""
-    line = Line(clock, samples(0, 0), [samples(3, 30), Lost(TRIAL, 1, 2)], end(4, 40))
+    line = Line(clock, samples(0, 0), [samples(3, 30), LostRecords(TRIAL, 1, 2)], end(4, 40))
     ending, recording, mine = collected(line)
     check(recording, 40, range(10, 30))
     assert line.sent == []  # what is no more is not asked for again
@@ -259,7 +266,11 @@ def test_lost_samples_are_nan_and_said_to_be(clock: list[float]) -> None:
 
 def test_a_lost_beginning_and_a_lost_end_are_marked_as_well(clock: list[float]) -> None:
     ending, recording, mine = collected(
-        Line(clock, [samples(1, 10), Lost(TRIAL, 0, 1)], [end(3, 30), Lost(TRIAL, 2, 1)])
+        Line(
+            clock,
+            [samples(1, 10), LostRecords(TRIAL, 0, 1)],
+            [end(3, 30), LostRecords(TRIAL, 2, 1)],
+        )
     )
     assert np.isnan(recording["angle"]).tolist() == [True] * 10 + [False] * 10 + [True] * 10
     assert recording["current"][10:20].tolist() == [n / 4 for n in range(10, 20)]
@@ -268,7 +279,7 @@ def test_a_lost_beginning_and_a_lost_end_are_marked_as_well(clock: list[float]) 
 
 
 def test_lost_samples_stand_in_their_place_when_all_comes_at_once(clock: list[float]) -> None:
-    everything = [samples(0, 0), samples(2, 20), Lost(TRIAL, 1, 1), end(3, 30)]
+    everything = [samples(0, 0), samples(2, 20), LostRecords(TRIAL, 1, 1), end(3, 30)]
     _, recording, _ = collected(Line(clock, everything))
     check(recording, 30, range(10, 20))
 
@@ -276,7 +287,7 @@ def test_lost_samples_stand_in_their_place_when_all_comes_at_once(clock: list[fl
 def test_a_lost_event_is_a_fault_though_every_sample_is_there(clock: list[float]) -> None:
     """What it said cannot be known."""
     ending, recording, _ = collected(
-        Line(clock, samples(0, 0), [samples(2, 10), Lost(TRIAL, 1, 1)], end(3, 20))
+        Line(clock, samples(0, 0), [samples(2, 10), LostRecords(TRIAL, 1, 1)], end(3, 20))
     )
     check(recording, 20)
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES)
@@ -293,7 +304,7 @@ def test_samples_that_the_controller_skipped_are_marked(clock: list[float]) -> N
 
 def test_what_the_controller_says_of_its_trial_stays_with_it(clock: list[float]) -> None:
     """A fault keeps its name; of a limit, it is said; a stop by the operator is a fault now."""
-    lost = [samples(1, 10), Lost(TRIAL, 0, 1)]
+    lost = [samples(1, 10), LostRecords(TRIAL, 0, 1)]
     ways: tuple[tuple[OutcomeCode, FaultCode, Fault], ...] = (
         (OutcomeCode.FAULT, FaultCode.SENSOR, Fault.SENSOR),
         (OutcomeCode.FAULT, FaultCode.NONE, Fault.OTHER),

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from campaign.link.errors import ViolationError
-from campaign.link.records import LONGEST_PATIENCE, MOST, TRIES, Missing, RecordOrder
+from campaign.link.records import LONGEST_PATIENCE, MOST, TRIES, MissingRecords, RecordOrder
 from campaign.wire.messages import End, Fault, Outcome, Samples
 
 
@@ -57,7 +57,7 @@ def test_what_the_device_no_longer_has_is_missing() -> None:
     order = RecordOrder()
     order.add(samples(4), 0.0)
     order.lost(0, 3)
-    assert order.take() == [Missing(0, 3)]
+    assert order.take() == [MissingRecords(0, 3)]
     assert order.requests(0.0) == [(3, 1)]
 
 
@@ -69,7 +69,7 @@ def test_what_never_comes_is_given_up() -> None:
         now += LONGEST_PATIENCE
     assert order.take() == []
     assert order.requests(now) == []
-    assert order.take() == [Missing(0, 1), samples(1)]
+    assert order.take() == [MissingRecords(0, 1), samples(1)]
 
 
 def test_a_long_gap_is_asked_for_in_pieces() -> None:
@@ -98,7 +98,7 @@ def test_every_number_is_taken_once_or_missed_once(come: list[int], lost: set[in
     taken += order.take()
     numbers: list[int] = []
     for item in taken:
-        if isinstance(item, Missing):
+        if isinstance(item, MissingRecords):
             assert set(range(item.first, item.first + item.count)) <= lost - set(come)
             numbers += range(item.first, item.first + item.count)
         else:

@@ -6,7 +6,7 @@ import pytest
 
 from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin, Systematic
 from campaign.published.values import Cell
-from campaign.published.verdicts import Reproduced, deviation, judge, reproduced
+from campaign.published.verdicts import ReproducedNumber, deviation, judge, reproduced
 from campaign.result import Finding
 
 
@@ -17,62 +17,62 @@ def cell(value: float, relation: str = "equal", decimals: int | None = 1) -> Cel
 @pytest.mark.parametrize(
     ("found", "verdict"),
     [
-        (Reproduced(10.04), "agrees"),
-        (Reproduced(10.04, 9.1, 10.98), "agrees"),
-        (Reproduced(10.04, 1.0, 99.0), "undecided"),  # it may agree by luck
-        (Reproduced(10.06), "differs"),
-        (Reproduced(10.5, 9.9, 11.1), "compatible"),
-        (Reproduced(10.5, 9.55, 11.55), "compatible"),  # half-width 1.0, 10 % of 10
-        (Reproduced(10.5, 9.45, 11.55), "undecided"),
-        (Reproduced(10.5, 10.1, 10.9), "differs"),
-        (Reproduced(19.0, 9.9, 28.1), "undecided"),
-        (Reproduced(30.0, 10.1, 49.9), "differs"),
-        (Reproduced(10.5, 9.9, None), "undecided"),
-        (Reproduced(9.5, None, 10.1), "undecided"),
-        (Reproduced(10.5, 10.1, None), "differs"),
-        (Reproduced(9.5, None, 9.9), "differs"),
-        (Reproduced(10.0, 10.0, None, "at least"), "not reached"),
-        (Reproduced(12.0, None, 12.0, "at most"), "not reached"),
+        (ReproducedNumber(10.04), "agrees"),
+        (ReproducedNumber(10.04, 9.1, 10.98), "agrees"),
+        (ReproducedNumber(10.04, 1.0, 99.0), "undecided"),  # it may agree by luck
+        (ReproducedNumber(10.06), "differs"),
+        (ReproducedNumber(10.5, 9.9, 11.1), "compatible"),
+        (ReproducedNumber(10.5, 9.55, 11.55), "compatible"),  # half-width 1.0, 10 % of 10
+        (ReproducedNumber(10.5, 9.45, 11.55), "undecided"),
+        (ReproducedNumber(10.5, 10.1, 10.9), "differs"),
+        (ReproducedNumber(19.0, 9.9, 28.1), "undecided"),
+        (ReproducedNumber(30.0, 10.1, 49.9), "differs"),
+        (ReproducedNumber(10.5, 9.9, None), "undecided"),
+        (ReproducedNumber(9.5, None, 10.1), "undecided"),
+        (ReproducedNumber(10.5, 10.1, None), "differs"),
+        (ReproducedNumber(9.5, None, 9.9), "differs"),
+        (ReproducedNumber(10.0, 10.0, None, "at least"), "not reached"),
+        (ReproducedNumber(12.0, None, 12.0, "at most"), "not reached"),
     ],
 )
-def test_a_number(found: Reproduced, verdict: str) -> None:
+def test_a_number(found: ReproducedNumber, verdict: str) -> None:
     assert judge(cell(10.0), found) == verdict
 
 
 @pytest.mark.parametrize(
     ("relation", "found", "verdict", "percent"),
     [
-        ("at least", Reproduced(10.0), "met", None),
-        ("at least", Reproduced(9.0), "missed", -10.0),
-        ("at most", Reproduced(10.0), "met", None),
-        ("at most", Reproduced(11.0), "missed", 10.0),
-        ("at least", Reproduced(11.0, 10.0, 12.0), "met", None),
-        ("at least", Reproduced(11.0, 9.9, 12.1), "undecided", None),
-        ("at least", Reproduced(9.0, 7.9, 10.1), "undecided", None),
-        ("at least", Reproduced(9.0, 8.1, 9.9), "missed", -10.0),
-        ("at most", Reproduced(9.0, 8.0, 10.0), "met", None),
-        ("at most", Reproduced(9.0, 7.9, 10.1), "undecided", None),
-        ("at most", Reproduced(11.0, 9.9, 12.1), "undecided", None),
-        ("at most", Reproduced(11.0, 10.1, 11.9), "missed", 10.0),
+        ("at least", ReproducedNumber(10.0), "met", None),
+        ("at least", ReproducedNumber(9.0), "missed", -10.0),
+        ("at most", ReproducedNumber(10.0), "met", None),
+        ("at most", ReproducedNumber(11.0), "missed", 10.0),
+        ("at least", ReproducedNumber(11.0, 10.0, 12.0), "met", None),
+        ("at least", ReproducedNumber(11.0, 9.9, 12.1), "undecided", None),
+        ("at least", ReproducedNumber(9.0, 7.9, 10.1), "undecided", None),
+        ("at least", ReproducedNumber(9.0, 8.1, 9.9), "missed", -10.0),
+        ("at most", ReproducedNumber(9.0, 8.0, 10.0), "met", None),
+        ("at most", ReproducedNumber(9.0, 7.9, 10.1), "undecided", None),
+        ("at most", ReproducedNumber(11.0, 9.9, 12.1), "undecided", None),
+        ("at most", ReproducedNumber(11.0, 10.1, 11.9), "missed", 10.0),
         # Open on one side.
-        ("at least", Reproduced(11.0, 10.5, None), "met", None),
-        ("at least", Reproduced(11.0, None, 12.0), "undecided", None),
-        ("at most", Reproduced(9.0, None, 9.5), "met", None),
-        ("at most", Reproduced(9.0, 8.0, None), "undecided", None),
+        ("at least", ReproducedNumber(11.0, 10.5, None), "met", None),
+        ("at least", ReproducedNumber(11.0, None, 12.0), "undecided", None),
+        ("at most", ReproducedNumber(9.0, None, 9.5), "met", None),
+        ("at most", ReproducedNumber(9.0, 8.0, None), "undecided", None),
         # Never passed up to 12: the threshold itself was not seen, and meets nothing.
-        ("at least", Reproduced(12.0, 12.0, None, "at least"), "not reached", None),
-        ("at least", Reproduced(9.0, 9.0, None, "at least"), "not reached", None),
-        ("at most", Reproduced(12.0, 12.0, None, "at least"), "missed", None),
-        ("at least", Reproduced(9.0, None, 9.0, "at most"), "missed", None),
-        ("at most", Reproduced(9.0, None, 9.0, "at most"), "not reached", None),
-        ("near", Reproduced(10.04), "agrees", pytest.approx(0.4)),
-        ("near", Reproduced(10.4), "differs", pytest.approx(4.0)),
-        ("rank", Reproduced(10.0), "agrees", None),
-        ("rank", Reproduced(11.0, 9.0, 13.0), "differs", None),
+        ("at least", ReproducedNumber(12.0, 12.0, None, "at least"), "not reached", None),
+        ("at least", ReproducedNumber(9.0, 9.0, None, "at least"), "not reached", None),
+        ("at most", ReproducedNumber(12.0, 12.0, None, "at least"), "missed", None),
+        ("at least", ReproducedNumber(9.0, None, 9.0, "at most"), "missed", None),
+        ("at most", ReproducedNumber(9.0, None, 9.0, "at most"), "not reached", None),
+        ("near", ReproducedNumber(10.04), "agrees", pytest.approx(0.4)),
+        ("near", ReproducedNumber(10.4), "differs", pytest.approx(4.0)),
+        ("rank", ReproducedNumber(10.0), "agrees", None),
+        ("rank", ReproducedNumber(11.0, 9.0, 13.0), "differs", None),
     ],
 )
 def test_claims_and_ranks(
-    relation: str, found: Reproduced, verdict: str, percent: float | None
+    relation: str, found: ReproducedNumber, verdict: str, percent: float | None
 ) -> None:
     published = cell(10.0, relation)
     assert judge(published, found) == verdict
@@ -91,8 +91,8 @@ def test_what_is_not_determined_decides_nothing(
 
 
 def test_without_printed_digits_only_the_interval_can_agree() -> None:
-    assert judge(cell(10.0, decimals=None), Reproduced(10.04)) == "differs"
-    assert judge(cell(10.0, decimals=None), Reproduced(10.04, 9.9, 10.2)) == "compatible"
+    assert judge(cell(10.0, decimals=None), ReproducedNumber(10.04)) == "differs"
+    assert judge(cell(10.0, decimals=None), ReproducedNumber(10.04, 9.9, 10.2)) == "compatible"
 
 
 def test_the_interval_is_the_combined_one_in_the_printed_unit() -> None:

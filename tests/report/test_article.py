@@ -9,13 +9,13 @@ import pytest
 
 from campaign.errors import UsageError
 from campaign.report.article import write_article
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.formats import chosen_formats
 from campaign.report.formats.interface import Format
 from campaign.report.formats.report_data import ArticleData
 from campaign.report.page.article import Article, Part, problems_part
 from campaign.report.page.folder import Folder
-from campaign.report.page.pieces import Facts, Files, Folded, Items, Paragraph
+from campaign.report.page.pieces import Facts, Files, FoldedSection, Items, Paragraph
 from campaign.resources import templates_folder
 from campaign.result import Axis, Column, Curve, Figure, Panel, Table
 
@@ -32,7 +32,7 @@ def made() -> Article:
         panels=(Panel(Axis("Time", "s", "s"), Axis("Rate", "rad/s", "deg/s"),
                       [Curve([0.0, 1.0], [0.0, 1.0], "up", "measured")]),),
     )  # fmt: skip
-    shown = folder.figure(figure, Drawn.of(draw(figure), figure), (), "line")
+    shown = folder.figure(figure, DrawingFiles.of(draw(figure), figure), (), "line")
     table = Table("numbers", "Numbers of it", (Column("rate", "Rate", "rad/s", "deg/s"),),
                   ({"rate": 1.0}, {"rate": float("nan")}))  # fmt: skip
     grid = folder.shown_table(table, (), "numbers")
@@ -43,7 +43,7 @@ def made() -> Article:
         Items(("first thing", "second thing")),
         Facts((("a fact", "stands"),)),
         shown,
-        Folded("Unfold", (Items(("folded thing",)), grid)),
+        FoldedSection("Unfold", (Items(("folded thing",)), grid)),
         Files((("More in", grid.download),)),
     )
     return Article(

@@ -15,7 +15,7 @@ from campaign.experiments.interface import Experiment
 from campaign.physics.bench import Bench
 from campaign.physics.truth import digest, plant_of
 from campaign.report.content.document import Document, document_of
-from campaign.report.content.held_values import Held, held_by
+from campaign.report.content.held_values import HeldValue, held_by
 from campaign.result import Result
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
@@ -56,7 +56,7 @@ def document(
     return document_of(dataclasses.replace(run, trials=tuple(trials)), kinds)
 
 
-def one(numbers: Sequence[Held], quantity: str, direction: str = "") -> Held:
+def one(numbers: Sequence[HeldValue], quantity: str, direction: str = "") -> HeldValue:
     (found,) = (
         each
         for each in numbers

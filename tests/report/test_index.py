@@ -18,7 +18,7 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.reading.summary import summarise
 from campaign.errors import UsageError
 from campaign.report.index.page import entry_of, render, write_index
-from campaign.report.index.report_summary import told_by
+from campaign.report.index.report_summary import summary_of_report
 from campaign.report.index.sketch import sketch
 from campaign.resources import templates_folder
 
@@ -169,7 +169,7 @@ def test_what_the_report_says_is_the_verdict(results: Path):
 )
 def test_a_report_that_says_nothing_usable_is_still_linked(results: Path, tree: object):
     told(results, tree)
-    found = told_by(results / "sound-report")
+    found = summary_of_report(results / "sound-report")
     assert found.page is not None
     assert (found.sentence, found.headline) == ("", "")
     assert found.figure == results / "sound-report" / "figures" / "a-early.svg"
@@ -178,9 +178,9 @@ def test_a_report_that_says_nothing_usable_is_still_linked(results: Path, tree: 
 def test_what_is_too_large_is_left_alone_and_what_is_too_long_is_cut(results: Path, monkeypatch):
     path = results / "sound-report" / "report.json"
     told(results, {"opening": {"compared": "x" * 1000}})
-    assert told_by(path.parent).headline == "x" * 399 + "…"
+    assert summary_of_report(path.parent).headline == "x" * 399 + "…"
     monkeypatch.setattr("campaign.report.index.report_summary.LARGEST", 1000)
-    assert told_by(path.parent).headline == ""
+    assert summary_of_report(path.parent).headline == ""
 
 
 def test_trials_are_counted(tmp_path: Path):

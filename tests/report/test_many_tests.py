@@ -16,7 +16,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.reason import NONE, Reason
 from campaign.report.build import build_report
 from campaign.report.content.document import document_of
-from campaign.report.content.first_screen import MANY, Opening
+from campaign.report.content.first_screen import MANY, FirstScreen
 from campaign.report.formats import chosen_formats
 from campaign.result import Amount, Axis, Conclusion, Curve, Figure, Panel, Result
 
@@ -85,17 +85,17 @@ def kinds(made_up: ModuleType) -> dict[str, Experiment]:
 
 
 @pytest.fixture(scope="module")
-def opening(run: RunReader, kinds: dict[str, Experiment]) -> Opening:
+def opening(run: RunReader, kinds: dict[str, Experiment]) -> FirstScreen:
     return document_of(run, kinds).opening
 
 
-def test_what_has_an_interval_stands_on_top_one_test_of_a_kind(opening: Opening) -> None:
+def test_what_has_an_interval_stands_on_top_one_test_of_a_kind(opening: FirstScreen) -> None:
     measured = [f"measured-{n}" for n in range(MANY - 1)]
     assert list(opening.main) == [*measured, "tells-first"], "which says it in its first sentence"
     assert [each.test for each in opening.in_short.answers] == list(opening.main)
 
 
-def test_the_figure_on_top_is_of_a_test_that_stands_there(opening: Opening) -> None:
+def test_the_figure_on_top_is_of_a_test_that_stands_there(opening: FirstScreen) -> None:
     """Though others draw intervals, and these do not."""
     assert opening.telling == ("measured-0", "a")
 

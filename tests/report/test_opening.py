@@ -22,7 +22,7 @@ from campaign.recording import Ending, Outcome, SafeState
 from campaign.report.build import build_report, render
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
-from campaign.report.content.first_screen import Opening
+from campaign.report.content.first_screen import FirstScreen
 from campaign.report.content.run_problems import without_trials
 from campaign.result import (
     Amount,
@@ -76,7 +76,7 @@ def opening(made_up: ModuleType, folder: Path, /, *, run: RunReader | None = Non
     return document_of(found, experiments(made_up, **analyses)).opening
 
 
-def spoken(found: Opening) -> str:
+def spoken(found: FirstScreen) -> str:
     said = [found.asked, *found.wrong, found.compared]
     for answer in found.answers:
         said += [*answer.sentences, *answer.remarks, answer.truth, answer.problem]

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from campaign.published.values import read_published
 from campaign.report.drawing import figures
-from campaign.report.drawing.published_marks import PublishedBeside, told
+from campaign.report.drawing.published_marks import PublishedBeside, published_text
 from campaign.report.page.drawings import _drawing
 from campaign.report.palette import SERIES, looks
 from campaign.result import Array, Axis, Curve, Figure, Panel
@@ -171,12 +171,12 @@ def test_no_curve_is_drawn_where_a_parameter_is_missing() -> None:
 
 def test_the_caption_names_the_tables_of_each_sign() -> None:
     both = beside("1.1", "1.2", domain="hardware")
-    assert told(both.marks(over_frequency())) == "Hollow: Tables 1.1, 1.2."
-    assert told(both.marks(over_frequency(compensation="lugre"))) == (
+    assert published_text(both.marks(over_frequency())) == "Hollow: Tables 1.1, 1.2."
+    assert published_text(both.marks(over_frequency(compensation="lugre"))) == (
         "Hollow: Table 1.1; pale what is inconsistent or not reproducible."
     )
-    assert told(beside("1.3").marks(law("positive"))) == "Fine dotted line: Table 1.3."
-    assert told({}) == ""
+    assert published_text(beside("1.3").marks(law("positive"))) == "Fine dotted line: Table 1.3."
+    assert published_text({}) == ""
 
 
 # As they are drawn, and on the page
@@ -236,7 +236,9 @@ def test_a_bound_has_an_arrow_and_a_number_none(monkeypatch: pytest.MonkeyPatch)
     assert arrow.get_position()[1] > 0, "upwards"
     assert ax.get_ylim()[1] > 1000.0, "room for it"
     marks = beside("1.4").marks(over_frequency(compensation="observer"))
-    assert told(marks) == "Hollow: Table 1.4. Hollow, with an arrow (at least): Table 1.4."
+    assert (
+        published_text(marks) == "Hollow: Table 1.4. Hollow, with an arrow (at least): Table 1.4."
+    )
 
 
 def test_the_page_says_beside_a_figure_what_its_hollow_marks_are() -> None:

@@ -211,7 +211,7 @@ def test_a_real_bench_does_not_move_before_somebody_says_so(
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))  # no terminal, whatever it holds
     with pytest.raises(UsageError, match="--yes"):
         run_protocol(request, results, workers=None, report=False)
-    monkeypatch.setattr("campaign.cli.ask.somebody_is_there", lambda: True)
+    monkeypatch.setattr("campaign.cli.ask.has_terminal", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
     with pytest.raises(NotStartedError, match="nothing has moved"):
         run_protocol(request, results, workers=None, report=False)

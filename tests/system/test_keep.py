@@ -17,7 +17,7 @@ from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.decisions import extremes
 from campaign.experiments.post_processing.recording_checks import doubt
-from campaign.policy import Keeping
+from campaign.policy import SampleRetention
 from campaign.reason import Cause
 from campaign.recording import Ending, Outcome
 from campaign.trial import Role
@@ -171,12 +171,12 @@ def test_failed_trials_and_checks_keep_theirs():
     trial = make_trials(1)[0]
     failed, done = Ending(Outcome.LIMIT, "too fast"), Ending(Outcome.COMPLETED)
     for keep, kept in (("none", False), ("failed", True), ("extremes", True), (1, True)):
-        rule = Keeping(keep).rule(trial, 1)
+        rule = SampleRetention(keep).rule(trial, 1)
         assert rule is not None
         assert rule(done)
         assert (rule(failed) == "") is kept
-        assert Keeping(keep).rule(trial.model_copy(update={"role": Role.CHECK}), 1) is None
-    assert Keeping.of(2, make_trials(5)).first == {1, 2}
+        assert SampleRetention(keep).rule(trial.model_copy(update={"role": Role.CHECK}), 1) is None
+    assert SampleRetention.of(2, make_trials(5)).first == {1, 2}
 
 
 def value(name: str, size: float) -> tuple[Estimate, ...]:

@@ -48,7 +48,7 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """No agent, no dialog and no terminal of whoever runs the tests."""
     for name in ("SSH_AUTH_SOCK", "SSH_ASKPASS", "SSH_ASKPASS_REQUIRE", "DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("campaign.cli.sign.somebody_is_there", lambda: False)
+    monkeypatch.setattr("campaign.cli.sign.has_terminal", lambda: False)
 
 
 @pytest.fixture

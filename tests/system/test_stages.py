@@ -23,7 +23,7 @@ from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
-from campaign.execution.trial_metrics import Measuring
+from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response import experiment as frequency_response
 from campaign.experiments.interface import TrialData
@@ -194,7 +194,7 @@ def test_a_stage_measures_in_a_limited_time(lab: Lab):
     kind = replace(experiments()["frequency_response"], measure=hangs)
     with experiments().including(kind), lab.patch.context() as patch:
         patch.setattr(frequency_response, "_measure", hangs)
-        patch.setattr(session, "Measuring", partial(Measuring, limit=0.02))
+        patch.setattr(session, "TrialMeasurement", partial(TrialMeasurement, limit=0.02))
         run = lab.run()
     assert run.status != "interrupted"
     assert set(threads) == {"measuring"}

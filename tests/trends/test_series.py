@@ -13,7 +13,7 @@ from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Reason
 from campaign.trends.covariates import Covariate
 from campaign.trends.members import Member
-from campaign.trends.rig_trends import WITHIN, Followed, Verdict, _followed, _judged
+from campaign.trends.rig_trends import WITHIN, TrendSeries, Verdict, _followed, _judged
 from campaign.trends.series import Point, Series, add_point, made
 
 CALIBRATED = "torque constant"
@@ -52,7 +52,7 @@ def series(*found: Estimate, constants: str = "") -> Series:
 TIME = Covariate("time", "Time", "d", "month", 30.0, ordered=True, at=lambda m, _: 30.0 * m.number)
 
 
-def judged(*all_of: Series) -> list[Followed]:
+def judged(*all_of: Series) -> list[TrendSeries]:
     return _judged([_followed(each, TIME) for each in all_of], ordered=True)[0]
 
 

@@ -48,7 +48,7 @@ def channels(draw: st.DrawFn) -> wire.Channels:
     return wire.Channels(draw(U16), first + len(listed) + draw(U8) % 50, first, rate, listed)
 
 
-def _range(kind: type[wire.Resend] | type[wire.Lost]) -> st.SearchStrategy[wire.Message]:
+def _range(kind: type[wire.Resend] | type[wire.LostRecords]) -> st.SearchStrategy[wire.Message]:
     pairs = st.tuples(U32, POSITIVE).map(lambda p: (p[0], min(p[1], 2**32 - p[0])))
     return st.tuples(U32, pairs).map(lambda p: kind(p[0], *p[1]))
 
@@ -83,7 +83,7 @@ DEVICE = st.one_of(
     st.builds(
         wire.End, U32, U32, st.sampled_from(wire.Outcome), FAULTS, U32, st.booleans(), TEXT
     ),
-    _range(wire.Lost),
+    _range(wire.LostRecords),
     st.builds(
         wire.Latch, st.booleans(), U32, st.sampled_from(wire.LatchCause), st.none() | FINITE, TEXT
     ),

@@ -127,7 +127,7 @@ EXAMPLES = [
     wire.Nak(3, 3, wire.NakCode.LIMIT, wire.State.CONFIGURED, "task.command", "too fast"),
     wire.Samples(1, 0, 0, 2, struct.pack("<dhdh", 0.5, 100, -0.5, -100)),
     wire.End(1, 2, wire.Outcome.FAULT, wire.Fault.DRIVE, 2, True, "drive fault 17"),
-    wire.Lost(1, 0, 3),
+    wire.LostRecords(1, 0, 3),
     wire.Latch(True, 3, wire.LatchCause.STOPPED, 2.5, "stop"),
 ]
 """What the text above the examples says they are, in the order of the examples."""

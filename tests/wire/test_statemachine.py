@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from campaign.wire.codes import COMMANDS, Kind, NakCode, Outcome, State
 from campaign.wire.statemachine import (
-    Numbering,
+    SequenceNumbers,
     Turn,
     after,
     after_end,
@@ -77,7 +77,7 @@ def test_every_safe_but_the_holders_latches() -> None:
 
 
 def test_numbers_follow_each_other_over_the_wrap() -> None:
-    numbering = Numbering()
+    numbering = SequenceNumbers()
     for number in (0, 1):
         assert numbering.turn(Kind.SET, number, b"a") is Turn.OUT_OF_ORDER  # nobody said HELLO
     assert numbering.turn(Kind.SAFE, 9, b"") is Turn.NEW
@@ -96,7 +96,7 @@ def test_numbers_follow_each_other_over_the_wrap() -> None:
 
 
 def test_the_same_number_and_body_of_another_kind_is_no_repetition() -> None:
-    numbering = Numbering()
+    numbering = SequenceNumbers()
     numbering.begin(session=1, sequence=1)
     assert numbering.turn(Kind.START, 2, b"") is Turn.NEW
     assert numbering.turn(Kind.STOP, 2, b"") is Turn.OUT_OF_ORDER
@@ -104,7 +104,7 @@ def test_the_same_number_and_body_of_another_kind_is_no_repetition() -> None:
 
 
 def test_a_session_is_the_same_until_another_begins() -> None:
-    numbering = Numbering()
+    numbering = SequenceNumbers()
     assert numbering.same_session(7) is False
     numbering.begin(session=7, sequence=9)
     assert numbering.same_session(7) is True
@@ -116,7 +116,7 @@ def test_a_session_is_the_same_until_another_begins() -> None:
 @given(st.lists(st.tuples(st.integers(0, 3), st.booleans()), max_size=30))
 def test_each_command_is_carried_out_once_and_in_order(sendings: list[tuple[int, bool]]) -> None:
     """A host that sends again until it is answered, over a line that repeats and loses."""
-    numbering = Numbering()
+    numbering = SequenceNumbers()
     numbering.begin(session=5, sequence=0)
     carried_out, number = [], 1
     for repetitions, arrives in sendings:

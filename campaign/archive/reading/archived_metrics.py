@@ -16,7 +16,7 @@ from campaign.estimate import Estimate
 
 
 @dataclass(frozen=True)
-class Measured:
+class ArchivedMetrics:
     """What was found.
 
     Attributes:
@@ -30,11 +30,11 @@ class Measured:
     problem: str = ""
 
 
-Measure = Callable[[ArchivedTrial], Measured]
+Measure = Callable[[ArchivedTrial], ArchivedMetrics]
 """Measures a trial that is archived. Raises nothing."""
 
 
-def trial_measured(at: str, finished: TrialFinished, found: Measured) -> TrialMeasured:
+def trial_measured(at: str, finished: TrialFinished, found: ArchivedMetrics) -> TrialMeasured:
     """The line of the journal for what was found of a trial."""
     return TrialMeasured.model_validate(
         {

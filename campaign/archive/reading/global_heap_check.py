@@ -34,7 +34,7 @@ def known_heaps() -> dict[Looked, bool]:
     return dict(_known)
 
 
-def told_of_heaps(known: Mapping[Looked, bool]) -> None:
+def add_known_heaps(known: Mapping[Looked, bool]) -> None:
     """What another process knows of files that are still the same."""
     _known.update(known)
 

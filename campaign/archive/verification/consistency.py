@@ -23,7 +23,7 @@ _BESIDE = {"published", "policy"}
 
 
 @dataclass(frozen=True)
-class Executed:
+class TrialFacts:
     """What is compared of a trial that is there; its bench and samples are let go of.
 
     Attributes:
@@ -43,7 +43,7 @@ class Executed:
     safe_state: str
 
     @classmethod
-    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> Executed:
+    def of(cls, entry: str, place: str, archived: ArchivedTrial, fingerprint: str) -> TrialFacts:
         trial, ending = archived.trial, archived.ending
         return cls(
             entry=entry,
@@ -100,7 +100,7 @@ def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList)
 
 
 def check_trials(
-    story: Lines, there: Mapping[str, Executed], unreadable: Iterable[str], found: DamageList
+    story: Lines, there: Mapping[str, TrialFacts], unreadable: Iterable[str], found: DamageList
 ) -> None:
     """Each finished trial of the journal is there, ended as it says; `unreadable` are told of."""
     told = entry_names(story.attempts)
@@ -120,7 +120,7 @@ def check_trials(
 def check_plan(
     plan: tuple[PlannedTrial, ...],
     header: RunHeader,
-    there: Iterable[Executed],
+    there: Iterable[TrialFacts],
     place: str,
     found: DamageList,
     followed: int = 0,

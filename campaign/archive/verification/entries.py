@@ -27,11 +27,11 @@ from campaign.archive.layout.record import Trees, TrialRecord, series_of
 from campaign.archive.reading import safe_hdf5
 from campaign.archive.reading.archived_samples import TIME, PackedSamples
 from campaign.archive.reading.damage import DamageList
-from campaign.archive.reading.global_heap_check import known_heaps, told_of_heaps
+from campaign.archive.reading.global_heap_check import add_known_heaps, known_heaps
 from campaign.archive.reading.packed_trial_reader import packed_record, read_packed
 from campaign.archive.reading.sealed_run import read_entry
 from campaign.archive.reading.series import series_at
-from campaign.archive.verification.consistency import Executed
+from campaign.archive.verification.consistency import TrialFacts
 from campaign.archive.verification.result import UNFINISHED, Progress
 from campaign.archive.writing import nexus
 from campaign.archive.writing.default_plot import Aim
@@ -68,11 +68,11 @@ class EntryCheck:
         self.path = path
         self.problems = DamageList(path)
         self.remarks = DamageList(path)
-        self.executed: dict[str, Executed] = {}
+        self.executed: dict[str, TrialFacts] = {}
         self.unreadable: set[str] = set()
         self.datasets = 0
         self.size = 0
-        self.instruments: list[tuple[int, nexus.Described, EntryCheck]] = []
+        self.instruments: list[tuple[int, nexus.InstrumentDescription, EntryCheck]] = []
 
     def absorb(self, other: EntryCheck) -> None:
         """Add what others show; an instrument that was added before counts once."""
@@ -86,7 +86,7 @@ class EntryCheck:
                 self.instruments.append((address, described, found))
                 self.absorb(found)
 
-    def _has(self, address: int, described: nexus.Described) -> bool:
+    def _has(self, address: int, described: nexus.InstrumentDescription) -> bool:
         return any(each[0] == address and each[1] == described for each in self.instruments)
 
     def trial_file(self, entry: str, finished: TrialFinished) -> None:
@@ -121,7 +121,7 @@ class EntryCheck:
     def _record(self, place: str, entry: str, record: TrialRecord, trees: Trees) -> None:
         if record.fingerprint_of(trees) != record.fingerprint:
             self.problems.add(f"{place}/record", "does not match its fingerprint")
-        self.executed[entry] = Executed(
+        self.executed[entry] = TrialFacts(
             entry=entry,
             place=place,
             number=record.number,
@@ -162,10 +162,12 @@ class EntryCheck:
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
         self._by_themselves(group, place, "record", ("trees",))
         if set(nexus.MEMBERS) <= there & wanted:
-            described = nexus.Described.of(trees[str(record.trial["bench"])])
+            described = nexus.InstrumentDescription.of(trees[str(record.trial["bench"])])
             self._instrument(group, place, described)
 
-    def _instrument(self, group: h5py.Group, place: str, described: nexus.Described) -> None:
+    def _instrument(
+        self, group: h5py.Group, place: str, described: nexus.InstrumentDescription
+    ) -> None:
         """The definition and the instrument, which trials of one bench share: each once."""
         address = h5o.get_info(safe_hdf5.inner_group(group, "instrument").id).addr
         if self._has(address, described):
@@ -240,7 +242,7 @@ def _checked(path: Path, parts: Sequence[Entries], many: bool) -> Iterator[Entry
     if count == 1:
         yield from (_check(path, part) for part in parts)
         return
-    with processes.process_pool(count, PRELOADED, told_of_heaps, known_heaps()) as pool:
+    with processes.process_pool(count, PRELOADED, add_known_heaps, known_heaps()) as pool:
         begun: list[Future[EntryCheck]] = []
         with suppress(BrokenProcessPool):  # keeps those before
             begun.extend(pool.submit(_check, path, part) for part in parts)

@@ -26,7 +26,7 @@ from campaign.archive.reading.run_reader import RunReader
 from campaign.archive.reading.seal import NUMBERS, OUTSIDE, SealedTexts
 from campaign.archive.reading.sealed_run import NOTES, read_not_kept
 from campaign.archive.verification import consistency
-from campaign.archive.verification.consistency import Executed
+from campaign.archive.verification.consistency import TrialFacts
 from campaign.archive.verification.entries import EntryCheck, check_entries, places
 from campaign.archive.verification.result import (
     STRUCTURE,
@@ -118,7 +118,7 @@ class _Check(EntryCheck):
             for archived in (*run.trials, *chain(*run.earlier_attempts.values())):
                 if (entry := archived.entry) in gone:
                     fingerprint = archived.trial.fingerprint
-                    self.executed[entry] = Executed.of(entry, f"/{entry}", archived, fingerprint)
+                    self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)
             for why, entries in reasons.items():
                 more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
                 what = f"no samples of it{more} are kept: {why}; their digests are"

@@ -53,13 +53,13 @@ def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
     return {channel.name for channel in channels}.issuperset(REQUIRED)
 
 
-def write_definition(entry: h5py.Group, bench: Described) -> None:
+def write_definition(entry: h5py.Group, bench: InstrumentDescription) -> None:
     """Say that `entry` follows the definition, and describe its bench."""
     hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
     h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
 
 
-def differences(entry: h5py.Group, bench: Described) -> Iterator[tuple[str, str]]:
+def differences(entry: h5py.Group, bench: InstrumentDescription) -> Iterator[tuple[str, str]]:
     """What of an entry's definition and instrument is not what the bench says: name, and what."""
     definition = entry["definition"]
     if definition[()] != DEFINITION.encode() or definition.attrs.get("version") != VERSION:
@@ -76,7 +76,7 @@ def differences(entry: h5py.Group, bench: Described) -> Iterator[tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Described:
+class InstrumentDescription:
     """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
 
     An archive keeps benches of any origin, so nothing of their layout is taken for granted.
@@ -87,7 +87,7 @@ class Described:
     sides: Sides = BOTH_ROTARY
 
     @classmethod
-    def of(cls, bench: Tree) -> Described:
+    def of(cls, bench: Tree) -> InstrumentDescription:
         loops = bench.get("controller")
         gains = (
             (loop, *found)
@@ -98,7 +98,7 @@ class Described:
 
 
 @lru_cache(maxsize=32)
-def _template(bench: Described) -> h5py.File:
+def _template(bench: InstrumentDescription) -> h5py.File:
     """A file in memory that holds the instrument."""
     file = hdf5.memory_file("instrument")
     instrument = hdf5.make_group(file, "instrument", "NXinstrument")

@@ -58,7 +58,7 @@ class SealedFile:
         self.not_kept: dict[str, str] = {}
         self._part = part
         self._trees: dict[str, str] = {}  # lines by digest
-        self._instruments: dict[nexus.Described, str] = {}
+        self._instruments: dict[nexus.InstrumentDescription, str] = {}
         self._hash_place: tuple[int, int]  # once it is finished
         self._file = hdf5.create_file(part)
         self._entries = EntryWriter(self._file)
@@ -149,7 +149,7 @@ class SealedFile:
         """Say that it follows the application definition; each bench is described once."""
         if not nexus.follows_definition(record.series):
             return
-        described = nexus.Described.of(trees[str(record.trial["bench"])])
+        described = nexus.InstrumentDescription.of(trees[str(record.trial["bench"])])
         group = self._file[entry]
         if (first := self._instruments.get(described)) is not None:
             for name in nexus.MEMBERS:

@@ -15,7 +15,7 @@ from campaign.archive.layout.journal import Entry, TrialAbandoned, TrialFinished
 from campaign.archive.reading.archived_metrics import trial_measured
 from campaign.errors import ArchiveError
 from campaign.estimate import Estimate, Window
-from campaign.policy import KEEP_ALL, Keeping, NotKept
+from campaign.policy import KEEP_ALL, NotKept, SampleRetention
 from campaign.recording import ChannelInfo, Ending, Event
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
@@ -45,7 +45,7 @@ class FolderWriter:
         self._entries: list[Entry] = []
         self._files: list[tuple[Path, Path]] = []
 
-    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
+    def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> TrialWriter:
         """As `RunWriter.begin`."""
         note, attempt = self._entries.append, self._attempts[trial.number]
 

@@ -28,7 +28,7 @@ from campaign.archive.writing.run_lock import RunLock
 from campaign.archive.writing.trial_writer import TrialWriter
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
-from campaign.policy import KEEP_ALL, Keeping
+from campaign.policy import KEEP_ALL, SampleRetention
 from campaign.recording import Outcome, SafeState
 from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Trial
@@ -145,7 +145,7 @@ class RunWriter:
         with self._lock:
             return {number: self._last[number].outcome for number in sorted(self._last)}
 
-    def begin(self, trial: Trial, keeping: Keeping = KEEP_ALL) -> TrialWriter:
+    def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> TrialWriter:
         """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
 
         A trial is executed by one thread at a time. `keeping` says whether its samples are

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from campaign.axis_kind import sides_in
 from campaign.backends.handover import checks
 from campaign.backends.handover.excitation import shown
-from campaign.backends.handover.returned_recording import Returned
+from campaign.backends.handover.returned_recording import ReturnedRecording
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -40,23 +40,28 @@ LIMITED = {DRIVE_TORQUE: "torque", MOTOR_CURRENT: "current"}
 """The limit of a bench that holds a torque, by channel."""
 
 
-class Refused(Exception):  # noqa: N818 - of a recording, not of this program
+class RefusedRecording(Exception):  # noqa: N818 - of a recording, not of this program
     """A recording that is not what was asked.
 
     Attributes:
         recording: what there is of it, None when it cannot be read.
     """
 
-    def __init__(self, found: checks.RecordingProblem, recording: Returned | None = None) -> None:
+    def __init__(
+        self, found: checks.RecordingProblem, recording: ReturnedRecording | None = None
+    ) -> None:
         self.found = found
         self.recording = recording
         super().__init__(str(found))
 
 
-def as_asked(
-    trial: Trial, recording: Returned, others: Sequence[Trial], may_clip: Collection[str] = ()
-) -> Returned:
-    """The recording as it is archived. Raises Refused when it is not what was asked.
+def accepted_recording(
+    trial: Trial,
+    recording: ReturnedRecording,
+    others: Sequence[Trial],
+    may_clip: Collection[str] = (),
+) -> ReturnedRecording:
+    """The recording as it is archived. Raises RefusedRecording when it is not what was asked.
 
     Args:
         others: trials whose recording it could be instead.
@@ -66,16 +71,16 @@ def as_asked(
     recording, stopped = _until_stopped(trial, recording)
     asked = task.command.sample(recording.time)
     if found := checks.wrong_length(task, len(recording.time), stopped):
-        raise Refused(found, recording)
+        raise RefusedRecording(found, recording)
     good = ~recording.lost
     series = {name: values[good] for name, values in recording.by_name.items()}
     for name, values in series.items():
         if not np.isfinite(values).all():
             first = int(np.argmax(~np.isfinite(recording[name]) & good))
             told = f"{name} has no value at {recording.time[first]:.6g} s"
-            raise Refused(checks.RecordingProblem("undefined", told), recording)
+            raise RefusedRecording(checks.RecordingProblem("undefined", told), recording)
     if not good.any():
-        raise Refused(
+        raise RefusedRecording(
             checks.RecordingProblem("undefined", "all of its samples are missing"), recording
         )
     asked = asked[good]
@@ -93,11 +98,11 @@ def as_asked(
     unlimited = {name: values for name, values in series.items() if name not in may_clip}
     found = found or checks.clipped(task, unlimited, asked, _torque_limits(trial), words)
     if found is not None:
-        raise Refused(found, recording)
+        raise RefusedRecording(found, recording)
     return recording
 
 
-def _until_stopped(trial: Trial, recording: Returned) -> tuple[Returned, bool]:
+def _until_stopped(trial: Trial, recording: ReturnedRecording) -> tuple[ReturnedRecording, bool]:
     """Up to the rate that ends the trial, and as far behind it as is needed; whether it got there.
 
     Nothing behind that rate breaks a limit.
@@ -147,7 +152,7 @@ def _torque_limits(trial: Trial) -> dict[str, float]:
     return {name: float(getattr(limits, key)) for name, key in LIMITED.items()} if limits else {}
 
 
-def not_completed(trial: Trial, recording: Returned) -> str:
+def not_completed(trial: Trial, recording: ReturnedRecording) -> str:
     """Why the recorder will not take it for completed, in words; empty where it will."""
     if recording.lost.any():
         return f"lost samples: {int(recording.lost.sum())} of its samples are missing"
@@ -155,7 +160,7 @@ def not_completed(trial: Trial, recording: Returned) -> str:
     return f"limit: {violation.text}" if violation else ""
 
 
-def _violation(trial: Trial, recording: Returned) -> Violation | None:
+def _violation(trial: Trial, recording: ReturnedRecording) -> Violation | None:
     """The first sample beyond a limit of the bench."""
     limits = _limits(trial)
     if limits is None:

@@ -67,7 +67,7 @@ def layout_of(trial: Trial, known: Mapping[str, Layout], name: str, path: Path) 
     raise ProtocolError([Problem(path, 0, 0, message)])
 
 
-def asked_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def requested_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The channels that some of `trials` require, with the command; and those of use to some."""
     required = dict.fromkeys((COMMAND, *(name for trial in trials for name in trial.requires)))
     useful = dict.fromkeys(name for trial in trials for name in trial.can_use)
@@ -87,7 +87,7 @@ def first_mapping(trials: Sequence[Trial]) -> str:
 
 
 def _layout(name: str, mode: str, trials: Sequence[Trial]) -> str:
-    required, useful = asked_channels(trials)
+    required, useful = requested_channels(trials)
     axis = axis_of(trials[0])
     text = f'\n[columns.{name}.time]\ncolumn = "time"\nunit = "s"\n'
     for channel in required:

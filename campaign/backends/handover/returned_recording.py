@@ -12,7 +12,7 @@ import numpy as np
 from campaign.backends.handover.excitation import axis_of, facts_of, samples_of
 from campaign.channels import COMMAND, GYRO_RATE, RELATIVE_RATE, info, missing
 from campaign.importing.derived_channels import AT_REST
-from campaign.importing.description import Described
+from campaign.importing.description import RecordingDescription
 from campaign.importing.mapped_trials import describe
 from campaign.importing.mapping import Layout, RecordingEntry
 from campaign.importing.reader import RecordingReader
@@ -26,7 +26,7 @@ DRIFT = 0.25
 
 
 @dataclass(frozen=True)
-class Returned:
+class ReturnedRecording:
     """What came back, as a recorder wants it.
 
     Attributes:
@@ -56,7 +56,7 @@ class Returned:
         rows = zip(self.channels, self.samples, strict=True)
         return {channel.name: row for channel, row in rows}
 
-    def cut(self, count: int, remark: str) -> Returned:
+    def cut(self, count: int, remark: str) -> ReturnedRecording:
         """Its first samples."""
         return replace(
             self,
@@ -77,7 +77,7 @@ class ColumnsError(ValueError):
 
 def read_returned(
     trial: Trial, files: Sequence[Path], layout: Layout, wanted: Collection[str]
-) -> Returned:
+) -> ReturnedRecording:
     """The recording that lies in `files`, which have one clock.
 
     Raises RecordingError for files that cannot be read, MappingError for what does not go with the
@@ -105,10 +105,12 @@ def read_returned(
         remarks.append(f"what it has after the trial, {over / rate:.4g} s, is left out")
     samples, lost = _on_the_grid(samples, lost, ratio, samples_of(task), remarks)
     time = np.arange(samples.shape[1]) / task.sample_rate
-    return Returned(channels, time, samples, lost, rate, described.samples / rate, tuple(remarks))
+    return ReturnedRecording(
+        channels, time, samples, lost, rate, described.samples / rate, tuple(remarks)
+    )
 
 
-def _check_channels(trial: Trial, described: Described) -> None:
+def _check_channels(trial: Trial, described: RecordingDescription) -> None:
     """Raises ColumnsError where a channel is lacking, or made as if the hull were at rest."""
     names = [each.name for each in described.channels]
     if lacking := missing(trial.requires, names):

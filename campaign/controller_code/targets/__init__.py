@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 
 Array = NDArray[np.float64]
 BOUND = 1e-8
@@ -28,7 +28,7 @@ class Target:
     """
 
     name: str
-    write: Callable[[Sampled, Sequence[str], Array], dict[str, str]]
+    write: Callable[[SampledCompensation, Sequence[str], Array], dict[str, str]]
 
 
 def targets() -> dict[str, Target]:
@@ -38,12 +38,12 @@ def targets() -> dict[str, Target]:
     return {target.name: target for module in modules for target in module.TARGETS}
 
 
-def vectors(made: Sampled, inputs: Array) -> Array:
+def vectors(made: SampledCompensation, inputs: Array) -> Array:
     """`INPUTS` and the torque of this program, shape (n, 5)."""
     return np.column_stack([inputs, made.torques(inputs)])
 
 
-def about(made: Sampled, head: Sequence[str]) -> list[str]:
+def about(made: SampledCompensation, head: Sequence[str]) -> list[str]:
     """Lines that stand above any code: where it comes from, and how to call it."""
     period = float(made.controller.period[0])
     return [

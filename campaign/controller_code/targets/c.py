@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 from campaign.controller_code.sample import MEMORY, rows_of, sample
 from campaign.controller_code.syntax import INTEGER, NUMBER, TRUTH, Argument, Syntax, signs
 from campaign.controller_code.targets import Array, Target, about, vectors
@@ -100,7 +100,7 @@ def _struct(name: str, fields: Mapping[str, str]) -> str:
     return f"typedef struct {{ {' '.join(f'{k} {n};' for n, k in fields.items())} }} {name};\n"
 
 
-def c_code(made: Sampled, head: Sequence[str], *, single: bool = False) -> str:
+def c_code(made: SampledCompensation, head: Sequence[str], *, single: bool = False) -> str:
     """The whole of `NAME.c`; head: lines that stand above it. single: in floats."""
     name, program = made.identifier, Program(syntax(single=single))
     main, rows = sample(program, made), rows_of(made)
@@ -141,8 +141,8 @@ int {name}_selftest(void)
 """
 
 
-def vectors_code(made: Sampled, inputs: Array, *, single: bool = False) -> str:
-    """A program that ends with 0 where the code gives the torques of `Sampled.torques`.
+def vectors_code(made: SampledCompensation, inputs: Array, *, single: bool = False) -> str:
+    """A program that ends with 0 where the code gives the torques of `SampledCompensation.torques`.
 
     To the bit; in single precision to `SINGLE` of the largest.
     """
@@ -192,7 +192,7 @@ def _begins(name: str) -> str:
 
 
 def _files(
-    made: Sampled, head: Sequence[str], inputs: Array, *, single: bool = False
+    made: SampledCompensation, head: Sequence[str], inputs: Array, *, single: bool = False
 ) -> dict[str, str]:
     name = made.identifier
     told = f"In single precision: to {SINGLE:g} of the largest torque of the test vectors."

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 from campaign.controller_code.sample import MEMORY, rows_of, sample
 from campaign.controller_code.syntax import INTEGER, NUMBER, TRUTH, Argument, Syntax, signs
 from campaign.controller_code.targets import BOUND, Array, Target, about, vectors
@@ -100,7 +100,7 @@ def _function(
     return "\n".join([head, *body, "end", ""])
 
 
-def m_code(made: Sampled, head: Sequence[str]) -> str:
+def m_code(made: SampledCompensation, head: Sequence[str]) -> str:
     """The whole of `NAME.m`; head: lines that stand above it."""
     name, program = made.identifier, Program(syntax())
     main, rows = sample(program, made), rows_of(made)
@@ -128,7 +128,7 @@ def m_code(made: Sampled, head: Sequence[str]) -> str:
     ])  # fmt: skip
 
 
-def script(made: Sampled, inputs: Array) -> str:
+def script(made: SampledCompensation, inputs: Array) -> str:
     """A script that ends with an error where a torque is not within `BOUND` of the largest."""
     name, rows = made.identifier, vectors(made, inputs)
     most = BOUND * float(np.max(np.abs(rows[:, 4])))
@@ -150,7 +150,7 @@ end
 """
 
 
-def _files(made: Sampled, head: Sequence[str], inputs: Array) -> dict[str, str]:
+def _files(made: SampledCompensation, head: Sequence[str], inputs: Array) -> dict[str, str]:
     name = made.identifier
     return {f"{name}.m": m_code(made, head), f"{name}_test.m": script(made, inputs)}
 

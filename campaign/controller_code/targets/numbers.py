@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 from campaign.controller_code.targets import Array, Target, vectors
 
 
-def _files(made: Sampled, head: Sequence[str], inputs: Array) -> dict[str, str]:
+def _files(made: SampledCompensation, head: Sequence[str], inputs: Array) -> dict[str, str]:
     """The numbers alone, for whoever writes the code."""
     its = made.controller
     tree = {

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from campaign.controller_code.compensation import INPUTS, Sampled
+from campaign.controller_code.compensation import INPUTS, SampledCompensation
 from campaign.controller_code.sample import MEMORY, Rows, rows_of, sample
 from campaign.controller_code.syntax import INTEGER, NUMBER, TRUTH, Argument, Syntax, signs
 from campaign.controller_code.targets import BOUND, Array, Target, about, vectors
@@ -138,7 +138,7 @@ def _struct(name: str, fields: Mapping[str, str]) -> str:
     return f"TYPE\n    {name} : STRUCT\n{told}\n    END_STRUCT;\nEND_TYPE\n"
 
 
-def st_code(made: Sampled, head: Sequence[str]) -> str:
+def st_code(made: SampledCompensation, head: Sequence[str]) -> str:
     """The whole of `NAME.st`; head: lines that stand above it."""
     name = made.identifier
     program = Program(syntax(f"{name}_"))
@@ -170,13 +170,13 @@ def _start(rows: Rows) -> str:
     return f" := [{', '.join(map(_literal, rows.values))}]" if rows.values else ""
 
 
-def csv(made: Sampled, inputs: Array) -> str:
+def csv(made: SampledCompensation, inputs: Array) -> str:
     """Test vectors: a head, then a sample a line (SI)."""
     rows = vectors(made, inputs).tolist()
     return "\n".join([",".join([*INPUTS, "torque"]), *(",".join(map(repr, r)) for r in rows), ""])
 
 
-def _files(made: Sampled, head: Sequence[str], inputs: Array) -> dict[str, str]:
+def _files(made: SampledCompensation, head: Sequence[str], inputs: Array) -> dict[str, str]:
     name = made.identifier
     return {f"{name}.st": st_code(made, head), f"{name}.csv": csv(made, inputs)}
 

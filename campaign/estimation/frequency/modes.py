@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.frequency.orders import Chosen, root_jacobian, with_order
+from campaign.estimation.frequency.orders import ChosenOrder, root_jacobian, with_order
 from campaign.estimation.frequency.rational import RationalFit
 from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.gate import admitted
@@ -60,7 +60,7 @@ def modes(fit: RationalFit) -> tuple[Mode, ...]:
     return tuple(found)
 
 
-def chosen_modes(chosen: Chosen) -> tuple[Mode, ...]:
+def chosen_modes(chosen: ChosenOrder) -> tuple[Mode, ...]:
     """Those of the order chosen, with what others that are not ruled out say as a systematic part.
 
     Of another order the mode counts that is nearest, where it has one within a tenth.

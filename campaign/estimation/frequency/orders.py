@@ -33,7 +33,7 @@ INTEGRATOR = 0.5
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenOrder:
     """The fit chosen, and all that were tried, with why each other was not.
 
     Attributes:
@@ -59,7 +59,7 @@ def chosen_order(
     orders: Sequence[tuple[int, int]] | None = None,
     with_delay: bool = True,
     stable: bool = True,
-) -> Chosen:
+) -> ChosenOrder:
     """Fits of all orders up to `highest`, and the one with the lowest criterion.
 
     Args:
@@ -100,7 +100,7 @@ def chosen_order(
     order = min(near or usable, key=lambda each: (tried[each].parameters, tried[each].criterion))
     possible = [each for each in usable if each != order and not tried[each].misfit]
     close = [each for each in possible if tried[each].criterion <= best + POSSIBLE]
-    return Chosen(tried[order], tried, refused, tuple(tried[each] for each in close))
+    return ChosenOrder(tried[order], tried, refused, tuple(tried[each] for each in close))
 
 
 def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:

@@ -11,7 +11,7 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.regression import Regression, regress
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import Term
@@ -54,7 +54,7 @@ def shifts(
     fit: Regression,
     motions: Sequence[Motion],
     terms: Sequence[Term],
-    filterings: Sequence[Filtering],
+    filterings: Sequence[FilterSettings],
     delay: float = 0.0,
 ) -> Array | None:
     """How far coefficients go at most with rows made otherwise, shape (k,); None where these tell
@@ -63,7 +63,7 @@ def shifts(
     delay: by which the force is late in these rows (s).
     """
 
-    def other(filtering: Filtering) -> Array:
+    def other(filtering: FilterSettings) -> Array:
         return regress([rows(motion, terms, filtering, delay) for motion in motions]).values
 
     return farthest(fit.values, [partial(other, each) for each in filterings])

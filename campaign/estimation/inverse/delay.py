@@ -13,7 +13,7 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece, fitted, regress, stacked
 from campaign.estimation.inverse.rows import all_rows, late_force, moving, rows
 from campaign.estimation.inverse.terms import Terms
@@ -39,7 +39,7 @@ STEADY_FORCE = Cause(
 )
 
 
-def find_delay(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> Estimate:
+def find_delay(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings) -> Estimate:
     """How much later the force acts than it is recorded (s); negative where it is recorded late.
 
     What half the band finds otherwise is a systematic part: a loop that answers the noise of what
@@ -59,7 +59,7 @@ def find_delay(motions: Sequence[Motion], terms: Terms, filtering: Filtering) ->
     return shifted_by(found, "band", abs(other.value - found.value))
 
 
-def _in_band(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> Estimate:
+def _in_band(motions: Sequence[Motion], terms: Terms, filtering: FilterSettings) -> Estimate:
     from scipy.optimize import minimize_scalar
 
     rate = motions[0].sample_rate
@@ -85,7 +85,7 @@ def _in_band(motions: Sequence[Motion], terms: Terms, filtering: Filtering) -> E
 
 
 def _with_interval(
-    delay: float, motions: Sequence[Motion], terms: Terms, filtering: Filtering, reach: float
+    delay: float, motions: Sequence[Motion], terms: Terms, filtering: FilterSettings, reach: float
 ) -> Estimate:
     """By a column more: how the model's own force changes in time."""
     values = regress([rows(motion, terms, filtering, delay) for motion in motions]).values

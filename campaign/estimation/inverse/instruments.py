@@ -27,7 +27,7 @@ WEAK = 10.0
 
 
 @dataclass(frozen=True)
-class Instrumented:
+class InstrumentFit:
     """A regression by instruments.
 
     Attributes:
@@ -38,7 +38,7 @@ class Instrumented:
     strength: Array
 
 
-def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> Instrumented:
+def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> InstrumentFit:
     """Coefficients from the same columns of another motion, row by row.
 
     Raises ValueError where instruments say nothing of a column.
@@ -54,7 +54,7 @@ def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> Ins
         raise ValueError("what was wanted cannot tell the model's terms apart")
     inverse = np.asarray(np.linalg.solve(across, other.T))
     fit = fitted(pieces, inverse, design, force)
-    return Instrumented(fit, _strength(design, other, pieces))
+    return InstrumentFit(fit, _strength(design, other, pieces))
 
 
 def _strength(design: Array, other: Array, pieces: Sequence[Piece]) -> Array:

@@ -32,7 +32,7 @@ SHORTEST = 8
 
 
 @dataclass(frozen=True)
-class Filtering:
+class FilterSettings:
     """How a motion is made ready.
 
     Attributes:
@@ -163,7 +163,7 @@ def first_kept(count: int, factor: int) -> int:
     return factor - 1 - (factor * -(-count // factor) - count)
 
 
-def kept_times(motion: Motion, filtering: Filtering) -> Array:
+def kept_times(motion: Motion, filtering: FilterSettings) -> Array:
     """Times (s) of the rows that are left of a motion."""
     time = motion.time[filtering.skip :]
     if filtering.decimation == 1:
@@ -202,7 +202,7 @@ class LateRows:
     the rows alone. The ends differ from those of `decimated(later(...))` by what is held there.
     """
 
-    def __init__(self, samples: Array, sample_rate: float, filtering: Filtering) -> None:
+    def __init__(self, samples: Array, sample_rate: float, filtering: FilterSettings) -> None:
         """samples: shape (n,), evenly spaced."""
         from scipy.interpolate import CubicSpline
 

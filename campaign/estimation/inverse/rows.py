@@ -12,7 +12,7 @@ import numpy as np
 
 from campaign.estimation.inverse.motion import (
     Array,
-    Filtering,
+    FilterSettings,
     LateRows,
     Motion,
     decimated,
@@ -27,7 +27,7 @@ END_ROWS, END_PERIODS = 5, 3.0
 """Rows, or periods of the low-pass, that its beginning and its end spoil; a tenth at most."""
 
 
-def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+def rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
     """Columns (n, k) and force (n,) of a motion, the force `delay` (s) later than recorded.
 
     Rows that are left out as standing still are zero: the others keep their places in time.
@@ -39,7 +39,7 @@ def rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0)
     return Piece(piece.columns * moves[:, None], piece.force * moves, piece.time)
 
 
-def all_rows(motion: Motion, terms: Terms, filtering: Filtering, delay: float = 0.0) -> Piece:
+def all_rows(motion: Motion, terms: Terms, filtering: FilterSettings, delay: float = 0.0) -> Piece:
     """The same with those that stand still."""
     made = [_column(motion, term, filtering) for term in terms]
     force = late_force(motion, filtering).at(delay)
@@ -57,7 +57,7 @@ def _once(motion: Motion, key: Hashable, make: Callable[[], T]) -> T:
     return cast("T", kept[key])
 
 
-def _column(motion: Motion, term: Term, filtering: Filtering) -> Array:
+def _column(motion: Motion, term: Term, filtering: FilterSettings) -> Array:
     def make() -> Array:
         whole = columns(motion, [term])[filtering.skip :]
         return decimated(whole, filtering.decimation)[:, 0]
@@ -65,7 +65,7 @@ def _column(motion: Motion, term: Term, filtering: Filtering) -> Array:
     return _once(motion, (term, filtering.decimation, filtering.skip), make)
 
 
-def late_force(motion: Motion, filtering: Filtering) -> LateRows:
+def late_force(motion: Motion, filtering: FilterSettings) -> LateRows:
     """The rows of the force, for any delay."""
     return _once(
         motion,
@@ -74,7 +74,7 @@ def late_force(motion: Motion, filtering: Filtering) -> LateRows:
     )
 
 
-def moving(motion: Motion, filtering: Filtering) -> Array:
+def moving(motion: Motion, filtering: FilterSettings) -> Array:
     """1 for rows in which the axis moves, and 0 for others, shape (n,).
 
     Those at both ends are among the others: differentiated noise is large there.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece, Regression, regress
 from campaign.estimation.inverse.rows import in_blocks, part, rows
 from campaign.estimation.inverse.terms import Term
@@ -51,7 +51,7 @@ class Structure:
 def structure(
     motions: Sequence[Motion],
     terms: Sequence[Term],
-    filtering: Filtering,
+    filtering: FilterSettings,
     delay: float = 0.0,
     effective: float | None = None,
 ) -> Structure:
@@ -102,7 +102,7 @@ def choose(
     motions: Sequence[Motion],
     start: Sequence[Term],
     candidates: Sequence[Sequence[Term]],
-    filtering: Filtering,
+    filtering: FilterSettings,
     delay: float = 0.0,
 ) -> tuple[list[Structure], int]:
     """Groups of terms added one by one to `start` while blocks left out gain by it.

@@ -20,8 +20,8 @@ from campaign.estimation.presliding_dynamics.channel import (
     white_noise,
 )
 from campaign.estimation.presliding_dynamics.fit_result import (
-    Fitted,
     Grid,
+    JointFit,
     centred,
     residuals_of,
     slopes_of,
@@ -30,7 +30,7 @@ from campaign.estimation.presliding_dynamics.fit_result import (
 )
 from campaign.estimation.presliding_dynamics.parameters import Parameters
 from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
-from campaign.estimation.presliding_dynamics.record import Assumed, Record, measured
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 from campaign.estimation.presliding_dynamics.start import first_plant
 
 EVALUATIONS = 60
@@ -45,8 +45,8 @@ ROUNDS = 1
 
 
 def fit_presliding_dynamics(
-    records: Sequence[Record], assumed: Assumed | None = None, first: Plant | None = None
-) -> Fitted:
+    records: Sequence[Record], assumed: Assumptions | None = None, first: Plant | None = None
+) -> JointFit:
     """Fit sigma0, sigma1, J and what else is free to all records at once.
 
     `first`: where the search begins; absent: a linear fit of the spectra. Raises ValueError with
@@ -56,9 +56,9 @@ def fit_presliding_dynamics(
         raise ValueError("there is no record to fit")
     if len({record.doubts.shape[1] for record in records}) > 1:
         raise ValueError("the records differ in how many columns of doubt their torques have")
-    known = assumed or Assumed()
+    known = assumed or Assumptions()
     begin = first or first_plant(records, known)
-    best: Fitted | None = None
+    best: JointFit | None = None
     for start in _starts(begin):
         try:
             found = search(_prepared(records, start, known))
@@ -84,7 +84,7 @@ def _starts(begin: Plant) -> list[Plant]:
     return [begin, replace(begin, bristles=(other,))]
 
 
-def _prepared(records: Sequence[Record], first: Plant, assumed: Assumed) -> Fitted:
+def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> JointFit:
     parameters = Parameters.of(records, first, assumed)
     priors = np.zeros(parameters.size)
     priors[len(parameters.names) :] = 1.0
@@ -105,7 +105,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumed) -> Fitt
         for each, record in zip(channels, records, strict=True)
     )
     start = parameters.start()
-    return Fitted(
+    return JointFit(
         records=tuple(records),
         parameters=parameters,
         vector=start,
@@ -121,7 +121,7 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumed) -> Fitt
     )
 
 
-def search(fit: Fitted, held: int | None = None) -> Fitted:
+def search(fit: JointFit, held: int | None = None) -> JointFit:
     """From the vector of `fit` to where the sum of squares is least, with one parameter held.
 
     Raises ValueError when the start cannot be simulated.
@@ -191,12 +191,12 @@ def search(fit: Fitted, held: int | None = None) -> Fitted:
     )
 
 
-def _reweighted(fit: Fitted) -> Fitted:
+def _reweighted(fit: JointFit) -> JointFit:
     """With each channel's deviation as its residuals have it."""
     return _with_noise(fit, lambda left: np.ones(1))
 
 
-def whitened(fit: Fitted) -> Fitted:
+def whitened(fit: JointFit) -> JointFit:
     """The fit again, with the noise of each channel taken for an autoregression.
 
     Its order is chosen by Akaike's criterion, its coefficients follow from the residuals' own
@@ -206,7 +206,7 @@ def whitened(fit: Fitted) -> Fitted:
     return with_slopes(search(centred(_reweighted(first))))
 
 
-def _with_noise(fit: Fitted, whitening: Callable[[Array], Array]) -> Fitted:
+def _with_noise(fit: JointFit, whitening: Callable[[Array], Array]) -> JointFit:
     """With the noise of the record that is in the middle: all of them have the same sensors.
 
     One that the model misses would else be taken for a noisy one, and not be missed.

@@ -44,7 +44,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class JointFit:
     """A joint fit.
 
     Attributes:
@@ -109,13 +109,13 @@ def products(one: Array, other: Array) -> Array:
     return np.asarray(one.reshape(-1, one.shape[-1]).T @ other.reshape(-1, other.shape[-1]))
 
 
-def with_slopes(fit: Fitted) -> Fitted:
+def with_slopes(fit: JointFit) -> JointFit:
     """The fit with its derivatives."""
     every = range(len(fit.records))
     return replace(fit, jacobians=tuple(slopes_of(fit, number, fit.vector) for number in every))
 
 
-def with_doubts(fit: Fitted) -> Fitted:
+def with_doubts(fit: JointFit) -> JointFit:
     """With the torque that fits best, and what the plant answers to what it may be off by.
 
     What the torque is off by is small, so that the plant's answer to it is linear.
@@ -133,7 +133,7 @@ def with_doubts(fit: Fitted) -> Fitted:
     return replace(fit, doubt_answers=tuple(found))
 
 
-def centred(fit: Fitted) -> Fitted:
+def centred(fit: JointFit) -> JointFit:
     """With the torque that fits best: other plants answer to that as well."""
     factors = fit.vector[fit.parameters.doubted]
     moved = replace(fit, taken=factors)
@@ -143,18 +143,18 @@ def centred(fit: Fitted) -> Fitted:
     return moved
 
 
-def _on_grid(fit: Fitted, number: int, torque: Array) -> Array:
+def _on_grid(fit: JointFit, number: int, torque: Array) -> Array:
     return torque_on_grid(torque, fit.grids[number].per_sample, fit.parameters.assumed.between)
 
 
-def with_torque(fit: Fitted, number: int, torque: Array) -> Fitted:
+def with_torque(fit: JointFit, number: int, torque: Array) -> JointFit:
     """With another torque on the grid of a record, shape (steps, 3)."""
     grids = list(fit.grids)
     grids[number] = replace(grids[number], torque=torque)
     return replace(fit, grids=tuple(grids))
 
 
-def _motion(fit: Fitted, number: int, vector: Array, plant: Plant | None) -> Motion:
+def _motion(fit: JointFit, number: int, vector: Array, plant: Plant | None) -> Motion:
     parameters, record = fit.parameters, fit.records[number]
     grid, own = fit.grids[number], vector[parameters.of_record(number)]
     scale = LARGEST_OFFSET * record.amplitude
@@ -173,11 +173,11 @@ def _motion(fit: Fitted, number: int, vector: Array, plant: Plant | None) -> Mot
     )
 
 
-def _answers(fit: Fitted, number: int, vector: Array, plant: Plant | None = None) -> Array:
+def _answers(fit: JointFit, number: int, vector: Array, plant: Plant | None = None) -> Array:
     return _seen(fit, number, _motion(fit, number, vector, plant), vector)
 
 
-def _seen(fit: Fitted, number: int, motion: Motion, vector: Array) -> Array:
+def _seen(fit: JointFit, number: int, motion: Motion, vector: Array) -> Array:
     """What the channels of a record show of a motion, shape (channels, n)."""
     told = []
     for channel in fit.channels[number]:
@@ -186,14 +186,14 @@ def _seen(fit: Fitted, number: int, motion: Motion, vector: Array) -> Array:
     return np.array(told) + fit.doubt_answers[number] @ (vector[fit.parameters.doubted] - fit.taken)
 
 
-def residuals_of(fit: Fitted, number: int, vector: Array) -> Array:
+def residuals_of(fit: JointFit, number: int, vector: Array) -> Array:
     """Measured less simulated, without offset and drift, in deviations, shape (channels, n)."""
     answers = _answers(fit, number, vector)
     pairs = zip(fit.channels[number], answers, strict=True)
     return np.array([channel.left(channel.samples - told) for channel, told in pairs])
 
 
-def slopes_of(fit: Fitted, number: int, vector: Array) -> Array:
+def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
     """Of the simulated, in deviations, shape (channels, n, size): forward differences."""
     parameters, channels = fit.parameters, fit.channels[number]
     own = parameters.of_record(number)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.plant import Appendage, Array, Bristles, Plant
-from campaign.estimation.presliding_dynamics.record import Assumed, Record
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 
 LONGEST_DELAY = 20.0
 """Samples that a channel may lag behind, either way."""
@@ -46,14 +46,14 @@ class Parameters:
 
     names: tuple[str, ...]
     first: Plant
-    assumed: Assumed
+    assumed: Assumptions
     step: float
     torque: float
     factors: int
     own: tuple[int, ...]
 
     @classmethod
-    def of(cls, records: Sequence[Record], first: Plant, assumed: Assumed) -> Parameters:
+    def of(cls, records: Sequence[Record], first: Plant, assumed: Assumptions) -> Parameters:
         """Those that the records and what is assumed leave open."""
         # Where viscous friction is free, too, what is known well is the sum of both dampings.
         whole = "damping" if assumed.viscous_free else "bristle_damping"

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.channel import Channel
-from campaign.estimation.presliding_dynamics.fit_result import Fitted, Grid
+from campaign.estimation.presliding_dynamics.fit_result import Grid, JointFit
 from campaign.estimation.presliding_dynamics.record import Record, measured
 
 
-def unexplained(fit: Fitted, record: Record) -> float:
+def unexplained(fit: JointFit, record: Record) -> float:
     """Rms of what the fitted plant misses of another record, over that of the record's own motion.
 
     Of its first channel, offset and drift taken out of both. Nothing is fitted but those.

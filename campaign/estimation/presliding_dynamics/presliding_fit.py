@@ -20,10 +20,10 @@ from campaign.estimation.intervals import (
     with_error,
 )
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
-from campaign.estimation.presliding_dynamics.fit_result import Fitted
+from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
 from campaign.estimation.presliding_dynamics.plant import Array, Plant
-from campaign.estimation.presliding_dynamics.record import Assumed, Record
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
 from campaign.estimation.presliding_dynamics.uncertainty import (
     CURVED,
@@ -78,7 +78,7 @@ class PreslidingDynamics:
     """
 
     estimates: dict[str, Estimate]
-    fit: Fitted
+    fit: JointFit
     spread: Spread
     misfit: Misfit
     reason: Reason
@@ -90,7 +90,7 @@ class PreslidingDynamics:
 
 
 def identify_presliding_dynamics(
-    records: Sequence[Record], assumed: Assumed | None = None, first: Plant | None = None
+    records: Sequence[Record], assumed: Assumptions | None = None, first: Plant | None = None
 ) -> PreslidingDynamics:
     """Stiffness and damping of the bristles and inertia from all records at once.
 
@@ -113,7 +113,7 @@ def identify_presliding_dynamics(
     return PreslidingDynamics(found, fit, spread, misfit, reason)
 
 
-def _reason(fit: Fitted, misfit: Misfit) -> Reason:
+def _reason(fit: JointFit, misfit: Misfit) -> Reason:
     if not fit.reached:
         return NO_MINIMUM()
     slipping = [
@@ -126,12 +126,12 @@ def _reason(fit: Fitted, misfit: Misfit) -> Reason:
     return MODEL_MISFIT(why=misfit.reason) if misfit.reason else NONE
 
 
-def _without(fit: Fitted, name: str, reason: Reason) -> Estimate:
+def _without(fit: JointFit, name: str, reason: Reason) -> Estimate:
     value, _ = fit.parameters.in_units(fit.vector, name)
     return Estimate.without_interval(name, value, UNITS[name], reason, method=METHOD)
 
 
-def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estimate:
+def _estimate(fit: JointFit, spread: Spread, misfit: Misfit, index: int) -> Estimate:
     """Of one shared parameter, with its limits along the profile where that is curved."""
     name = fit.parameters.names[index]
     value, scale = fit.parameters.in_units(fit.vector, name)
@@ -167,7 +167,7 @@ def _estimate(fit: Fitted, spread: Spread, misfit: Misfit, index: int) -> Estima
     return found if name.endswith("delay") or name == "yielding" else admitted(found)
 
 
-def _in_units(fit: Fitted, name: str, at: float) -> float:
+def _in_units(fit: JointFit, name: str, at: float) -> float:
     vector: Array = fit.vector.copy()
     vector[fit.parameters.names.index(name)] = at
     return fit.parameters.in_units(vector, name)[0]
@@ -191,7 +191,7 @@ def _missed(estimate: Estimate, misfit: Misfit) -> Estimate:
     return shifted_by(estimate, "what the model misses", share * abs(estimate.value))
 
 
-def _derived(fit: Fitted, spread: Spread, misfit: Misfit) -> dict[str, Estimate]:
+def _derived(fit: JointFit, spread: Spread, misfit: Misfit) -> dict[str, Estimate]:
     """Whole damping, its ratio, and natural frequency of the load, by the delta method."""
     plant, names = fit.plant, fit.parameters.names
     scale, ratio = fit.parameters.damping_scale, 0.5 / math.sqrt(plant.stiffness * plant.inertia)

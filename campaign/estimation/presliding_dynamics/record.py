@@ -138,7 +138,7 @@ def _says_something(values: Array) -> bool:
 
 
 @dataclass(frozen=True)
-class Assumed:
+class Assumptions:
     """What a fit takes as known, and what it leaves free besides sigma0, sigma1 and J.
 
     Attributes:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.fit_result import Fitted, products, with_torque
+from campaign.estimation.presliding_dynamics.fit_result import JointFit, products, with_torque
 from campaign.estimation.presliding_dynamics.long_run import at_bandwidths
 from campaign.estimation.presliding_dynamics.plant import Array, Bristles
 from campaign.reason import NONE, Cause, Reason
@@ -100,7 +100,7 @@ class Misfit:
         return NONE
 
 
-def misfit_of(plain: Fitted, whitened: Fitted) -> Misfit:
+def misfit_of(plain: JointFit, whitened: JointFit) -> Misfit:
     """Ask the residuals of a fit both questions, as they are and whitened.
 
     How large an error of the model is, residuals say as they are: an autoregression would take much
@@ -116,7 +116,7 @@ def misfit_of(plain: Fitted, whitened: Fitted) -> Misfit:
     )
 
 
-def _misfit_of(fit: Fitted) -> Misfit:
+def _misfit_of(fit: JointFit) -> Misfit:
     size = sum(float(np.sum(answer**2)) for answer in _answers(fit))
     places, columns = _band_columns(fit)
     _, _, chance, explained = _score_test(fit, columns)
@@ -138,7 +138,7 @@ def _misfit_of(fit: Fitted) -> Misfit:
     )
 
 
-def _answers(fit: Fitted) -> list[Array]:
+def _answers(fit: JointFit) -> list[Array]:
     """Simulated answers without offset and drift, in deviations, shape (channels, n)."""
     return [
         np.array([c.left(told) for c, told in zip(group, fit.answers(number), strict=True)])
@@ -146,7 +146,7 @@ def _answers(fit: Fitted) -> list[Array]:
     ]
 
 
-def _band_columns(fit: Fitted) -> tuple[list[float], list[Array]]:
+def _band_columns(fit: JointFit) -> tuple[list[float], list[Array]]:
     """Middle of each band (Hz), and the answer in it, in phase and a quarter ahead."""
     answers = _answers(fit)
     low, high = np.inf, 0.0
@@ -170,7 +170,7 @@ def _band_columns(fit: Fitted) -> tuple[list[float], list[Array]]:
     return [float(np.sqrt(a * b)) for a, b in itertools.pairwise(edges)], columns
 
 
-def _shape_columns(fit: Fitted) -> list[Array]:
+def _shape_columns(fit: JointFit) -> list[Array]:
     """What each of `SHAPES` would change in the simulated answer, in deviations."""
     plant, found = fit.plant, []
     bristles = plant.bristles[0]
@@ -198,7 +198,7 @@ def _shape_columns(fit: Fitted) -> list[Array]:
     return found
 
 
-def _fastest(fit: Fitted) -> float:
+def _fastest(fit: JointFit) -> float:
     return max(float(np.max(np.abs(fit.motion(n).rate))) for n in range(len(fit.records)))
 
 
@@ -215,14 +215,14 @@ def _apart(bristles: Bristles) -> tuple[Bristles, Bristles]:
     )
 
 
-def _pushed(fit: Fitted, number: int, force: Array) -> Array:
+def _pushed(fit: JointFit, number: int, force: Array) -> Array:
     """The answer with a further force on the load, of shape (steps + 1,)."""
     middle = 0.5 * (force[:-1] + force[1:])
     more = PUSH * np.column_stack([force[:-1], middle, force[1:]])
     return with_torque(fit, number, fit.grids[number].torque - more).answers(number)
 
 
-def _score_test(fit: Fitted, columns: list[Array]) -> tuple[Array, Array, float, float]:
+def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, float, float]:
     """Step to a model with more columns: theirs, the parameters', its chance, sum explained
     beyond what noise explains.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
-from campaign.estimation.presliding_dynamics.record import Assumed, Record, measured
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 
 ComplexArray = NDArray[np.complex128]
 
@@ -21,7 +21,7 @@ PASSES = 6
 """of the weighted regression; the weights follow from the plant of the one before."""
 
 
-def first_plant(records: Sequence[Record], assumed: Assumed) -> Plant:
+def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
     """A plant without yielding, by T = (J jw + d + sigma0 / jw) V at the excited frequencies.
 
     Both sides are correlated with the torque, so that noise of the rate biases nothing; weights as

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.estimation.presliding_dynamics.fit import search
-from campaign.estimation.presliding_dynamics.fit_result import Fitted
+from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
 from campaign.estimation.presliding_dynamics.plant import Array
 
@@ -55,7 +55,7 @@ class Spread:
         return np.asarray(self.covariance / np.outer(self.deviation, self.deviation))
 
 
-def spread_of(fit: Fitted) -> Spread:
+def spread_of(fit: JointFit) -> Spread:
     """Covariance of the shared parameters of a fit.
 
     Raises ValueError where the records cannot tell the parameters apart.
@@ -116,7 +116,9 @@ def _scaled_to(covariance: Array, deviation: Array) -> Array:
     return np.asarray(covariance * np.outer(ratio, ratio))
 
 
-def _with_records(fit: Fitted, information: Array, covariance: Array) -> tuple[Array, Array, Array]:
+def _with_records(
+    fit: JointFit, information: Array, covariance: Array
+) -> tuple[Array, Array, Array]:
     """Covariance, degrees of freedom, and ratio of the deviations between records to those within.
 
     Each record's score, without what its own parameters take, shows where it would have the shared
@@ -144,7 +146,7 @@ def _with_records(fit: Fitted, information: Array, covariance: Array) -> tuple[A
     return _scaled_to(covariance, np.where(apart, between, within)), freedom, ratio
 
 
-def profile_end(fit: Fitted, spread: Spread, index: int, quantile: float, way: float) -> float:
+def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way: float) -> float:
     """Where the profile of a shared parameter has risen by `quantile` deviations, to one side.
 
     The sum of squares counts in units of the parameter's own variance, so that autocorrelated
@@ -180,12 +182,12 @@ def profile_end(fit: Fitted, spread: Spread, index: int, quantile: float, way: f
     return float(fit.vector[index] + way * high * sigma)
 
 
-def _curvature(fit: Fitted, index: int) -> float:
+def _curvature(fit: JointFit, index: int) -> float:
     """Rise of the profiled sum of squares over the square of a small distance."""
     return 1.0 / float(np.linalg.inv(fit.information)[index, index])
 
 
-def _held(fit: Fitted, index: int, distance: float) -> Fitted:
+def _held(fit: JointFit, index: int, distance: float) -> JointFit:
     """The fit with one parameter held so far away, the others as good as they get."""
     column = np.linalg.inv(fit.information)[:, index]
     vector = np.clip(fit.vector + distance * column / column[index], *fit.parameters.bounds())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from campaign.estimation.inverse.motion import Array, kept_times
 from campaign.estimation.inverse.rows import all_rows, moving
 from campaign.estimation.inverse.terms import Term
-from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried, together
+from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together
 from campaign.result import Axis, Curve, Figure, Panel
 
 TIME = Axis("Time", "s", "s")
@@ -90,7 +90,9 @@ def residual_figure(found: InverseDynamics) -> Figure:
         f"of it would lie if they were white. {fit.count} rows are worth {fit.effective:.0f}.",
         alt="Residual torque over time, over rate, over angle, and its autocorrelation.",
         panels=(
-            Panel(TIME, LEFT, (Curve(*apart(time, left), "", "measured", "thin"),), "Over time"),
+            Panel(
+                TIME, LEFT, (Curve(*with_gaps(time, left), "", "measured", "thin"),), "Over time"
+            ),
             Panel(RATE, LEFT, (Curve(own[:, 1], left, "", "measured", "points"),), "Over rate"),
             Panel(PLACE, LEFT, (Curve(own[:, 0], left, "", "measured", "points"),), "Over angle"),
             Panel(
@@ -122,11 +124,11 @@ def validation_figure(found: InverseDynamics) -> Figure:
         alt="Measured and predicted torque over time, and their difference.",
         panels=(
             Panel(TIME, FORCE, (
-                Curve(*apart(whole.time, whole.force), "measured", "measured"),
-                Curve(*apart(whole.time, whole.predicted), "predicted", "fit", "thin"),
+                Curve(*with_gaps(whole.time, whole.force), "measured", "measured"),
+                Curve(*with_gaps(whole.time, whole.predicted), "predicted", "fit", "thin"),
             )),
             Panel(TIME, LEFT, (
-                Curve(*apart(whole.time, whole.residuals), "", "measured", "thin"),
+                Curve(*with_gaps(whole.time, whole.residuals), "", "measured", "thin"),
             )),
         ),
     )  # fmt: skip
@@ -134,12 +136,12 @@ def validation_figure(found: InverseDynamics) -> Figure:
 
 def models_figure(found: InverseDynamics) -> Figure:
     """What the plain model and the best others leave over of the validation."""
-    told = models_told(found)
+    told = shown_models(found)
     panels = []
     for title, each in told:
         own = together(each.predictions)
         share = 100.0 * own.relative
-        curve = Curve(*apart(own.time, own.residuals), "", "measured", "thin")
+        curve = Curve(*with_gaps(own.time, own.residuals), "", "measured", "thin")
         panels.append(Panel(TIME, LEFT, (curve,), f"{title}: {share:.2f} %"))
     return Figure(
         key="models",
@@ -152,7 +154,7 @@ def models_figure(found: InverseDynamics) -> Figure:
     )
 
 
-def models_told(found: InverseDynamics) -> list[tuple[str, Tried]]:
+def shown_models(found: InverseDynamics) -> list[tuple[str, CandidateFit]]:
     """Plain models, the start with its delay, and the chosen one; no two alike."""
     picked = [0, 1] if len(found.tried) > 2 and found.tried[1].delay == 0.0 else [0]
     later = [i for i, each in enumerate(found.tried) if each.delay != 0.0]
@@ -167,7 +169,7 @@ def models_told(found: InverseDynamics) -> list[tuple[str, Tried]]:
     return names[:BEST]
 
 
-def _is_symmetric(each: Tried) -> bool:
+def _is_symmetric(each: CandidateFit) -> bool:
     return "coulomb" in each.structure.names
 
 
@@ -184,7 +186,7 @@ def autocorrelation(residuals: Sequence[Array]) -> tuple[Array, Array, float]:
     return lags.astype(float), np.array(found), 1.96 / float(np.sqrt(count))
 
 
-def apart(time: Array, values: Array) -> tuple[Array, Array]:
+def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
     """With a gap wherever time begins anew: no line leads from one recording to the next."""
     anew = np.flatnonzero(np.diff(time) < 0.0) + 1
     return np.insert(time, anew, np.nan), np.insert(values, anew, np.nan)

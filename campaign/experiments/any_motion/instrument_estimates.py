@@ -20,8 +20,8 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS, farthest
 from campaign.estimation.inverse.delay import LONGEST
-from campaign.estimation.inverse.instruments import WEAK, Instrumented, by_instruments
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.instruments import WEAK, InstrumentFit, by_instruments
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece
 from campaign.estimation.inverse.rows import all_rows, moving
 from campaign.estimation.inverse.simulation import (
@@ -31,7 +31,7 @@ from campaign.estimation.inverse.simulation import (
     followed_motion,
 )
 from campaign.estimation.inverse.terms import Term
-from campaign.experiments.any_motion.motions import Moved
+from campaign.experiments.any_motion.motions import MotionPiece
 
 ROUNDS = 2
 """Times that the model is simulated, each time with what instruments said before."""
@@ -57,7 +57,7 @@ class Instruments:
 
     along: str
     of_wanted: bool
-    found: Instrumented
+    found: InstrumentFit
     estimates: dict[str, Estimate]
     delay: Estimate | None
 
@@ -67,10 +67,10 @@ class Instruments:
 
 
 def instruments(
-    pieces: Sequence[Moved],
+    pieces: Sequence[MotionPiece],
     terms: Sequence[Term],
     values: Array,
-    filtering: Filtering,
+    filtering: FilterSettings,
     delay: float,
     *,
     stated: bool = False,
@@ -134,7 +134,7 @@ def differs(squares: Mapping[str, Estimate], found: Instruments) -> bool:
     return any(_differ(one, found.estimates[name]) for name, one in squares.items())
 
 
-def told_delay(late: Estimate, found: Instruments | None) -> Estimate:
+def judged_delay(late: Estimate, found: Instruments | None) -> Estimate:
     """The delay that is told: held against instruments, as coefficients are.
 
     Without any that know of no noise, nobody knows how much of it a loop makes of noise and of what
@@ -181,10 +181,10 @@ def _weak(found: Instruments, terms: Sequence[Term]) -> str:
 
 
 def _iterated(
-    pieces: Sequence[Moved],
+    pieces: Sequence[MotionPiece],
     terms: Sequence[Term],
     values: Array,
-    filtering: Filtering,
+    filtering: FilterSettings,
     delay: float,
     loops: Sequence[Loop] | None,
     *,
@@ -212,7 +212,7 @@ def _iterated(
         doubt = max(1.0 / pieces[0].motion.sample_rate, abs(before) / NORMAL_95)
         others["delay"] = [(filtering, before - doubt)]
 
-    def other(rows: Filtering, late: float) -> Array:
+    def other(rows: FilterSettings, late: float) -> Array:
         return _regressed(pieces, made, terms, at, rows, late, fitted=fitted).fit.values
 
     parts = {
@@ -231,7 +231,7 @@ def _iterated(
 
 
 def _simulated(
-    pieces: Sequence[Moved],
+    pieces: Sequence[MotionPiece],
     terms: Sequence[Term],
     values: Array,
     delay: float,
@@ -251,15 +251,15 @@ def _simulated(
 
 
 def _regressed(
-    pieces: Sequence[Moved],
+    pieces: Sequence[MotionPiece],
     made: Sequence[Motion],
     terms: Sequence[Term],
     values: Array,
-    filtering: Filtering,
+    filtering: FilterSettings,
     delay: float,
     *,
     fitted: bool,
-) -> Instrumented:
+) -> InstrumentFit:
     """Rows where both move; a column more for the delay: how the model's force changes in time."""
     own: list[Piece] = []
     other: list[Piece] = []
@@ -284,7 +284,7 @@ def _estimate(
     name: str,
     unit: str,
     along: str,
-    found: Instrumented,
+    found: InstrumentFit,
     index: int,
     value: float,
     parts: Mapping[str, Array | None],

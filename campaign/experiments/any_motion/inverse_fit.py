@@ -11,7 +11,7 @@ import numpy as np
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.inverse.coefficients import estimates, shifts
 from campaign.estimation.inverse.delay import find_delay
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.position_period import find_period
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.rows import all_rows, rows
@@ -30,9 +30,9 @@ from campaign.experiments.any_motion.instrument_estimates import (
     Instruments,
     held_against,
     instruments,
-    told_delay,
+    judged_delay,
 )
-from campaign.experiments.any_motion.motions import Moved, never_moved
+from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.reason import Cause
 
 SQUARED = "_squared"
@@ -47,7 +47,7 @@ STATED = Cause("stated", "stated")
 
 
 @dataclass(frozen=True)
-class Tried:
+class CandidateFit:
     """A structure, at a delay, and how it predicts what it was not fitted to.
 
     Attributes:
@@ -85,10 +85,10 @@ class InverseDynamics:
         period: over position, that was tried; None without any.
     """
 
-    pieces: tuple[Moved, ...]
-    filtering: Filtering
+    pieces: tuple[MotionPiece, ...]
+    filtering: FilterSettings
     delay: Estimate
-    tried: tuple[Tried, ...]
+    tried: tuple[CandidateFit, ...]
     chosen: int
     squares: dict[str, Estimate]
     estimates: dict[str, Estimate]
@@ -98,7 +98,7 @@ class InverseDynamics:
     period: float | None
 
     @property
-    def best(self) -> Tried:
+    def best(self) -> CandidateFit:
         """The chosen one."""
         return self.tried[self.chosen]
 
@@ -114,9 +114,9 @@ class InverseDynamics:
 
 
 def find(
-    pieces: Sequence[Moved],
-    unseen: Sequence[Moved],
-    filtering: Filtering,
+    pieces: Sequence[MotionPiece],
+    unseen: Sequence[MotionPiece],
+    filtering: FilterSettings,
     *,
     delay: float | None = None,
     terms: Sequence[Term] | None = None,
@@ -180,7 +180,7 @@ def find(
     return InverseDynamics(
         tuple(pieces),
         filtering,
-        told_delay(late, held),
+        judged_delay(late, held),
         tuple(tried),
         picked,
         squares,
@@ -192,7 +192,7 @@ def find(
     )
 
 
-def _plain(motions: Sequence[Motion], filtering: Filtering) -> list[Structure]:
+def _plain(motions: Sequence[Motion], filtering: FilterSettings) -> list[Structure]:
     """The usual models without any delay; of one direction alone only that one's friction."""
     everything = replace(filtering, slowest=0.0)
     missing = tuple(f"_{way}" for way in never_moved(motions, filtering.slowest))
@@ -206,7 +206,10 @@ def _plain(motions: Sequence[Motion], filtering: Filtering) -> list[Structure]:
 
 
 def _delay(
-    motions: Sequence[Motion], terms: Sequence[Term], filtering: Filtering, stated: float | None
+    motions: Sequence[Motion],
+    terms: Sequence[Term],
+    filtering: FilterSettings,
+    stated: float | None,
 ) -> Estimate:
     if stated is not None:
         return Estimate.without_interval("delay", stated, "s", STATED(), origin=Origin.GIVEN)
@@ -240,7 +243,7 @@ def _candidates(
 
 
 def _period(
-    motions: Sequence[Motion], start: Sequence[Term], filtering: Filtering, delay: float
+    motions: Sequence[Motion], start: Sequence[Term], filtering: FilterSettings, delay: float
 ) -> float | None:
     fit = structure(motions, start, filtering, delay).fit
     own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
@@ -259,15 +262,15 @@ def _validated(
     found: Sequence[tuple[Structure, float]],
     motions: Sequence[Motion],
     unseen: Sequence[Motion],
-    filtering: Filtering,
+    filtering: FilterSettings,
     moved: Collection[int],
-) -> list[Tried]:
+) -> list[CandidateFit]:
     """Each structure with its predictions of what it was not fitted to; some also as they move."""
-    told: list[Tried] = []
+    told: list[CandidateFit] = []
     reference: tuple[Prediction, ...] = ()
     for index, (which, delay) in enumerate(found):
         predictions = tuple(predicted(motion, which, filtering, delay) for motion in unseen)
-        one = Tried(which, delay, predictions)
+        one = CandidateFit(which, delay, predictions)
         if index in moved:
             one = replace(one, simulated=_simulated(unseen or motions, which, delay))
         if predictions:
@@ -287,7 +290,9 @@ def _simulated(motions: Sequence[Motion], which: Structure, delay: float) -> flo
         return math.nan
 
 
-def predicted(motion: Motion, which: Structure, filtering: Filtering, delay: float) -> Prediction:
+def predicted(
+    motion: Motion, which: Structure, filtering: FilterSettings, delay: float
+) -> Prediction:
     """What a structure says of another motion."""
     piece = all_rows(motion, which.terms, filtering, delay)
     return Prediction(piece.time, piece.force, piece.columns @ which.fit.values)
@@ -303,7 +308,7 @@ def together(predictions: Sequence[Prediction]) -> Prediction:
 
 
 def _estimates(
-    best: Tried, motions: Sequence[Motion], filtering: Filtering, late: Estimate
+    best: CandidateFit, motions: Sequence[Motion], filtering: FilterSettings, late: Estimate
 ) -> dict[str, Estimate]:
     """The chosen terms: scatter with autocorrelation; band and delay as systematic parts."""
     fit, terms = best.structure.fit, best.structure.terms
@@ -322,7 +327,7 @@ def _estimates(
 
 
 def _moved_by(
-    bends: Sequence[Term], best: Tried, motions: Sequence[Motion], filtering: Filtering
+    bends: Sequence[Term], best: CandidateFit, motions: Sequence[Motion], filtering: FilterSettings
 ) -> Array | None:
     """How far coefficients go with further terms, shape (k,); None where these are not told."""
     own = best.structure
@@ -354,7 +359,7 @@ def _without_shares(
     }
 
 
-def _doubt(best: Tried, late: Estimate, motion: Motion) -> float:
+def _doubt(best: CandidateFit, late: Estimate, motion: Motion) -> float:
     """By how much the delay may be wrong (s, 1 sigma): a sample where it was not taken out."""
     if best.delay == 0.0 or math.isnan(late.half_width):
         return 1.0 / motion.sample_rate

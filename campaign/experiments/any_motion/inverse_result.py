@@ -32,7 +32,7 @@ from campaign.experiments.shared.directions import with_offset
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
-from campaign.parameter import Identified, Parameter, Unseen, is_value
+from campaign.parameter import IdentifiedRig, Parameter, Unseen, is_value
 from campaign.reason import Cause
 from campaign.result import Amount, Conclusion, Finding, Result, Table
 from campaign.text import words
@@ -113,7 +113,7 @@ def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
         notes=tuple(_notes(found, data)),
         conclusions=tuple(_conclusions(found, parameters)),
-        identified=Identified(
+        identified=IdentifiedRig(
             parameters,
             correlations=_correlations(found),
             settings=_settings(parameters, data),

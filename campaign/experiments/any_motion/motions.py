@@ -20,7 +20,7 @@ from campaign.channels import (
 from campaign.estimation.inverse.motion import (
     REGRESSION_RATE,
     Array,
-    Filtering,
+    FilterSettings,
     Motion,
     motion_of_position,
     motion_of_rate,
@@ -54,7 +54,7 @@ ONE_WAY = 0.02
 
 
 @dataclass(frozen=True)
-class Moved:
+class MotionPiece:
     """A piece of a trial as it moved, and as it was meant to; None where nobody recorded that.
 
     of_rate: whether a rate was measured, and its position is no more than what that adds up to.
@@ -65,7 +65,7 @@ class Moved:
     wanted: Motion | None
     of_rate: bool = False
 
-    def part(self, which: slice) -> Moved:
+    def part(self, which: slice) -> MotionPiece:
         """Samples of it that follow each other."""
         wanted = None if self.wanted is None else self.wanted.part(which)
         return replace(self, motion=self.motion.part(which), wanted=wanted)
@@ -91,14 +91,14 @@ def usable(trials: Sequence[TrialData]) -> tuple[Sequence[TrialData], str]:
 
 def read(
     data: TestData, low_pass: float | None, decimation: int | None, skip: float
-) -> tuple[Filtering, tuple[Moved, ...], tuple[Moved, ...]]:
+) -> tuple[FilterSettings, tuple[MotionPiece, ...], tuple[MotionPiece, ...]]:
     """How motions are filtered, with defaults for the sample rate; all pieces of the trials, and
     those of the validation. Raises ValueError where either have none.
     """
     rate = data.trials[0].trial.task.sample_rate
-    plain = Filtering.for_rate(rate)
+    plain = FilterSettings.for_rate(rate)
     decimation = decimation or max(plain.decimation, round(rate / rows_of(data.trials)))
-    filtering = Filtering(low_pass or plain.low_pass, decimation, round(skip * rate))
+    filtering = FilterSettings(low_pass or plain.low_pass, decimation, round(skip * rate))
     pieces = moved(data.trials, filtering)
     if not data.validation:
         return filtering, pieces, ()
@@ -118,7 +118,7 @@ def rows_of(trials: Sequence[TrialData]) -> float:
     return max(FEWEST_ROWS, ROWS * highest)
 
 
-def moved(trials: Sequence[TrialData], filtering: Filtering) -> tuple[Moved, ...]:
+def moved(trials: Sequence[TrialData], filtering: FilterSettings) -> tuple[MotionPiece, ...]:
     """All pieces of all trials without a lost sample. Raises ValueError without any."""
     found = tuple(piece for each in trials for piece in _pieces(each, filtering))
     if not found:
@@ -145,7 +145,7 @@ def force_of(trial: TrialData) -> str:
     return next((name for name in FORCES if name in names), DRIVE_TORQUE)
 
 
-def _moves(piece: Moved, low_pass: float) -> bool:
+def _moves(piece: MotionPiece, low_pass: float) -> bool:
     """Whether what was measured goes further than from one independent sample to the next.
 
     What is left of white noise behind its low-pass does not: its samples twice a period of the
@@ -171,14 +171,16 @@ def never_moved(motions: Sequence[Motion], slowest: float) -> tuple[str, ...]:
     return tuple(way for way, samples in count.items() if samples <= ONE_WAY * total)
 
 
-def with_slowest(filtering: Filtering, pieces: Sequence[Moved], slowest: float | None) -> Filtering:
+def with_slowest(
+    filtering: FilterSettings, pieces: Sequence[MotionPiece], slowest: float | None
+) -> FilterSettings:
     """With the rate (SI) below which the axis stands still; None: a share of its fastest."""
     if slowest is None:
         slowest = SLOWEST * max(float(np.abs(each.motion.rate).max()) for each in pieces)
     return replace(filtering, slowest=slowest)
 
 
-def _pieces(archived: TrialData, filtering: Filtering) -> Iterator[Moved]:
+def _pieces(archived: TrialData, filtering: FilterSettings) -> Iterator[MotionPiece]:
     recording, task = archived.recording(), archived.trial.task
     force = force_of(archived)
     sources = _sources(recording, force)
@@ -191,7 +193,7 @@ def _pieces(archived: TrialData, filtering: Filtering) -> Iterator[Moved]:
         parts[FORCE] = parts.pop(force)
         if task.mode == "rate" and not parts.keys() & {REFERENCE, COMMAND}:
             parts[COMMAND] = task.command.sample(recording.time[piece])
-        yield Moved(
+        yield MotionPiece(
             archived.trial.number,
             _motion(recording.time[piece], parts, filtering),
             _wanted(recording.time[piece], parts, filtering),
@@ -212,7 +214,7 @@ def _sources(recording: Recording, force: str) -> list[str]:
     return names
 
 
-def _motion(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motion:
+def _motion(time: Array, parts: dict[str, Array], filtering: FilterSettings) -> Motion:
     force, warm = parts[FORCE], parts.get(TEMPERATURE)
     if RELATIVE_ANGLE in parts:
         motion = motion_of_position(time, parts[RELATIVE_ANGLE], force, filtering.low_pass, warm)
@@ -225,7 +227,7 @@ def _motion(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motio
     return replace(motion, acceleration=np.gradient(inertial, 1.0 / motion.sample_rate))
 
 
-def _wanted(time: Array, parts: dict[str, Array], filtering: Filtering) -> Motion | None:
+def _wanted(time: Array, parts: dict[str, Array], filtering: FilterSettings) -> Motion | None:
     force, warm = parts[FORCE], parts.get(TEMPERATURE)
     if REFERENCE in parts:
         found = motion_of_position(time, parts[REFERENCE], force, filtering.low_pass, warm)

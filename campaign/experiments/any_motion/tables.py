@@ -9,7 +9,7 @@ import numpy as np
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.instrument_estimates import Instruments, differs
-from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried
+from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 
@@ -66,12 +66,12 @@ def structures_table(found: InverseDynamics) -> Table:
     )
 
 
-def formula(tried: Tried) -> str:
+def formula(tried: CandidateFit) -> str:
     """`a, v+, v-, (v > 0), -(v < 0), q`."""
     return ", ".join(term.symbol for term in tried.structure.terms)
 
 
-def deviations_table(key: str, title: str, tried: Tried) -> Table:
+def deviations_table(key: str, title: str, tried: CandidateFit) -> Table:
     """Coefficients of one structure with ordinary deviations and those with autocorrelation."""
     fit = tried.structure.fit
     half, rule, twice = fit.by_bandwidth

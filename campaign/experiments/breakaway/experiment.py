@@ -42,7 +42,7 @@ from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
-from campaign.parameter import Identified
+from campaign.parameter import IdentifiedRig
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError, inertia_of
 from campaign.physics.friction import friction_models
@@ -50,7 +50,7 @@ from campaign.reason import Cause
 from campaign.recording import Array, Recording
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Polyline
-from campaign.trial import Offered, Task, Trial, TrialRequest
+from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
     AngularRate,
@@ -60,7 +60,7 @@ from campaign.units import (
     Time,
     Torque,
     TorqueRate,
-    rate_here,
+    rate_text,
 )
 
 WAYS = {"positive": 1.0, "negative": -1.0}
@@ -131,7 +131,7 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
                 stop_rate=ends,
             ),
             point={"measurement": number, "position": position, "direction": direction},
-            note=f"ends early, once the load slides at {rate_here(ends)}",
+            note=f"ends early, once the load slides at {rate_text(ends)}",
             windows=windows,
         )
 
@@ -144,7 +144,9 @@ def _warnings(options: BreakawayOptions, bench: Bench) -> Iterator[str]:
         )
 
 
-def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+def _found(
+    options: BreakawayOptions, bench: Bench, offered: OfferedRecording
+) -> Iterator[TrialRequest]:
     """The ramp of a recording that nobody planned: up to when the load first slides."""
     known = {RELATIVE_ANGLE} & offered.channels
     recording = offered.read([GYRO_RATE, DRIVE_TORQUE, *known])
@@ -152,13 +154,13 @@ def _found(options: BreakawayOptions, bench: Bench, offered: Offered) -> Iterato
     threshold = max(options.sliding_rate, seen.finest)
     slides = slides_from(seen.values, threshold)
     if slides is None:
-        raise ValueError(f"the load never slides at {rate_here(threshold)} (sliding_rate)")
+        raise ValueError(f"the load never slides at {rate_text(threshold)} (sliding_rate)")
     ramp = found_ramp(recording.time, recording[DRIVE_TORQUE], float(recording.time[slides[0]]))
     # And what the smoothing needs behind it.
     stop = min(offered.duration, float(recording.time[slides[1] - 1]) + 0.5 * seen.window)
     coarse = ""
     if threshold > options.sliding_rate:
-        coarse = f"; sliding is {rate_here(threshold)}, the least that its sensor resolves"
+        coarse = f"; sliding is {rate_text(threshold)}, the least that its sensor resolves"
     place: dict[str, JsonValue] = {}
     if known and "position" not in offered.conditions:
         place["position"] = round(float(recording[RELATIVE_ANGLE][0]), 4)
@@ -369,7 +371,7 @@ def _analyse(data: TestData) -> Result:
             ),
             *conclusions_of(parameters),
         ),
-        identified=Identified(parameters),
+        identified=IdentifiedRig(parameters),
     )
 
 

@@ -11,7 +11,7 @@ from campaign.estimation.breakaway_torque import STILL_RISING
 from campaign.estimation.presliding import NOT_RESOLVED, WINDOW
 from campaign.experiments.breakaway.means import MEASURED, Ramps
 from campaign.experiments.interface import bench_of
-from campaign.units import angle_here, rate_here
+from campaign.units import angle_text, rate_text
 
 FEW_COUNTS = 10.0
 """of the encoder in presliding: an angle of fewer shows no curve."""
@@ -56,7 +56,7 @@ def _encoder(ramps: Ramps) -> Iterator[str]:
     yield (
         f"Presliding spans {float(np.median(spans)) / count:.2g} counts of the encoder: σ0 rests "
         "on the gyro alone. An angle sensor that is to show presliding needs counts of "
-        f"{angle_here(float(np.median(spans)) / FEW_COUNTS, '.2g')} or finer."
+        f"{angle_text(float(np.median(spans)) / FEW_COUNTS, '.2g')} or finer."
     )
 
 
@@ -117,7 +117,7 @@ def _unfinished(ramps: Ramps) -> Iterator[str]:
         why = "was still rising" if risen else "did not fall significantly before"
         yield (
             f"Friction {why} {'when ' if risen else ''}ramps ended: their breakaway torque is a "
-            f"bound. Choose a sliding_rate of {rate_here(4.0 * rate, '.2g')} or more."
+            f"bound. Choose a sliding_rate of {rate_text(4.0 * rate, '.2g')} or more."
         )
 
 

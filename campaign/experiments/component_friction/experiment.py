@@ -26,7 +26,7 @@ from campaign.estimation.readings import (
 )
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.experiments.component_friction.conclusions import component_conclusions
-from campaign.experiments.component_friction.figures import Shown, component_figure
+from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
 from campaign.experiments.component_friction.sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.shared.captions import trials_of
@@ -271,7 +271,7 @@ def _side(reading: Reading) -> str:
 
 def _figure(readings: list[Reading], suffix: str) -> Figure:
     shown = [
-        Shown(
+        ComponentCurves(
             name,
             tuple(reading.measurement for reading in own),
             tuple(reading.torque for reading in own),

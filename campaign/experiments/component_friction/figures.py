@@ -21,7 +21,7 @@ TORQUE = "breakaway_torque"
 
 
 @dataclass(frozen=True)
-class Shown:
+class ComponentCurves:
     """What is shown of one component.
 
     Attributes:
@@ -41,7 +41,7 @@ class Shown:
 
 
 def component_figure(
-    shown: Sequence[Shown],
+    shown: Sequence[ComponentCurves],
     place: Mapping[str, Value],
     sliding_rate: float,
     trials: tuple[int, ...],
@@ -88,14 +88,14 @@ def component_figure(
     )
 
 
-def _ramp(each: Shown) -> Curve:
+def _ramp(each: ComponentCurves) -> Curve:
     """Size of rate over size of torque."""
     recording = each.ramp.recording()
     torque, rate = np.abs(recording[DRIVE_TORQUE]), np.abs(recording[GYRO_RATE])
     return Curve(torque, rate, each.name, each.name, "thin")
 
 
-def _dots(each: Shown, place: Mapping[str, Value], behind: float) -> tuple[Curve, Curve]:
+def _dots(each: ComponentCurves, place: Mapping[str, Value], behind: float) -> tuple[Curve, Curve]:
     """The readings by their numbers, and their mean behind them."""
     own = {**place, "component": each.name}
     numbers = np.array(each.numbers, dtype=float)
@@ -114,7 +114,7 @@ def _numbered(count: int) -> Axis:
     return Axis("Measurement", places=(*names, (count + BEHIND, "mean")))
 
 
-def _what_shows(shown: Sequence[Shown]) -> str:
+def _what_shows(shown: Sequence[ComponentCurves]) -> str:
     """Means of the components, the largest first, and on which steps readings fall."""
     order = sorted(shown, key=lambda each: -each.mean.value)
     words = [f"{each.name} {amount(each.mean.value, 'N m')}" for each in order]

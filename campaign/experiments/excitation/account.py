@@ -9,7 +9,7 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
-from campaign.estimation.inverse.motion import Filtering, Motion
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.experiments.any_motion.motions import moved
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.interface import TrialData
@@ -82,5 +82,5 @@ def reached_rate(data: TrialData) -> tuple[Array, Array]:
 
 def motion_of(data: TrialData) -> Motion:
     """How a series moved: its longest part without a lost sample. Raises ValueError for none."""
-    pieces = moved((data,), Filtering.for_rate(data.trial.task.sample_rate))
+    pieces = moved((data,), FilterSettings.for_rate(data.trial.task.sample_rate))
     return max((each.motion for each in pieces), key=lambda motion: len(motion.time))

@@ -23,7 +23,7 @@ from campaign.experiments.excitation.figures import command_figure, plane_figure
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.excitation.tables import reached_tables
 from campaign.experiments.interface import (
-    Chosen,
+    ChosenValue,
     Experiment,
     TestData,
     TrialData,
@@ -78,7 +78,7 @@ def _trials(options: ExcitationOptions, bench: Bench) -> Iterator[TrialRequest]:
         )
 
 
-def _fit(options: ExcitationOptions, bench: Bench) -> Mapping[str, Chosen]:
+def _fit(options: ExcitationOptions, bench: Bench) -> Mapping[str, ChosenValue]:
     """Sizes within the limits of the bench, and above its friction."""
     choices, rig = Choices(options), Rig(bench)
     choices.sample_rate(rig)

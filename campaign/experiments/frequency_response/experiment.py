@@ -34,8 +34,8 @@ from campaign.experiments.frequency_response.figures import (
 from campaign.experiments.frequency_response.marks import place_names, servo_figure
 from campaign.experiments.frequency_response.model.analysis import MODEL, identified
 from campaign.experiments.frequency_response.sine_commands import (
+    amplitude_text,
     rate_sine,
-    told_amplitude,
     torque_sine,
 )
 from campaign.experiments.frequency_response.tables import (
@@ -76,7 +76,7 @@ from campaign.physics.complete import control_rate
 from campaign.reason import Cause
 from campaign.result import Conclusion, Figure, Finding, Result, Table
 from campaign.signals import Sine
-from campaign.trial import NONE_MORE, Most, Offered, Task, Trial, TrialRequest
+from campaign.trial import NONE_MORE, Most, OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import (
     Angle,
     AngularAcceleration,
@@ -178,14 +178,14 @@ def _request(options: FrequencyResponseOptions, bench: Bench, frequency: float) 
             start_angle=options.position - swing,
         ),
         point={"frequency": frequency},
-        note=f"{options.cycles} cycles after {settle} to settle; {told_amplitude(command, closed)}",
+        note=f"{options.cycles} cycles after {settle} to settle; {amplitude_text(command, closed)}",
         requires=(GYRO_RATE, _excitation("rate" if closed else "torque")),
         windows=(Window(STEADY, start, stop),),
     )
 
 
 def _found(
-    options: FrequencyResponseOptions, bench: Bench, offered: Offered
+    options: FrequencyResponseOptions, bench: Bench, offered: OfferedRecording
 ) -> Iterator[TrialRequest]:
     """The sine that a recording of one frequency is."""
     mode: Literal["rate", "torque"] = "rate" if options.loop == "closed" else "torque"

@@ -27,7 +27,7 @@ PLOTTED = -3.0
 
 
 @dataclass(frozen=True)
-class Drawn:
+class BodeContent:
     """What is drawn into a Bode diagram: curves and marks of its two panels."""
 
     gain: list[Curve] = field(default_factory=list)
@@ -40,9 +40,9 @@ Named = tuple[str, str, Response]
 Found = Sequence[ServoCharacteristics | None]
 
 
-def bandwidths(sweeps: Sequence[Named], found: Found, names: Sequence[str]) -> Drawn:
+def bandwidths(sweeps: Sequence[Named], found: Found, names: Sequence[str]) -> BodeContent:
     """A dot where each gain passes -3 dB, with the interval of its frequency."""
-    drawn = Drawn()
+    drawn = BodeContent()
     for (_, series, _), read, name in zip(sweeps, found, names, strict=True):
         if read is None:
             continue
@@ -65,12 +65,12 @@ def bandwidths(sweeps: Sequence[Named], found: Found, names: Sequence[str]) -> D
 
 def margins(
     loops: Sequence[Named], phases: Sequence[Array], found: Found, names: Sequence[str]
-) -> Drawn:
+) -> BodeContent:
     """The distances that the margins are, from 0 dB and from -180 deg, at their frequencies.
 
     phases: of each loop, as they are drawn (rad).
     """
-    drawn = Drawn()
+    drawn = BodeContent()
     for (_, series, loop), shown, read, name in zip(loops, phases, found, names, strict=True):
         if read is None:
             continue
@@ -86,7 +86,7 @@ def margins(
 
 
 def _phase_margin(
-    drawn: Drawn, at: Crossing, loop: Response, shown: Array, series: str, name: str
+    drawn: BodeContent, at: Crossing, loop: Response, shown: Array, series: str, name: str
 ) -> None:
     assert at.margin is not None  # noqa: S101 (for the type checker; the caller looked)
     frequency, margin = at.frequency.value, at.margin
@@ -100,7 +100,7 @@ def _phase_margin(
     drawn.phase_marks.append(Mark(label, x=frequency, y=y, point=True, series=series))
 
 
-def _gain_margin(drawn: Drawn, at: Crossing, series: str, name: str) -> None:
+def _gain_margin(drawn: BodeContent, at: Crossing, series: str, name: str) -> None:
     assert at.margin is not None  # noqa: S101 (for the type checker; the caller looked)
     frequency, margin = at.frequency.value, at.margin
     drawn.gain.append(_distance(frequency, 0.0, -margin.value, series))

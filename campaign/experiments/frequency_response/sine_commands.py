@@ -9,16 +9,16 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import inertia_of, limits_of
 from campaign.physics.limits import worst_friction
 from campaign.signals import Sine
-from campaign.units import angle_here, rate_here
+from campaign.units import angle_text, rate_text
 
 LIMIT_SHARE = 0.9
 """of the bench's limits that the amplitude of a rate command may use."""
 
 
-def told_amplitude(command: Sine, closed: bool) -> str:
+def amplitude_text(command: Sine, closed: bool) -> str:
     """Of a rate command in a closed loop, or a torque in an open one; for people."""
     if closed:
-        return f"amplitude {rate_here(command.amplitude)}"
+        return f"amplitude {rate_text(command.amplitude)}"
     return f"amplitude {command.amplitude:.3g} N·m"
 
 
@@ -55,7 +55,7 @@ def torque_sine(
     if abs(position) + swing > limits.angle or rate > limits.rate:
         raise ValueError(
             f"{torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
-            f"{angle_here(swing)} at {rate_here(rate)}, beyond the bench's "
+            f"{angle_text(swing)} at {rate_text(rate)}, beyond the bench's "
             "limits; lower torque or raise lowest"
         )
     return Sine(amplitude=torque, frequency=frequency, phase=0.5 * math.pi), swing

@@ -17,7 +17,7 @@ from campaign.experiments.interface import TrialData
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
 from campaign.signals import Sine
-from campaign.units import rate_here
+from campaign.units import rate_text
 
 
 @dataclass(frozen=True)
@@ -361,8 +361,8 @@ def falling_amplitude(group: Sequence[TrialData]) -> Iterator[str]:
         first = min(lowered, key=lambda sine: sine.frequency)
         least = max(lowered, key=lambda sine: sine.frequency)
         yield (
-            f"The command's amplitude was {rate_here(largest)} below "
+            f"The command's amplitude was {rate_text(largest)} below "
             f"{first.frequency:.4g} Hz; from there on its acceleration was kept, down to "
-            f"{rate_here(least.amplitude)} at {least.frequency:.4g} Hz. Where friction "
+            f"{rate_text(least.amplitude)} at {least.frequency:.4g} Hz. Where friction "
             "matters, other amplitudes give other responses."
         )

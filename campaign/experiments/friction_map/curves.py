@@ -39,7 +39,7 @@ from campaign.experiments.friction_map.points import Point, coefficient_of, with
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.result import Array
-from campaign.units import rate_here
+from campaign.units import rate_text
 
 ANGLE = "angle"
 """Part of an uncertainty: what was taken off the torque by the angle."""
@@ -275,7 +275,7 @@ def _fit(curves: Curves, name: str, own: Sequence[_Averaged]) -> None:
         mean = mean_of_stretches("friction", values, quantity.meanings["friction"][0])
         curves.others[name] = {"friction": mean}
         curves.moved[name] = {"friction": float(np.mean(moved))}
-        at = f"{rate_here(float(speed.min()))} to {rate_here(float(speed.max()))}"
+        at = f"{rate_text(float(speed.min()))} to {rate_text(float(speed.max()))}"
         notes.append(
             f"In the {name} direction {problem}: friction is that from {at}, and what of it is "
             "dry or viscous is not known."

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from campaign.experiments.interface import Chosen
+from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.default_options import overcome_friction, stands_still, usual
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.experiments.shared.rounded_choices import Choices, nice, share
 from campaign.physics.bench import Bench
 from campaign.physics.complete import limits_of, require
-from campaign.units import angle_here
+from campaign.units import angle_text
 
 SETTLED = 10.0
 """Ts / sigma0 after which friction's memory is below 1e-4 of Ts: exp(-10) = 5e-5."""
@@ -34,7 +34,7 @@ SPEEDS = 40
 """of a map: the fit needs some ten, the rest shows where the curve is not the model's."""
 
 
-def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def velocity_map(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Travel, ramps, settling, windows, speeds and times of a friction-velocity map."""
     require(bench, ("limits",), "a plan of runs at constant speed")
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
@@ -87,8 +87,8 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     undescribed = {"a usual size; friction is not described": usual(0.75)}
     turned = rig.unwinding(0.0)
     told = (
-        f"{SETTLED:.0f} times Ts/σ0 of {angle_here(memory, '.2g')}, once the loop's "
-        f"integral has turned round in {angle_here(turned, '.2g')}"
+        f"{SETTLED:.0f} times Ts/σ0 of {angle_text(memory, '.2g')}, once the loop's "
+        f"integral has turned round in {angle_text(turned, '.2g')}"
     )
     known = bench.friction and {told: SETTLED * memory + TURNED * turned}
     slow = {} if own else {"half of what slow speeds turn": 0.5 * longest * SLOWEST * fastest}

@@ -10,10 +10,12 @@ from campaign.estimate import Window
 from campaign.estimation.steady_stretches import steady_stretches
 from campaign.experiments.friction_map.runs import DIRECTIONS, SMALLEST_WINDOW, WHOLE
 from campaign.physics.bench import Bench
-from campaign.trial import Offered, Task, TrialRequest
+from campaign.trial import OfferedRecording, Task, TrialRequest
 
 
-def stretches_found(options: Any, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+def stretches_found(
+    options: Any, bench: Bench, offered: OfferedRecording
+) -> Iterator[TrialRequest]:
     """A trial for each steady stretch, of one direction; or the windows that somebody has named.
 
     Raises ValueError where there is none.
@@ -40,7 +42,7 @@ def stretches_found(options: Any, bench: Bench, offered: Offered) -> Iterator[Tr
         )
 
 
-def _named(offered: Offered) -> Iterator[TrialRequest]:
+def _named(offered: OfferedRecording) -> Iterator[TrialRequest]:
     wrong = [window.name for window in offered.windows if window.name not in DIRECTIONS]
     if wrong:
         raise ValueError(

@@ -20,7 +20,7 @@ from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.experiments.shared.conclusion_parts import Settings
-from campaign.parameter import Identified, Parameter
+from campaign.parameter import IdentifiedRig, Parameter
 from campaign.reason import Reason
 from campaign.result import Finding, Result
 
@@ -70,7 +70,7 @@ def identified(data: TestData) -> Result:
     if not parameters or curves is None:
         raise ValueError("; ".join(note.rstrip(".") for note in result.notes))
     settings = _settings(curves.found, parameters)
-    return replace(result, identified=Identified(parameters, settings=settings, left_out=lost))
+    return replace(result, identified=IdentifiedRig(parameters, settings=settings, left_out=lost))
 
 
 def _settings(

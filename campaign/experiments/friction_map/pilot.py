@@ -30,7 +30,7 @@ from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
 from campaign.trial import NONE_MORE, Most, TrialRequest
-from campaign.units import angle_here
+from campaign.units import angle_text
 
 SPEEDS = 10
 """of a pilot: twice as many as Equation 4.6 has parameters."""
@@ -115,6 +115,6 @@ def settled_enough(group: Sequence[TrialData], notes: list[str]) -> list[TrialDa
     if short := len(first) - len(kept):
         notes.append(
             f"{short} of {len(first)} runs of the pilot are no points of the map: they settled for "
-            f"less than the {angle_here(needed, '.2g')} of those that followed."
+            f"less than the {angle_text(needed, '.2g')} of those that followed."
         )
     return [*kept, *then]

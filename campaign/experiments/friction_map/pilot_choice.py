@@ -38,7 +38,7 @@ from campaign.experiments.interface import Stage, TestData, TrialData
 from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
 from campaign.trial import TrialRequest
-from campaign.units import angle_here, in_words
+from campaign.units import angle_text, in_words
 
 FINER = 3
 """speeds to choose among for each of `points`."""
@@ -183,7 +183,7 @@ def _speeds(
     offered = offered[apart > ROUNDING]  # a repeat would be averaged with what it repeats
     candidates = np.array([speed for speed in offered if _fits(float(speed), options, longer)])
     if not len(candidates) or not len(measured):
-        angle = angle_here(longer.settle_angle)
+        angle = angle_text(longer.settle_angle)
         raise ValueError(f"friction asks to settle for {angle}, and no run has room for it")
     chosen = telling_speeds(curves, measured, candidates, options.points - SPEEDS)
     return tuple(chosen.tolist())
@@ -210,7 +210,7 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves
         f"vs {in_words(found['stribeck_velocity'], 'rad/s', 'deg/s')}, "
         f"δ {found['stribeck_exponent']:.2g}"
     )
-    settle, window = (angle_here(angle) for angle in (longer.settle_angle, longer.window_angle))
+    settle, window = (angle_text(angle) for angle in (longer.settle_angle, longer.window_angle))
     if longer.settle_angle > options.settle_angle:
         told += f"; settled for {settle}, as its reversals ask for"
     if longer.window_angle > options.window_angle:

@@ -29,7 +29,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.units import shown_here
+from campaign.units import display_value
 
 RIPPLE = {
     "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
@@ -39,7 +39,7 @@ DESCRIBES = Cause("describes the window", "it describes the window")
 """Why some metrics of a window have no interval."""
 
 
-def told_periods(bench: Bench) -> float | None:
+def stated_periods(bench: Bench) -> float | None:
     """Periods per revolution of the largest ripple that the bench describes; None without one."""
     found = [
         (each.ripple.amplitude * float(getattr(each, "static_torque", 1.0)), each.ripple.periods)
@@ -106,7 +106,7 @@ def _ripple(cut: _Samples, bench: Bench) -> Harmonic | None:
     if len(cut.time) < 3 or cut.angle is None or inertia is None:
         return None
     angle, rate, torque = cut.angle, cut.rate, cut.torque
-    periods = told_periods(bench) or dominant_periods(angle, rate, torque, inertia)
+    periods = stated_periods(bench) or dominant_periods(angle, rate, torque, inertia)
     if periods is None or periods * abs(float(np.mean(rate))) > 2.0 * np.pi * FASTEST:
         return None
     try:
@@ -259,7 +259,7 @@ def _with_rule(point: Point, reason: Reason) -> Point:
 
 
 def _speeds(points: Sequence[Point]) -> str:
-    told = (f"{shown_here(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
+    told = (f"{display_value(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
     return f"{', '.join(told)} {axis_unit('deg/s')}"
 
 

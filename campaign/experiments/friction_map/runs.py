@@ -29,8 +29,8 @@ from campaign.units import (
     AngularRate,
     Frequency,
     Time,
-    angle_here,
-    rate_here,
+    angle_text,
+    rate_text,
 )
 
 SMALLEST_WINDOW = 10
@@ -227,9 +227,9 @@ def settling_advice(rig: Rig, speed: float, settled: float) -> str:
     needed = MEMORIES * memory + turned
     if settled >= needed * (1.0 - ROUNDING):
         return ""
-    wanted, lag = (angle_here(angle, ".2g") for angle in (needed, turned))
+    wanted, lag = (angle_text(angle, ".2g") for angle in (needed, turned))
     integral = f", and the loop's integral turns round in {lag}" if turned else ""
-    return f"settle for {wanted} or more: Ts/sigma0 is {angle_here(memory)}{integral}"
+    return f"settle for {wanted} or more: Ts/sigma0 is {angle_text(memory)}{integral}"
 
 
 def plan_run(speed: float, options: VelocityMapOptions) -> Run:
@@ -242,7 +242,7 @@ def plan_run(speed: float, options: VelocityMapOptions) -> Run:
     room = cruise - settle
     if room <= 0:
         raise ValueError(
-            f"at {rate_here(speed, '.4g')} the run lasts {max(cruise, 0):.3g} s at constant "
+            f"at {rate_text(speed, '.4g')} the run lasts {max(cruise, 0):.3g} s at constant "
             f"speed but takes {settle:.3g} s to settle; raise max_travel, max_time or "
             "acceleration, or drop that speed"
         )
@@ -285,7 +285,7 @@ def settling_of_runs(rig: Rig, runs: Iterable[tuple[float, float]]) -> tuple[str
 
 def speed_range(speeds: Sequence[float]) -> str:
     """From the slowest to the fastest (rad/s), in words."""
-    low, high = rate_here(min(speeds)), rate_here(max(speeds))
+    low, high = rate_text(min(speeds)), rate_text(max(speeds))
     return high if low == high else f"{low.split()[0]} to {high}"
 
 
@@ -306,11 +306,11 @@ def run_requests(
     """
     if run.window * options.sample_rate < SMALLEST_WINDOW:
         raise ValueError(
-            f"at {rate_here(run.speed, '.4g')} the window of {run.window:.3g} s holds fewer "
+            f"at {rate_text(run.speed, '.4g')} the window of {run.window:.3g} s holds fewer "
             f"than {SMALLEST_WINDOW} samples; raise sample_rate or drop that speed"
         )
     (first, _), (_, last) = run.window_of(+1), run.window_of(-1)
-    told = f"window {run.window:.3g} s, {angle_here(run.window * run.speed)}: {run.rule}"
+    told = f"window {run.window:.3g} s, {angle_text(run.window * run.speed)}: {run.rule}"
     advice = settling_advice(rig, run.speed, run.speed * run.settle)
     many = bool(options.start_angles)
     for start_angle in _starts(options, run, number, rig.limits.angle):

@@ -25,8 +25,8 @@ from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.stretches import (
     StretchOptions,
+    drives_motion,
     force_of,
-    goes_along,
     loaded,
     loads_alike,
     points_of,
@@ -62,7 +62,7 @@ KEYS = {*ADVICE} - {"friction"}
 
 
 @dataclass(frozen=True)
-class Sliding:
+class SteadyResult:
     """What steady stretches show.
 
     Attributes:
@@ -96,7 +96,7 @@ def by_direction(parameters: Iterable[Parameter]) -> dict[str, dict[str, Estimat
     return told
 
 
-def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
+def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> SteadyResult:
     """Of all trials together, which are of one bench."""
     first = trials[0]
     found, held = points_of(trials, options.shortest, options.slowest)
@@ -104,7 +104,7 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
     left = tuple(point for point in found if point.unsteady)
     lost = tuple(_left_out(trials, options, found))
     if not points:
-        return Sliding(first, points, left, left_out=lost)
+        return SteadyResult(first, points, left, left_out=lost)
     notes = [] if held is None else [_over_a_turn(held)]
     quantities = [FRICTION] if loads_alike(points) else []
     quantities += [COEFFICIENT] if loaded(points) else []
@@ -117,7 +117,7 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
         )
     maps = tuple(fit_curves(points, first, each, force_of(first)) for each in quantities)
     notes += (note for each in maps for note in each.notes)
-    if goes_along(points):
+    if drives_motion(points):
         notes.append(
             "Friction goes with the motion nearly everywhere, and cannot: the column of the force, "
             "or that of the motion, has the other sign, as of a sensor on the part that rests. "
@@ -125,7 +125,7 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> Sliding:
         )
     parameters = tuple(each for one in maps for each in parameters_of(one, maps[0]))
     told = tuple(dict.fromkeys(notes))
-    return Sliding(first, points, left, maps, parameters, told, lost)
+    return SteadyResult(first, points, left, maps, parameters, told, lost)
 
 
 def _left_out(

@@ -175,7 +175,7 @@ def loads_alike(points: Sequence[Point]) -> bool:
     return not known or max(known) <= LOADS_ALIKE * min(known)
 
 
-def goes_along(points: Sequence[Point]) -> bool:
+def drives_motion(points: Sequence[Point]) -> bool:
     """Whether what is called friction drives the motion, nearly wherever it slides."""
     power = np.array([each.torque.value * each.sign for each in points])
     return bool(np.median(power) < 0 and np.mean(power < 0) > 0.9)

@@ -14,12 +14,12 @@ from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import MODELS, DirectionFit, Model, doubts
 from campaign.experiments.friction_map.curves import DIGITS, Curves
-from campaign.experiments.friction_map.points import Point, coefficient_of, told_periods
+from campaign.experiments.friction_map.points import Point, coefficient_of, stated_periods
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.reason import Cause
 from campaign.result import Cell, Column, Finding, Table, Value
-from campaign.units import angle_here
+from campaign.units import angle_text
 
 FITTED: tuple[Model, ...] = ("free", "2")
 """Models whose parameters are findings."""
@@ -238,7 +238,7 @@ def _scatter(fit: DirectionFit) -> str:
 
 
 def _ripple(fits: Curves, direction: str) -> str:
-    ripple, told = fits.ripples[direction], told_periods(bench_of(fits.first.trial))
+    ripple, told = fits.ripples[direction], stated_periods(bench_of(fits.first.trial))
     points = [point for point in fits.points if point.sign == DIRECTIONS[direction]]
     if ripple is not None:
         turn = 2.0 * np.pi / ripple.periods
@@ -249,7 +249,7 @@ def _ripple(fits: Curves, direction: str) -> str:
             f"{100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} runs, was taken "
             f"out of all points; {short} windows are shorter than its period"
         )
-    least = angle_here(
+    least = angle_text(
         min(abs(point.speed) * (point.stop - point.start) for point in points), ".2g"
     )
     return (

@@ -21,7 +21,7 @@ from campaign.experiments.friction_map.runs import (
 from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
 from campaign.physics.true_values import stribeck_parameters
-from campaign.units import angle_here, rate_here
+from campaign.units import angle_text, rate_text
 
 LEAST_RUNS = 2
 """that have to show a ripple whose period is known, for it to be taken out of all points."""
@@ -56,8 +56,8 @@ def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
     if velocity > 0 and below < FEWEST_BELOW:
         yield (
             f"{below} of {len(runs)} speeds are below the Stribeck velocity of "
-            f"{rate_here(velocity)}: static_torque is extrapolated; run {FEWEST_BELOW} or "
-            f"more below it, from {rate_here(0.1 * velocity)} on"
+            f"{rate_text(velocity)}: static_torque is extrapolated; run {FEWEST_BELOW} or "
+            f"more below it, from {rate_text(0.1 * velocity)} on"
         )
 
 
@@ -67,7 +67,7 @@ def _none_far_above(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
     far = FAR * max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
     if far > 0 and not any(run.speed > far for run in runs):
         yield (
-            f"no speed is above {FAR:g} times the Stribeck velocity, {rate_here(far)}: "
+            f"no speed is above {FAR:g} times the Stribeck velocity, {rate_text(far)}: "
             "coulomb_torque is extrapolated; run one or more above that"
         )
 
@@ -90,15 +90,15 @@ def _ripple(runs: Sequence[Run], options: VelocityMapOptions, bench: Bench) -> I
     showing = [run for run in slow if run.settled * run.speed >= LEAST_PERIODS * period]
     if not short or len(showing) >= LEAST_RUNS:
         return
-    told = f"a period of friction's ripple, {angle_here(period)}"
+    told = f"a period of friction's ripple, {angle_text(period)}"
     if options.max_travel < period and not options.spread_starts:
         yield (
-            f"max_travel of {angle_here(options.max_travel)} is shorter than {told}: every run "
+            f"max_travel of {angle_text(options.max_travel)} is shorter than {told}: every run "
             "sees it at one place; raise it, or write two start_angles half a period apart"
         )
         return
     yield (
         f"at {speed_range(short)} windows are shorter than {told}, and it cannot be taken out: of "
-        f"the runs below {rate_here(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
+        f"the runs below {rate_text(FASTEST * period)} {len(showing)} span one, and {LEAST_RUNS} "
         "have to; raise max_travel or max_time, or write two start_angles half a period apart"
     )

@@ -19,7 +19,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import bracketed
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
 from campaign.experiments.model_properties.parameter_set import Scale, options_of, with_friction
-from campaign.experiments.model_properties.rules import MARKS, MET, RULES, Judged
+from campaign.experiments.model_properties.rules import MARKS, MET, RULES, ModelVerdict
 from campaign.experiments.model_properties.tables_and_figures import figures, tables
 from campaign.experiments.model_properties.virtual_experiments import (
     estimates,
@@ -97,7 +97,7 @@ def _options(data: TestData) -> ModelPropertiesOptions:
     return ModelPropertiesOptions.model_validate(data.trials[0].trial.options, context={"si": True})
 
 
-def _judged(data: TestData, notes: list[str]) -> Iterator[Judged]:
+def _judged(data: TestData, notes: list[str]) -> Iterator[ModelVerdict]:
     """Each model whose trials are all there."""
     options = _options(data)
     done = list(data.completed())
@@ -122,10 +122,10 @@ def _judged(data: TestData, notes: list[str]) -> Iterator[Judged]:
                 notes.append(f"{model}, {name}: {error}; the model is left out.")
                 break
         else:
-            yield Judged(model, numbers, _sizes(model, next(iter(options.sets.values()))))
+            yield ModelVerdict(model, numbers, _sizes(model, next(iter(options.sets.values()))))
 
 
-def _findings(judged: Judged) -> Iterator[Finding]:
+def _findings(judged: ModelVerdict) -> Iterator[Finding]:
     conditions = {"model": judged.model}
     for rule in RULES:
         marks = judged.marks(rule)
@@ -154,7 +154,7 @@ def _analyse(data: TestData) -> Result:
     )
 
 
-def _conclusion(found: Sequence[Judged]) -> Conclusion:
+def _conclusion(found: Sequence[ModelVerdict]) -> Conclusion:
     """Which models meet most rules, and which they do not meet, all sets counted."""
     lacks = {
         each.model: [rule.name for rule in RULES if each.sign(rule) != MARKS[MET]] for each in found

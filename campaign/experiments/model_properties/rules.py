@@ -114,7 +114,7 @@ RULES = (
 
 
 @dataclass(frozen=True)
-class Judged:
+class ModelVerdict:
     """A model over all parameter sets.
 
     Attributes:

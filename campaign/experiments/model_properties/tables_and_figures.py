@@ -15,7 +15,7 @@ from campaign.experiments.model_properties.rules import (
     MET,
     PARTLY,
     RULES,
-    Judged,
+    ModelVerdict,
     Rule,
 )
 from campaign.result import Axis, Column, Curve, Figure, Panel, Table
@@ -24,7 +24,9 @@ ENDS = 1e-2, 1e2
 """Of a number over its threshold, as drawn: what lies beyond is drawn there."""
 
 
-def tables(found: Sequence[Judged], sets: Mapping[str, Mapping[str, Any]]) -> tuple[Table, ...]:
+def tables(
+    found: Sequence[ModelVerdict], sets: Mapping[str, Mapping[str, Any]]
+) -> tuple[Table, ...]:
     """Marks by property and model; numbers behind them; rules; sizes of models; parameter sets."""
     models = [Column(each.model, each.model) for each in found]
     text = Column("property", "Property", exact=True)
@@ -118,7 +120,7 @@ def _share(value: float, rule: Rule) -> float:
     return 0.0 if abs(share) < 1e-3 else float(f"{share:.3g}")
 
 
-def figures(found: Sequence[Judged], data: TestData) -> tuple[Figure, ...]:
+def figures(found: Sequence[ModelVerdict], data: TestData) -> tuple[Figure, ...]:
     """The numbers over their thresholds; loops in presliding and around a rate of the first set."""
     first = next(iter(found[0].numbers))
     own = [item for item in with_samples(data.completed()) if item.trial.point["set"] == first]
@@ -137,7 +139,7 @@ def figures(found: Sequence[Judged], data: TestData) -> tuple[Figure, ...]:
     return (_matrix(found), _decisions(found), *(figure for figure in loops if figure.panels))
 
 
-def _matrix(found: Sequence[Judged]) -> Figure:
+def _matrix(found: Sequence[ModelVerdict]) -> Figure:
     """The marks of all models as a picture."""
     models = [each.model.replace("-", "-\n") for each in found]
     looks = {
@@ -177,7 +179,7 @@ def _matrix(found: Sequence[Judged]) -> Figure:
     )
 
 
-def _decisions(found: Sequence[Judged]) -> Figure:
+def _decisions(found: Sequence[ModelVerdict]) -> Figure:
     places = tuple((float(-k), each.model) for k, each in enumerate(found))
     at = np.array([place for place, _ in places])
 
@@ -226,7 +228,7 @@ def _frequency(item: TrialData) -> float:
 
 
 def _loops(
-    found: Sequence[Judged],
+    found: Sequence[ModelVerdict],
     items: Iterator[TrialData],
     along: tuple[str, str, str, str],
     words: tuple[str, str, str],

@@ -14,7 +14,7 @@ from campaign.estimation.intervals import difference, multiplied, shifted_by
 from campaign.experiments.friction_map.curves import ANGLE, COEFFICIENT, FRICTION
 from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.friction_map.runs import DIRECTIONS
-from campaign.experiments.friction_map.steady_recordings import Sliding, sliding_of
+from campaign.experiments.friction_map.steady_recordings import SteadyResult, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import conditions
@@ -39,7 +39,7 @@ class Motion:
     data: TrialData
     place: Mapping[str, Value]
     found: Mapping[str, Estimate]
-    sliding: Sliding
+    sliding: SteadyResult
     constant: Estimate | None
     coefficient: Estimate | None
 
@@ -71,7 +71,7 @@ def account_of(
     return Motion(data, conditions(data), found, sliding, constant, _mean_coefficient(sliding))
 
 
-def _mean_coefficient(sliding: Sliding) -> Estimate | None:
+def _mean_coefficient(sliding: SteadyResult) -> Estimate | None:
     curves = next((each for each in sliding.maps if each.quantity is COEFFICIENT), None)
     loaded = [p for p in sliding.points if np.isfinite(p.load)]
     values = [coefficient_of(p, sliding.first).value for p in loaded]
@@ -81,14 +81,14 @@ def _mean_coefficient(sliding: Sliding) -> Estimate | None:
     return admitted(mean if curves is None else curves.with_constants(mean))
 
 
-def _coulomb_fitted(sliding: Sliding) -> dict[str, Estimate]:
+def _coulomb_fitted(sliding: SteadyResult) -> dict[str, Estimate]:
     """Coulomb friction by direction, as fitted."""
     found = next((each.found for each in sliding.maps if each.quantity is FRICTION), {})
     every = {way: own.get("coulomb_torque") for way, own in found.items()}
     return {way: one for way, one in every.items() if one is not None and one.has_interval}
 
 
-def _constant(sliding: Sliding) -> Estimate | None:
+def _constant(sliding: SteadyResult) -> Estimate | None:
     found = _coulomb_fitted(sliding)
     if len(found) < 2:
         return None
@@ -106,7 +106,7 @@ def is_surely_something(estimate: Estimate) -> bool:
     return low is not None and high is not None and (low > 0 or high < 0)
 
 
-def _doubts(label: str, found: Mapping[str, Estimate], sliding: Sliding) -> Iterator[str]:
+def _doubts(label: str, found: Mapping[str, Estimate], sliding: SteadyResult) -> Iterator[str]:
     """What a reader of stretches should know."""
     if not sliding.points:
         cause = "`shortest` says how long a steady stretch is"

@@ -33,7 +33,7 @@ from campaign.experiments.shared.recorded_motion import nothing_to_plan
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
 from campaign.result import Array, Result
-from campaign.trial import Offered, Task, TrialRequest
+from campaign.trial import OfferedRecording, Task, TrialRequest
 from campaign.units import Length
 
 CAN_USE = {
@@ -54,7 +54,9 @@ class MotionOptions(StretchOptions):
     """At which a normal load rubs, of an axis that turns: for friction over normal load."""
 
 
-def _found(options: MotionOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+def _found(
+    options: MotionOptions, bench: Bench, offered: OfferedRecording
+) -> Iterator[TrialRequest]:
     """The whole recording; a sensor in the joint tells friction without what accelerates."""
     force = JOINT_TORQUE if JOINT_TORQUE in offered.channels else DRIVE_TORQUE
     yield TrialRequest(

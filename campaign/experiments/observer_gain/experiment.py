@@ -20,7 +20,7 @@ from pydantic import Field, JsonValue
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.experiments.interface import Chosen, Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import ChosenValue, Experiment, TestData, TrialData, bench_of
 from campaign.experiments.observer_gain.conclusions import observer_conclusions
 from campaign.experiments.observer_gain.figures import (
     error_figure,
@@ -128,7 +128,7 @@ def predicted_limit(bench: Bench, name: str, highest: float) -> float | None:
     return high
 
 
-def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, Chosen]:
+def _fit(options: ObserverGainOptions, bench: Bench) -> Mapping[str, ChosenValue]:
     """The base motion, and times of noise and disturbance within the limit of duration."""
     choices, longest = Choices(options), MOST * limits_of(bench).duration
     why = share("duration", MOST)

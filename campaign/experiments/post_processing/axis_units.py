@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from campaign.axis_kind import axis_unit, in_axis_terms, is_linear
 from campaign.estimate import Estimate
-from campaign.parameter import Identified
+from campaign.parameter import IdentifiedRig
 from campaign.reason import Reason
 from campaign.result import (
     Amount,
@@ -45,7 +45,7 @@ def in_axis_units(result: Result) -> Result:
     )
 
 
-def _identified(found: Identified) -> Identified:
+def _identified(found: IdentifiedRig) -> IdentifiedRig:
     parameters = tuple(
         replace(
             each,

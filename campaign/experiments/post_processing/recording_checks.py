@@ -21,7 +21,7 @@ from campaign.signals import Zero
 from campaign.trial import Role, Trial
 
 
-class Finished(Protocol):
+class FinishedTrial(Protocol):
     """What is looked at of a finished trial: a part of `interface.TrialData`."""
 
     @property
@@ -51,7 +51,7 @@ NOT_MEASURED = Cause("not measured", "{error}")
 NOT_KEPT = Cause("samples not kept", "nothing was measured, and the samples were not kept: {why}")
 
 
-def doubt(data: Finished) -> RecordingDoubt | None:
+def doubt(data: FinishedTrial) -> RecordingDoubt | None:
     """What is wrong with the recording of a completed measurement.
 
     Nothing where it was measured when the trial ended, as its samples are not read again then, nor

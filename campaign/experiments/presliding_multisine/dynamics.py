@@ -14,7 +14,7 @@ from campaign.estimation.presliding import damping_by_ratio
 from campaign.estimation.presliding_dynamics.driven_torque import Driven, driven_torques
 from campaign.estimation.presliding_dynamics.plant import Appendage
 from campaign.estimation.presliding_dynamics.presliding_fit import PreslidingDynamics
-from campaign.estimation.presliding_dynamics.record import Assumed, Record
+from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.presliding_multisine.held_current import between_samples
 from campaign.experiments.shared.captions import amount
@@ -102,7 +102,7 @@ def _multisine(data: TrialData) -> MultiSine | None:
     return task.command if task.mode == "torque" and isinstance(task.command, MultiSine) else None
 
 
-def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumed:
+def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumptions:
     """What a bench says beforehand: a first guess of viscous friction, and its appendage.
 
     Both dampings are free: interfaces whose bristles differ yield with other shares of damping than
@@ -111,11 +111,11 @@ def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumed:
     """
     viscous = viscous_of(bench)
     if bench.appendage is None:
-        return Assumed(viscous, viscous_free=True)
+        return Assumptions(viscous, viscous_free=True)
     part = bench.appendage
     free = span[0] < part.frequency < span[1]
     told = Appendage(part.inertia, part.frequency, part.damping_ratio)
-    return Assumed(viscous, viscous_free=True, appendage=told, appendage_free=free)
+    return Assumptions(viscous, viscous_free=True, appendage=told, appendage_free=free)
 
 
 def viscous_of(bench: Bench) -> float:

@@ -19,7 +19,7 @@ from campaign.estimation.presliding_dynamics.record import Record
 from campaign.experiments.interface import TestData, TrialData
 from campaign.experiments.presliding_multisine.dynamics import viscous_of
 from campaign.experiments.presliding_multisine.small_motions import records_of, usable
-from campaign.parameter import Identified, Parameter, Unseen
+from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Column, Table
@@ -55,7 +55,7 @@ ADVICE = {
 
 def identified(
     data: TestData, found: PreslidingDynamics, told: dict[str, Estimate], planned: bool
-) -> tuple[Identified, Table, tuple[str, ...]]:
+) -> tuple[IdentifiedRig, Table, tuple[str, ...]]:
     """Parameters, what the model leaves over of each trial, and notes.
 
     planned: whether the trials are small motions by their plan. Raises ValueError where no trial of
@@ -66,7 +66,7 @@ def identified(
     unseen = _unseen(data.validation)
     missed = [unexplained(found.fit, each) for each in unseen]
     return (
-        Identified(
+        IdentifiedRig(
             tuple(_parameters(told, bench, planned or _gives_way(found))),
             correlations=_correlations(found),
             unseen=Unseen(max(missed), "motion") if missed else None,

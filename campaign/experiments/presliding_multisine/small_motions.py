@@ -9,7 +9,7 @@ import numpy as np
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimation.inverse.motion import whole_pieces
 from campaign.estimation.presliding_dynamics.plant import Array
-from campaign.estimation.presliding_dynamics.record import FEWEST, Assumed, Record
+from campaign.estimation.presliding_dynamics.record import FEWEST, Assumptions, Record
 from campaign.estimation.presliding_dynamics.start import first_plant
 from campaign.experiments.interface import TrialData
 from campaign.experiments.presliding_multisine.dynamics import record_of, with_torques_known
@@ -136,7 +136,7 @@ def slides(record: Record) -> str:
     if _only_ramps(record.torque):
         return "its torque only rises or falls: without a reversal nothing shows that it returns"
     try:
-        first_plant([record], Assumed())
+        first_plant([record], Assumptions())
     except ValueError as error:
         return str(error)
     torque, angle, rate, acceleration = _smooth(record)

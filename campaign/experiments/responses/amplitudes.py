@@ -10,7 +10,7 @@ import numpy as np
 from campaign.estimation.least_squares import Array
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.signals import Signals
-from campaign.units import rate_here
+from campaign.units import rate_text
 
 SAME_SIZE = 1.1
 """Ratio of neighbouring rms below which recordings are realisations of one amplitude. Realisations
@@ -48,4 +48,4 @@ def size_of(told: Sequence[Recorded], period: float) -> str:
     trial, first = told[0]
     mode = trial.trial.task.mode
     rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
-    return f"rms {rate_here(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"
+    return f"rms {rate_text(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"

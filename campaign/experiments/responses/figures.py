@@ -26,7 +26,7 @@ FITTED = (
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedResponse:
     """What is drawn on the response of one sensor.
 
     Attributes:
@@ -40,11 +40,11 @@ class Fitted:
     value: Callable[[Array], ComplexArray] | None = None
 
 
-NOTHING = Fitted()
+NOTHING = FittedResponse()
 
 
 def response_figures(
-    sources: Sequence[Source], fitted: Mapping[tuple[int, Side], Fitted] | None = None
+    sources: Sequence[Source], fitted: Mapping[tuple[int, Side], FittedResponse] | None = None
 ) -> Iterator[Figure]:
     """Each response and its distortion; `fitted`: by index of the source, and sensor."""
     for index, source in enumerate(sources):
@@ -58,7 +58,7 @@ def response_figures(
 
 
 def _bode(
-    key: str, source: Source, side: Side, measured: MeasuredResponse, fitted: Fitted
+    key: str, source: Source, side: Side, measured: MeasuredResponse, fitted: FittedResponse
 ) -> Figure:
     gain, phase = panels(measured, fitted.lines, TORQUE)
     gain = replace(gain, marks=fitted.marks)

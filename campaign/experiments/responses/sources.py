@@ -34,7 +34,7 @@ from campaign.experiments.responses.signals import (
 )
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Sine
-from campaign.units import rate_here
+from campaign.units import rate_text
 
 STEADY = "steady"
 FEWEST_SINES = 6
@@ -236,7 +236,7 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
         closed = make_response(loop)
     amplitude = max(abs(t.trial.task.command.amplitude) for t, _ in told)  # type: ignore[union-attr]
     in_rate = told[0][0].trial.task.mode == "rate"
-    largest = rate_here(amplitude) if in_rate else f"{amplitude:.4g} N·m"
+    largest = rate_text(amplitude) if in_rate else f"{amplitude:.4g} N·m"
     excitation = (
         f"{len(first)} single sines from {first[0]:.4g} to {first[-1]:.4g} Hz, "
         f"amplitude up to {largest}"
@@ -315,7 +315,7 @@ def _named(best: BestLinear, trial: TrialData) -> str:
     if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
         return torque
     rms = float(np.sqrt(0.5 * np.sum(np.square(command.amplitudes))))
-    return f"{torque}, of a rate of rms {rate_here(rms)} that was asked for"
+    return f"{torque}, of a rate of rms {rate_text(rms)} that was asked for"
 
 
 def _loop_of(

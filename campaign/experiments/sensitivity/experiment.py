@@ -27,8 +27,8 @@ from campaign.experiments.sensitivity.figures import (
 from campaign.experiments.sensitivity.model_variation import model_figures, model_trials
 from campaign.experiments.sensitivity.results import (
     SYMBOLS,
-    Judged,
     Response,
+    ResponseVerdict,
     judge,
     sensitivity_findings,
     sensitivity_table,
@@ -235,7 +235,7 @@ def _analyse(data: TestData) -> Result:
 
 
 def _figures(
-    judged: Sequence[Judged], limit: Threshold, told: Mapping[str, Value], whole: bool
+    judged: Sequence[ResponseVerdict], limit: Threshold, told: Mapping[str, Value], whole: bool
 ) -> Iterator[Figure]:
     """Thresholds, compared with published ones where all trials are there, and all errors."""
     compensation = str(told["compensation"])

@@ -9,7 +9,7 @@ import numpy as np
 
 from campaign.estimate import Origin
 from campaign.estimation.threshold import Threshold
-from campaign.experiments.sensitivity.results import Judged
+from campaign.experiments.sensitivity.results import ResponseVerdict
 from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import ends
 from campaign.result import Axis, Curve, Figure, Mark, Panel, Value
@@ -17,7 +17,7 @@ from campaign.units import in_words
 
 
 def thresholds_figure(
-    judged: Sequence[Judged],
+    judged: Sequence[ResponseVerdict],
     limit: Threshold,
     compensation: str,
     told: Mapping[str, Value] | None,
@@ -68,7 +68,9 @@ def thresholds_figure(
     )
 
 
-def sensitivity_figure(judged: Sequence[Judged], limit: Threshold, compensation: str) -> Figure:
+def sensitivity_figure(
+    judged: Sequence[ResponseVerdict], limit: Threshold, compensation: str
+) -> Figure:
     """Figure 5.14: a panel for each parameter, all of one scale."""
     top = 1.08 * max(float(np.nanmax(one.response.dots[:, 1], initial=0.0)) for one in judged)
     scale = (0.0, max(top, 1.1 * limit.value))
@@ -100,14 +102,14 @@ def sensitivity_figure(judged: Sequence[Judged], limit: Threshold, compensation:
     )
 
 
-def _place(one: Judged) -> str:
+def _place(one: ResponseVerdict) -> str:
     """A parameter below an axis, with what is not to be taken from its dot."""
     if one.threshold.kind == "at least":
         return f"{one.symbol}\nnot reached"
     return one.symbol if math.isfinite(one.threshold.value) else f"{one.symbol}\nnot determined"
 
 
-def _said(one: Judged) -> str:
+def _said(one: ResponseVerdict) -> str:
     if one.passed:
         return f"passes at {100 * one.threshold.value:.0f} %"
     if one.threshold.kind == "at least":
@@ -115,7 +117,7 @@ def _said(one: Judged) -> str:
     return "not determined"
 
 
-def _marks(one: Judged, limit: Threshold) -> Iterator[Mark]:
+def _marks(one: ResponseVerdict, limit: Threshold) -> Iterator[Mark]:
     """The threshold, and where the error passes it, with its interval."""
     yield Mark(_milliradians(limit.value), y=limit.value)
     found = one.threshold

@@ -63,7 +63,7 @@ class Response:
 
 
 @dataclass(frozen=True)
-class Judged:
+class ResponseVerdict:
     """What one parameter's response says.
 
     Attributes:
@@ -98,7 +98,7 @@ def ranking(responses: Mapping[str, Response], threshold: float) -> dict[str, in
     return {name: rank for rank, name in enumerate(sorted(responses, key=order), start=1)}
 
 
-def judge(responses: Mapping[str, Response], limit: Threshold) -> tuple[Judged, ...]:
+def judge(responses: Mapping[str, Response], limit: Threshold) -> tuple[ResponseVerdict, ...]:
     """Threshold and rank of each parameter, in the order of `responses`."""
     thresholds = {
         name: passing("sensitivity_threshold", response.change, response.errors, limit)
@@ -106,7 +106,7 @@ def judge(responses: Mapping[str, Response], limit: Threshold) -> tuple[Judged, 
     }
     ranks = ranking(responses, limit.value)
     return tuple(
-        Judged(name, response, thresholds[name], _rank(name, ranks, thresholds))
+        ResponseVerdict(name, response, thresholds[name], _rank(name, ranks, thresholds))
         for name, response in responses.items()
     )
 
@@ -139,7 +139,9 @@ def _range(threshold: Estimate) -> tuple[float, float]:
     )
 
 
-def sensitivity_findings(judged: Sequence[Judged], told: Mapping[str, Value]) -> Iterator[Finding]:
+def sensitivity_findings(
+    judged: Sequence[ResponseVerdict], told: Mapping[str, Value]
+) -> Iterator[Finding]:
     """Threshold and rank of each parameter; a threshold that nothing passes is a lower bound."""
     for one in judged:
         where = {**told, "parameter": one.parameter}
@@ -147,7 +149,7 @@ def sensitivity_findings(judged: Sequence[Judged], told: Mapping[str, Value]) ->
         yield Finding.of(one.rank, where)
 
 
-def _row(one: Judged) -> dict[str, Cell]:
+def _row(one: ResponseVerdict) -> dict[str, Cell]:
     response = one.response
     bound = "not determined" if np.isnan(one.threshold.value) else f"{one.threshold.value:.0%}"
     return {
@@ -164,7 +166,7 @@ def _row(one: Judged) -> dict[str, Cell]:
     }
 
 
-def sensitivity_table(judged: Sequence[Judged], limit: Threshold) -> Table:
+def sensitivity_table(judged: Sequence[ResponseVerdict], limit: Threshold) -> Table:
     """A row for each parameter, the most important first."""
     return Table(
         key="sensitivity",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from campaign.axis_kind import is_linear
-from campaign.experiments.interface import Chosen
+from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.experiments.shared.rounded_choices import Choices, nice, share
 from campaign.physics.bench import Bench
@@ -64,7 +64,7 @@ def stands_still(rig: Rig) -> None:
         )
 
 
-def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def frequency_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Amplitudes within the limits, and frequencies from where they fit to where the loop ends."""
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     amplitude, torque = options.amplitude, options.torque
@@ -135,7 +135,7 @@ def frequency_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
     return choices.told
 
 
-def base_motion(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def base_motion(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Acceleration of a sinusoidal base motion whose swing and rate the bench can follow."""
     if getattr(getattr(options, "motion", None), "kind", "sine") != "sine":
         return {}
@@ -174,7 +174,7 @@ def _periods_in_time(choices: Choices, longest: float) -> float:
     return frequency
 
 
-def step_response(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def step_response(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Height and ramp of a step of the rate command, above the gyro's noise."""
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     drive = 0.5 * min(limits.acceleration, rig.accelerated_by(rig.torque))

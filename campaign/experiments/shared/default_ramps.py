@@ -10,7 +10,7 @@ import numpy as np
 
 from campaign.axis_kind import is_linear
 from campaign.estimation.relative_rate import LONGEST, STOP_FACTOR, WORST_COUNT, stop_rate
-from campaign.experiments.interface import Chosen
+from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.default_options import (
     DEG,
     MILLIMETRE,
@@ -23,7 +23,7 @@ from campaign.experiments.shared.rounded_choices import Choices, Reasons, nice, 
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate, limits_of
 from campaign.physics.steady_friction import steady_friction
-from campaign.units import angle_here, rate_here
+from campaign.units import angle_text, rate_text
 
 RAMP_TIME = 30.0
 """s, of a torque ramp up to breakaway, at most: slow against friction's own rates."""
@@ -38,7 +38,7 @@ RUN_OUT = 4.0
 """s; times the rate that counts as sliding, room behind a ramp for the load to be stopped in."""
 
 
-def breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Positions, height and slope of torque ramps, and what counts as sliding."""
     rig, limits, choices = Rig(bench), limits_of(bench), Choices(options)
     overcome_friction(rig)
@@ -117,8 +117,8 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     least = max(noise, count, stop_rate(0.0, rig.rate_step) / STOP_FACTOR)
     if allowed[why] < least:
         raise ValueError(
-            f"within its limits a load slides at {rate_here(allowed[why], '.2g')} at most, and "
-            f"the sensors resolve {rate_here(least, '.2g')} (six deviations of the gyro's noise, "
+            f"within its limits a load slides at {rate_text(allowed[why], '.2g')} at most, and "
+            f"the sensors resolve {rate_text(least, '.2g')} (six deviations of the gyro's noise, "
             "or counts): raise the limits of angle or rate, or write sliding_rate"
         )
     return wanted if max(wanted.values()) <= allowed[why] else {why: allowed[why]}
@@ -129,18 +129,18 @@ def _reach(rig: Rig, options: Any, sliding: float) -> float:
     limit, creep = rig.limits.angle, 2.0 * (rig.presliding or 0.0)
     if creep > 0.5 * limit and "positions" not in options.model_fields_set:
         raise ValueError(
-            f"a load creeps {angle_here(creep, '.2g')} before friction gives way, more than half "
-            f"of the angle limit of {angle_here(limit, '.2g')}: raise it, or write positions"
+            f"a load creeps {angle_text(creep, '.2g')} before friction gives way, more than half "
+            f"of the angle limit of {angle_text(limit, '.2g')}: raise it, or write positions"
         )
     return max(min(usual(45), 0.75 * limit, limit - RUN_OUT * sliding - creep), 0.0)
 
 
-def presliding(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def presliding(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Displacements around the presliding angle."""
     memory = Rig(bench).presliding
     if memory is None:
         return {}
     choices = Choices(options)
     sizes = tuple(nice(part * memory, "rad") for part in (0.125, 0.25, 0.5, 1.0, 2.0))
-    choices.take("amplitudes", sizes, f"an eighth to twice Ts/σ0 of {angle_here(memory, '.2g')}")
+    choices.take("amplitudes", sizes, f"an eighth to twice Ts/σ0 of {angle_text(memory, '.2g')}")
     return choices.told

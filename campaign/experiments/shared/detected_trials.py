@@ -18,18 +18,18 @@ from campaign.estimation.excitation_detection import (
     sine_stretch,
 )
 from campaign.signals import Polyline, Sine
-from campaign.trial import Offered, Task, TrialRequest
+from campaign.trial import OfferedRecording, Task, TrialRequest
 
 CHOOSE_SINE = "where it is a sine for a while, windows name that part, or start and stop cut it out"
 
 
-def named_or_found(offered: Offered, found: Sequence[Window]) -> tuple[Window, ...]:
+def named_or_found(offered: OfferedRecording, found: Sequence[Window]) -> tuple[Window, ...]:
     """The windows that an analysis needs: as somebody has named them, and else as found."""
     stated = {window.name: window for window in offered.windows}
     return tuple(stated.get(window.name, window) for window in found)
 
 
-def _stated(offered: Offered, name: str) -> Window | None:
+def _stated(offered: OfferedRecording, name: str) -> Window | None:
     """The window that somebody has named so. Raises ValueError where there are only others."""
     names = [window.name for window in offered.windows]
     if names and name not in names:
@@ -37,7 +37,7 @@ def _stated(offered: Offered, name: str) -> Window | None:
     return next((window for window in offered.windows if window.name == name), None)
 
 
-def _sine(offered: Offered, channel: str, window: Window | None) -> FoundStretch:
+def _sine(offered: OfferedRecording, channel: str, window: Window | None) -> FoundStretch:
     """The sine of a channel, at the frequency (Hz) that is known to have been set, if it is.
 
     Looked for in the window that was stated, or in all of the recording.
@@ -58,7 +58,7 @@ def _sine(offered: Offered, channel: str, window: Window | None) -> FoundStretch
 
 
 def _steady(
-    offered: Offered,
+    offered: OfferedRecording,
     window: Window | None,
     found: FoundStretch,
     settle_cycles: int,
@@ -81,7 +81,7 @@ def _steady(
 
 
 def sine_response(
-    offered: Offered,
+    offered: OfferedRecording,
     mode: Literal["rate", "torque"],
     excitation: str,
     window: str,
@@ -109,7 +109,7 @@ def sine_response(
     )
 
 
-def _where(offered: Offered, stated: Window | None, found: FoundStretch) -> str:
+def _where(offered: OfferedRecording, stated: Window | None, found: FoundStretch) -> str:
     """Where a sine is in a recording, where that is not all of it: in which window, or times."""
     if stated is not None:
         return f" in the window {stated.name!r}, {stated.start:.4g} to {stated.stop:.4g} s"
@@ -120,7 +120,7 @@ def _where(offered: Offered, stated: Window | None, found: FoundStretch) -> str:
     return f", from {first:.4g} to {stop:.4g} s"
 
 
-def step_found(offered: Offered, names: tuple[str, str]) -> TrialRequest:
+def step_found(offered: OfferedRecording, names: tuple[str, str]) -> TrialRequest:
     """A step of the command; windows of these names before and after it. Raises ValueError."""
     recording = offered.read([COMMAND])
     try:
@@ -151,7 +151,7 @@ def step_found(offered: Offered, names: tuple[str, str]) -> TrialRequest:
     )
 
 
-def hull_sine(offered: Offered, window: str, settle_cycles: int) -> TrialRequest:
+def hull_sine(offered: OfferedRecording, window: str, settle_cycles: int) -> TrialRequest:
     """A motion of the hull that is a sine. Raises ValueError where it is none."""
     stated = _stated(offered, window)
     found = _sine(offered, BASE_RATE, stated)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from campaign.estimation.excitation_design.passage import first_passage
-from campaign.experiments.interface import Chosen
+from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.rounded_choices import Choices, nice
 from campaign.physics.bench import Bench
@@ -92,7 +92,7 @@ def first_slip(bench: Bench) -> tuple[float, float] | None:
     return (min(angles) * stiffness, stiffness) if angles else None
 
 
-def below_breakaway(options: Any, bench: Bench) -> Mapping[str, Chosen]:
+def below_breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     """Amplitudes and frequencies of a multisine, as the bench's bristles suggest them."""
     choices, rig = Choices(options), Rig(bench)
     slip, inertia, static = first_slip(bench), bench.axis.inertia, rig.static_torque

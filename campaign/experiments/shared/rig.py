@@ -18,7 +18,7 @@ from campaign.physics.limits import worst_friction
 from campaign.physics.loop import at_load
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.plan_loops import loops_of
-from campaign.units import rate_here
+from campaign.units import rate_text
 
 SLOW = 1e-9
 """rad/s; friction at this rate is that of the onset of sliding."""
@@ -157,7 +157,7 @@ class Rig:
         left = limits.rate - shown / watched
         if left <= 0.0:
             raise ValueError(
-                f"the encoder's noise alone reaches the rate limit of {rate_here(limits.rate)}; "
+                f"the encoder's noise alone reaches the rate limit of {rate_text(limits.rate)}; "
                 "raise limits.rate or limits.rate_time"
             )
         return left

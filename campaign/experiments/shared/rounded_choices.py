@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from campaign.axis_kind import axis_unit
-from campaign.experiments.interface import Chosen
+from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.rig import Rig
 from campaign.units import convert, factor
 
@@ -21,7 +21,7 @@ class Choices:
     """What is chosen for the options of one test; those that it writes stay as they are."""
 
     options: Any
-    told: dict[str, Chosen] = field(default_factory=dict)
+    told: dict[str, ChosenValue] = field(default_factory=dict)
 
     def least(self, name: str, unit: str, reasons: Reasons) -> float:
         """The smallest of some sizes, with few digits in `unit`, rounded towards zero."""
@@ -37,7 +37,7 @@ class Choices:
         """What the option will be: as written, or `value`."""
         if name in self.options.model_fields_set:
             return getattr(self.options, name)
-        self.told[name] = Chosen(value, why)
+        self.told[name] = ChosenValue(value, why)
         return value
 
     def sample_rate(self, rig: Rig) -> float:

@@ -66,7 +66,7 @@ from campaign.reason import Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import Offered, Task, Trial, TrialRequest
+from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import AngularAcceleration, Frequency
 
 SAMPLES_PER_CYCLE = 10
@@ -131,7 +131,9 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
     yield TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
 
 
-def _found(options: StabilizationOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+def _found(
+    options: StabilizationOptions, bench: Bench, offered: OfferedRecording
+) -> Iterator[TrialRequest]:
     """The swinging hull of a recording that nobody planned."""
     request = hull_sine(offered, MEASURED, options.settle_cycles)
     compensated = request.task.model_copy(update={"compensation": options.compensation})

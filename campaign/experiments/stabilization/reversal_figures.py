@@ -15,7 +15,7 @@ from campaign.experiments.shared.common import method_label
 from campaign.experiments.shared.pointing_error import rate_of
 from campaign.recording import Recording
 from campaign.result import Array, Axis, Curve, Mark, Panel
-from campaign.units import angle_here, rate_here
+from campaign.units import angle_text, rate_text
 
 TIME = Axis("Time", "s", "s")
 RATE = Axis("Rate relative to the hull", "rad/s", "deg/s")
@@ -72,7 +72,7 @@ class Slow:
 
 
 @dataclass(frozen=True)
-class Shown:
+class MethodRate:
     """The relative rate of one method in the zoom.
 
     Attributes:
@@ -136,7 +136,7 @@ def reversal(cuts: Mapping[str, Recording]) -> Reversal:
     return Reversal(tuple(panels), " ".join(filter(None, sentences)))
 
 
-def _zoomed(cuts: Mapping[str, Recording], first: Recording) -> tuple[Zoom, dict[str, Shown]]:
+def _zoomed(cuts: Mapping[str, Recording], first: Recording) -> tuple[Zoom, dict[str, MethodRate]]:
     """The smallest zoom in which every load is seen to come out of its slow time, if any is."""
     for wider in WIDER:
         zoom = _zoom(first, wider)
@@ -167,13 +167,13 @@ def _seen(cut: Recording, finest: float, longest: float) -> RelativeRate:
     return relative_rate(cut[RELATIVE_RATE], angle, gyro, cut[BASE_RATE], step, finest, longest)
 
 
-def _near(cut: Recording, zoom: Zoom) -> Shown:
+def _near(cut: Recording, zoom: Zoom) -> MethodRate:
     rate = _seen(cut, SEEN * zoom.height, FILTERED * (zoom.stop - zoom.start))
     inside = zoom.of(cut.time)
     time, values = cut.time[inside], rate.values[inside]
     seen = rate.finest < SLOW * zoom.height
     slow = _slow(time, values, zoom) if seen else None
-    return Shown(time, -cut[BASE_RATE][inside], replace(rate, values=values), slow)
+    return MethodRate(time, -cut[BASE_RATE][inside], replace(rate, values=values), slow)
 
 
 def _slow(time: Array, rate: Array, zoom: Zoom) -> Slow | None:
@@ -201,7 +201,7 @@ def _whole_panel(name: str, cut: Recording, rate: RelativeRate, zoom: Zoom) -> P
     return Panel(TIME, RATE, curves, f"Whole motion: {method_label(name)}", [mark])
 
 
-def _zoom_panel(name: str, shown: Shown, zoom: Zoom) -> Panel:
+def _zoom_panel(name: str, shown: MethodRate, zoom: Zoom) -> Panel:
     time = replace(TIME, limits=(zoom.start, zoom.stop))
     rate = replace(RATE, limits=(-zoom.height, zoom.height))
     curves = [
@@ -214,11 +214,11 @@ def _zoom_panel(name: str, shown: Shown, zoom: Zoom) -> Panel:
         marks.append(Mark(label, x=slow.start, until=slow.stop, series=name))
     title = method_label(name)
     if np.isfinite(shown.farthest):
-        title += f": {rate_here(shown.farthest, '.2g')} off"
+        title += f": {rate_text(shown.farthest, '.2g')} off"
     return Panel(time, rate, curves, title, marks)
 
 
-def _away_panel(shown: Mapping[str, Shown], zoom: Zoom) -> Iterator[Panel]:
+def _away_panel(shown: Mapping[str, MethodRate], zoom: Zoom) -> Iterator[Panel]:
     """How far off a load held still each method's is: what differs most, so in one panel."""
     curves = [
         Curve(each.time, each.rate.values - each.held, method_label(name), name)
@@ -234,7 +234,7 @@ def _time(seconds: float) -> str:
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
-def _filter_words(whole: RelativeRate, shown: Sequence[Shown]) -> Iterator[str]:
+def _filter_words(whole: RelativeRate, shown: Sequence[MethodRate]) -> Iterator[str]:
     """How the rates were come by; nothing for those that are as they were recorded."""
     zooms = list(dict.fromkeys(_how(each.rate) for each in shown))
     if zooms == [_how(whole)]:
@@ -257,21 +257,21 @@ def _how(rate: RelativeRate) -> str:
         return ""
     return (
         f"the slope of a line through {_time(rate.window)} of the encoder's samples, a filter "
-        f"that delays nothing and tells {rate_here(rate.finest, '.2g')} apart"
+        f"that delays nothing and tells {rate_text(rate.finest, '.2g')} apart"
     )
 
 
-def _slow_words(shown: Sequence[Shown], zoom: Zoom) -> str:
+def _slow_words(shown: Sequence[MethodRate], zoom: Zoom) -> str:
     """What is shaded, and how long a load held still would take."""
     if all(each.slow is None for each in shown):
         return ""
     held = _slow(shown[0].time, shown[0].held, zoom)
     beside = f"; a load held still is for {held.words}" if held else ""
-    limit = rate_here(SLOW * zoom.height, ".2g")
+    limit = rate_text(SLOW * zoom.height, ".2g")
     return f"Shaded: while the load is slower than {limit} relative to the hull{beside}."
 
 
-def _blind_words(first: Recording, shown: Sequence[Shown], zoom: Zoom) -> str:
+def _blind_words(first: Recording, shown: Sequence[MethodRate], zoom: Zoom) -> str:
     """Until when an encoder does not tell a load that sticks from one that is held still."""
     count = max((each.rate.blind for each in shown), default=0.0)
     if not count:
@@ -285,6 +285,6 @@ def _blind_words(first: Recording, shown: Sequence[Shown], zoom: Zoom) -> str:
     time = (int(np.argmax(after)) + int(np.argmax(before))) / rate_of(first)
     return (
         f"For {_time(time)} around the reversal the hull moves by less than one count of the "
-        f"encoder ({angle_here(count, '.2g')}): whether the load sticks in that time cannot be "
+        f"encoder ({angle_text(count, '.2g')}): whether the load sticks in that time cannot be "
         "seen."
     )

@@ -39,7 +39,7 @@ from campaign.reason import Cause
 from campaign.recording import Recording
 from campaign.result import Finding, Result
 from campaign.signals import Polyline
-from campaign.trial import Offered, Task, Tree, Trial, TrialRequest
+from campaign.trial import OfferedRecording, Task, Tree, Trial, TrialRequest
 from campaign.units import Angle, AngularRate, Frequency, Time
 
 LEAST_REST = 0.01
@@ -113,7 +113,9 @@ def _windows(options: StepResponseOptions) -> Iterator[Window]:
     yield Window(ANSWER, options.rest, options.rest + options.duration)
 
 
-def _found(options: StepResponseOptions, bench: Bench, offered: Offered) -> Iterator[TrialRequest]:
+def _found(
+    options: StepResponseOptions, bench: Bench, offered: OfferedRecording
+) -> Iterator[TrialRequest]:
     """The step of a recording that nobody planned."""
     request = step_found(offered, (REST, ANSWER))
     if float(str(request.options["rest"])) < LEAST_REST:

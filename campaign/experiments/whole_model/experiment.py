@@ -16,7 +16,13 @@ from campaign.estimation.gate import admitted
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
-from campaign.experiments.any_motion.motions import Moved, force_of, read, usable, with_slowest
+from campaign.experiments.any_motion.motions import (
+    MotionPiece,
+    force_of,
+    read,
+    usable,
+    with_slowest,
+)
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.recorded_motion import of_any_motion
@@ -26,7 +32,7 @@ from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.tables_and_figures import figures, models_table, values_table
 from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
 from campaign.options import Options
-from campaign.parameter import Identified, Parameter, Unseen
+from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.reason import Cause, Reason
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.text import words
@@ -96,7 +102,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
         notes=tuple(_notes(best)),
         conclusions=tuple(_conclusions(best, found.as_good)),
-        identified=Identified(
+        identified=IdentifiedRig(
             parameters,
             correlations=best.fit.correlation,
             settings=_settings(best, parameters),
@@ -107,7 +113,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
     )
 
 
-def _left_out(whole: Sequence[Moved], parts: Sequence[Moved]) -> tuple[Reason, ...]:
+def _left_out(whole: Sequence[MotionPiece], parts: Sequence[MotionPiece]) -> tuple[Reason, ...]:
     """Of long recordings."""
     if parts is whole:
         return ()

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Filtering, Motion
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
-from campaign.experiments.any_motion.motions import Moved
+from campaign.experiments.any_motion.motions import MotionPiece
 from campaign.experiments.whole_model.residuals import steps_between
 
 MOST_STEPS = 60_000
@@ -22,7 +22,9 @@ SLOW = (0.01, 0.1)
 """of the fastest rate, over which friction may change as sliding sets in."""
 
 
-def telling_parts(pieces: Sequence[Moved], filtering: Filtering) -> Sequence[Moved]:
+def telling_parts(
+    pieces: Sequence[MotionPiece], filtering: FilterSettings
+) -> Sequence[MotionPiece]:
     """All pieces where a fit can simulate them, or else their parts that tell most, in order.
 
     One part after the other that raises the determinant of the normal equations most (Wynn, Ann.
@@ -51,7 +53,7 @@ def telling_parts(pieces: Sequence[Moved], filtering: Filtering) -> Sequence[Mov
     return [parts[i] for i in sorted(chosen)]
 
 
-def _cut(piece: Moved, skip: int) -> list[Moved]:
+def _cut(piece: MotionPiece, skip: int) -> list[MotionPiece]:
     left = len(piece.motion.time) - skip
     count = max(1, round(left / (PART * piece.motion.sample_rate)))
     edges = skip + np.linspace(0, left, count + 1).astype(int)

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Filtering, Motion, decimated, first_kept
+from campaign.estimation.inverse.motion import Array, FilterSettings, Motion, decimated, first_kept
 from campaign.estimation.inverse.rows import all_rows, late_force, moving
 from campaign.estimation.inverse.terms import TERMS, Term
 from campaign.estimation.whole_model import Values
@@ -21,7 +21,7 @@ KEPT = 16
 linear terms ask for the friction of the point itself."""
 
 
-def steps_between(filtering: Filtering) -> int:
+def steps_between(filtering: FilterSettings) -> int:
     """Samples from one simulated step to the next: rows remain where they are."""
     most = max(1, filtering.decimation // STEPS)
     return next(n for n in range(most, 0, -1) if filtering.decimation % n == 0)
@@ -36,7 +36,7 @@ class Residuals:
         model: Model,
         extra: Sequence[Term],
         motions: Sequence[Motion],
-        filtering: Filtering,
+        filtering: FilterSettings,
         every: int = 1,
     ) -> None:
         """names: of the values. every: samples from one simulated step to the next."""

@@ -11,9 +11,9 @@ from campaign.estimation.inverse.rows import all_rows, moving, rows
 from campaign.estimation.inverse.terms import Term
 from campaign.estimation.inverse.terms import columns as columns_of
 from campaign.estimation.inverse.validation import Prediction
-from campaign.experiments.any_motion.figures import FORCE, LEFT, PLACE, RATE, TIME, apart
-from campaign.experiments.any_motion.inverse_fit import InverseDynamics, Tried, together
-from campaign.experiments.any_motion.motions import Moved
+from campaign.experiments.any_motion.figures import FORCE, LEFT, PLACE, RATE, TIME, with_gaps
+from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together
+from campaign.experiments.any_motion.motions import MotionPiece
 from campaign.experiments.any_motion.tables import AS_THEY_ARE
 from campaign.experiments.whole_model.whole_model_fit import Fit, Whole
 from campaign.physics.friction import friction_models
@@ -78,7 +78,7 @@ def values_table(fit: Fit) -> Table:
 
 
 def figures(
-    found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]
+    found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
 ) -> Iterator[Figure]:
     """Friction over rate, and what models leave over."""
     yield _curve_figure(found, plain)
@@ -145,19 +145,21 @@ def _steady(fit: Fit, rate: Array) -> Array:
     return found
 
 
-def _plainest(plain: InverseDynamics) -> Tried:
+def _plainest(plain: InverseDynamics) -> CandidateFit:
     """Both directions of their own, without delay, as anybody would fit them."""
     return plain.tried[min(1, len(plain.tried) - 1)]
 
 
-def _regressed(fitted: Tried, rate: Array) -> Array:
+def _regressed(fitted: CandidateFit, rate: Array) -> Array:
     """Friction of a regression at steady rates."""
     still = np.zeros(len(rate))
     steady = Motion(time=still, position=still, rate=rate, acceleration=still, force=still)
     return columns_of(steady, fitted.structure.terms) @ fitted.structure.fit.values
 
 
-def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[Moved]) -> Figure:
+def _left_figure(
+    found: Whole, plain: InverseDynamics | None, unseen: Sequence[MotionPiece]
+) -> Figure:
     """Validation residuals of up to four models over time, rate and angle."""
     told: list[tuple[str, Prediction]] = []
     if plain is not None:
@@ -173,7 +175,7 @@ def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[M
         title = f"{name}: {100 * prediction.relative:.2f} %"
         panels += [
             Panel(TIME, LEFT, (
-                Curve(*apart(prediction.time, left), "", "measured", "thin"),
+                Curve(*with_gaps(prediction.time, left), "", "measured", "thin"),
             ), title),
             Panel(RATE, LEFT, (Curve(place[:, 1], left, "", "measured", "points"),)),
             Panel(PLACE, LEFT, (Curve(place[:, 0], left, "", "measured", "points"),)),
@@ -190,7 +192,7 @@ def _left_figure(found: Whole, plain: InverseDynamics | None, unseen: Sequence[M
     )
 
 
-def _places(found: Whole, unseen: Sequence[Moved]) -> Array:
+def _places(found: Whole, unseen: Sequence[MotionPiece]) -> Array:
     own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
     parts = [all_rows(each.motion, own, found.filtering).columns for each in unseen]
     return np.concatenate(parts)

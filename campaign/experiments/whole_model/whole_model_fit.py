@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Filtering, Motion, kept_times
+from campaign.estimation.inverse.motion import FilterSettings, Motion, kept_times
 from campaign.estimation.inverse.rows import late_force, moving
 from campaign.estimation.inverse.structure_choice import criterion, structure
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
@@ -28,7 +28,7 @@ from campaign.estimation.whole_model import (
     refitted,
 )
 from campaign.experiments.any_motion.inverse_fit import together
-from campaign.experiments.any_motion.motions import Moved, never_moved
+from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.experiments.interface import say_at
 from campaign.experiments.whole_model.models import USUAL, Model, models
 from campaign.experiments.whole_model.residuals import Residuals, steps_between
@@ -106,8 +106,8 @@ class Whole:
 
     fits: tuple[Fit, ...]
     best: int
-    filtering: Filtering
-    pieces: tuple[Moved, ...]
+    filtering: FilterSettings
+    pieces: tuple[MotionPiece, ...]
 
     @property
     def as_good(self) -> tuple[str, ...]:
@@ -144,9 +144,9 @@ def _above(fits: Sequence[Fit]) -> list[float]:
 
 
 def find(
-    pieces: Sequence[Moved],
-    unseen: Sequence[Moved],
-    filtering: Filtering,
+    pieces: Sequence[MotionPiece],
+    unseen: Sequence[MotionPiece],
+    filtering: FilterSettings,
     extra: Sequence[Term] = (),
     starts: int = 3,
     say: Callable[[str], None] = lambda text: None,
@@ -176,7 +176,7 @@ def find(
     return Whole(tuple(fits), best, filtering, tuple(pieces))
 
 
-def _sizes(motions: Sequence[Motion], filtering: Filtering) -> tuple[Sizes, float]:
+def _sizes(motions: Sequence[Motion], filtering: FilterSettings) -> tuple[Sizes, float]:
     """From plain inverse dynamics."""
     if missing := never_moved(motions, filtering.slowest):
         raise ValueError(f"the axis does not slide in the {missing[0]} direction")
@@ -194,7 +194,7 @@ def _fitted(
     model: Model,
     extra: tuple[Term, ...],
     motions: Sequence[Motion],
-    filtering: Filtering,
+    filtering: FilterSettings,
     inertia: float,
     starts: int,
     say: Callable[[str], None],
@@ -212,7 +212,7 @@ def _fitted(
     units |= {"inertia": "kg m^2", "delay": "s"} | {term.name: term.unit for term in extra}
     names = [unknown.name for unknown in unknowns]
 
-    def left_in(band: Filtering) -> Residuals:
+    def left_in(band: FilterSettings) -> Residuals:
         return Residuals(names, model, extra, motions, band, steps_between(filtering))
 
     residuals = left_in(filtering)
@@ -320,7 +320,7 @@ def with_bases(fit: ModelFit, model: Model) -> ModelFit:
 
 
 def resolved(
-    fit: ModelFit, model: Model, motions: Sequence[Motion], filtering: Filtering
+    fit: ModelFit, model: Model, motions: Sequence[Motion], filtering: FilterSettings
 ) -> ModelFit:
     """Without what happens at reversals faster than the rows can show.
 
@@ -368,7 +368,7 @@ def _left_out(count: int) -> NDArray[np.bool_]:
 
 
 def _validated(
-    one: Fit, reference: Fit | None, unseen: Sequence[Moved], filtering: Filtering
+    one: Fit, reference: Fit | None, unseen: Sequence[MotionPiece], filtering: FilterSettings
 ) -> Fit:
     predictions = predicted(one, [each.motion for each in unseen], filtering)
     whole = together(predictions)
@@ -377,7 +377,9 @@ def _validated(
     return replace(one, predictions=predictions, validation=share, gain=gain)
 
 
-def predicted(one: Fit, motions: Sequence[Motion], filtering: Filtering) -> tuple[Prediction, ...]:
+def predicted(
+    one: Fit, motions: Sequence[Motion], filtering: FilterSettings
+) -> tuple[Prediction, ...]:
     """What a fitted model says of other motions."""
     names = [unknown.name for unknown in one.fit.found.unknowns]
     made = Residuals(names, one.model, one.extra, motions, filtering, steps_between(filtering))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.importing.arrays import OPAQUE, WIDEST, Named, tables_of
+from campaign.importing.arrays import OPAQUE, WIDEST, NamedArray, tables_of
 from campaign.importing.interface import Array, RecordingError, RecordingFormat, Table, read_by
 from campaign.importing.subprocess_reader import tables_streamed
 
@@ -30,7 +30,7 @@ def tables(path: Path) -> Sequence[Table]:
     """What is in a file, in the process that asks; a broken one can end it."""
     import h5py
 
-    arrays: list[Named] = []
+    arrays: list[NamedArray] = []
     objects: list[str] = []
     with read_by("h5py", path, "HDF5 file"), h5py.File(path, "r") as file:
         for name, dataset in _datasets(file):
@@ -66,7 +66,9 @@ def _datasets(file: Any) -> Iterator[tuple[str, Any]]:
                 waiting.append((f"{path}.", item))
 
 
-def _sort_out(path: Path, name: str, dataset: Any, arrays: list[Named], objects: list[str]) -> None:
+def _sort_out(
+    path: Path, name: str, dataset: Any, arrays: list[NamedArray], objects: list[str]
+) -> None:
     kind = dataset.attrs.get(CLASS, b"")
     kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
     if dataset.shape is None or dataset.is_virtual or dataset.external:
@@ -80,12 +82,12 @@ def _sort_out(path: Path, name: str, dataset: Any, arrays: list[Named], objects:
             arrays.append(_named(path, name, dataset, bool(kind)))
 
 
-def _named(path: Path, name: str, dataset: Any, matlab: bool) -> Named:
+def _named(path: Path, name: str, dataset: Any, matlab: bool) -> NamedArray:
     """A series; MATLAB's arrays lie transposed in the file."""
     along = int(np.argmax(dataset.shape))
     unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
     unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
-    return Named(
+    return NamedArray(
         name,
         tuple(length for length in dataset.shape if length > 1),
         partial(_part, path, dataset.name, along),

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from campaign.importing.arrays import OPAQUE, Named, named, table_of, tables_of
+from campaign.importing.arrays import OPAQUE, NamedArray, named, table_of, tables_of
 from campaign.importing.interface import (
     LARGEST_PART,
     MOST_UNPACKED,
@@ -43,7 +43,7 @@ def tables(path: Path) -> Sequence[Table]:
         # mat_dtype: whole numbers were written as bytes; their differences would wrap around.
         found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
     whole: list[Table] = []
-    arrays: list[Named] = []
+    arrays: list[NamedArray] = []
     objects: list[str] = []
     for name, value in found.items():
         if not name.startswith("__") and name != "None":
@@ -91,7 +91,7 @@ def _sort_out(
     name: str,
     value: Any,
     tables: list[Table],
-    arrays: list[Named],
+    arrays: list[NamedArray],
     objects: list[str],
     deep: int = 0,
 ) -> None:
@@ -139,7 +139,7 @@ def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
         [each for each in _structures(fields.get(key)) if "Data" in each] for key in "XY"
     )
     lengths = [np.size(each["Data"]) for each in clocks]
-    groups: dict[int, list[Named]] = {}
+    groups: dict[int, list[NamedArray]] = {}
     for k, of in enumerate(signals if clocks else (), start=1):
         data = np.atleast_1d(of["Data"])
         index = of.get("XIndex")

@@ -19,7 +19,7 @@ _OF_A_RIG = ("temperature", "normal_load", "gyro_rate", "base_rate")
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedColumn:
     """A column, and where it is: in which of the tables, at which place; both from 1."""
 
     column: ColumnGuess
@@ -39,7 +39,7 @@ class Layout:
 
     name: str
     tables: Tables
-    columns: tuple[Placed, ...]
+    columns: tuple[PlacedColumn, ...]
     axis: str
 
     @property
@@ -113,7 +113,7 @@ def _clock(table: TableGuess) -> tuple[object, ...]:
 def _axis_by_axis(tables: Tables) -> Iterator[Layout]:
     """Columns of each axis with those of all; together where there is but one."""
     columns = tuple(
-        Placed(column, number, place)
+        PlacedColumn(column, number, place)
         for number, table in enumerate(tables, start=1)
         for place, column in enumerate(table.columns, start=1)
     )

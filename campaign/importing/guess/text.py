@@ -15,7 +15,7 @@ from campaign import channels
 from campaign.channels import UNITS, VOCABULARY, AxisKind
 from campaign.importing.defects.defect import counted
 from campaign.importing.guess.columns import INDEX, TIME, Basis, ColumnGuess, TableGuess
-from campaign.importing.guess.layouts import Layout, Placed, layouts, slug
+from campaign.importing.guess.layouts import Layout, PlacedColumn, layouts, slug
 from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
 from campaign.unit_grammar import parse_unit
 
@@ -113,7 +113,7 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
         yield _doubt('sample_rate = "... Hz"')
 
 
-def _block(layout: Layout, placed: Placed, again: bool) -> Iterator[str]:
+def _block(layout: Layout, placed: PlacedColumn, again: bool) -> Iterator[str]:
     """The lines of one column; in comments where it is none, or of a channel that another has."""
     column = placed.column
     numeric = column.low == column.low  # not NaN
@@ -135,7 +135,7 @@ def _block(layout: Layout, placed: Placed, again: bool) -> Iterator[str]:
     yield from map(_doubt, column.doubts)
 
 
-def _which(layout: Layout, placed: Placed, role: str) -> Iterator[str]:
+def _which(layout: Layout, placed: PlacedColumn, role: str) -> Iterator[str]:
     """What every block begins with; a name that two columns have is told by its place."""
     name = placed.column.name
     twice = sum((p.table, p.column.name) == (placed.table, name) for p in layout.columns) > 1

@@ -44,7 +44,7 @@ from campaign.physics.friction.unknowns import (
     BENDING,
     REVERSE,
     FrictionUnknown,
-    Lasting,
+    ReversalTime,
     Sizes,
     Unknowns,
     curve,
@@ -215,7 +215,7 @@ def _small_signal(options: ArmstrongOptions) -> SmallSignal:
 
 
 def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
-    late = Lasting("the memory lag", lambda options, turning: options["memory_lag"])
+    late = ReversalTime("the memory lag", lambda options, turning: options["memory_lag"])
     lag = FrictionUnknown(
         "memory_lag", "memory_lag", "s", "How late the torque answers to the rate.",
         0.0, MOST_LAG, 0.2 * MOST_LAG, REVERSE, lasts=late,

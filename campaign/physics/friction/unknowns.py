@@ -38,7 +38,7 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Lasting:
+class ReversalTime:
     """How long it takes in a reversal what a parameter says.
 
     Attributes:
@@ -76,7 +76,7 @@ class FrictionUnknown:
     advice: str
     logarithmic: bool = False
     rests_on: tuple[str, ...] = ()
-    lasts: Lasting | None = None
+    lasts: ReversalTime | None = None
     below_one: str = ""
     about_one: str = ""
     is_coulomb: bool = False
@@ -100,10 +100,10 @@ class DerivedOption:
 
 Unknowns = Sequence[FrictionUnknown | DerivedOption]
 
-PASSING = Lasting(
+PASSING = ReversalTime(
     "passing it in a reversal", lambda options, turning: options["stribeck_velocity"] / turning
 )
-BENDING = Lasting(
+BENDING = ReversalTime(
     "bending the bristles",
     lambda options, turning: math.sqrt(
         2.0 * options["coulomb_torque"] / options["bristle_stiffness"] / turning
@@ -144,7 +144,7 @@ def product(*names: str) -> Callable[[Mapping[str, float]], float]:
 
 
 def static(
-    lasts: Lasting,
+    lasts: ReversalTime,
     *,
     by_direction: bool,
     ratio: tuple[float, float] = STATIC,

@@ -23,7 +23,7 @@ from campaign.experiments.interface import Experiment
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.values import Published
 from campaign.recording import Outcome
-from campaign.report.content.first_screen import Opening, opening_of
+from campaign.report.content.first_screen import FirstScreen, opening_of
 from campaign.report.content.held_values import held_tables
 from campaign.report.content.incidents import Incidents, incidents
 from campaign.report.content.references import Files, References, compared_with
@@ -56,7 +56,7 @@ class Document:
     truths: Mapping[str, Table]
     references: References
     incidents: Incidents
-    opening: Opening
+    opening: FirstScreen
     damaged: tuple[Damage, ...]
     measured_by: str
 

@@ -72,7 +72,7 @@ class Short:
 
 
 @dataclass(frozen=True)
-class Opening:
+class FirstScreen:
     """What stands on top of the page.
 
     Attributes:
@@ -116,11 +116,11 @@ def opening_of(
     truths: Mapping[str, Table],
     references: References,
     damaged: Sequence[Damage] = (),
-) -> Opening:
+) -> FirstScreen:
     """The opening of a run's report; `damaged` is all damage that the report met."""
     main = _main(tests)
     shown = [test for test in tests if not main or test.name in main]
-    return Opening(
+    return FirstScreen(
         tuple(_answer(test, truths.get(test.name), references) for test in tests),
         leading_figure(tests),
         (*wrong_with(run, tests, damaged), *_without_stated(tests)),

@@ -58,7 +58,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldValue:
     """A number of a compensation, as it is stated and as its twin holds it (SI)."""
 
     compensation: str
@@ -78,7 +78,7 @@ def held_tables(
     if run.header.backend != SIMULATED:
         return {}
     benches = Benches(run.header.truth.plants)
-    told: list[tuple[Held, ...]] = []
+    told: list[tuple[HeldValue, ...]] = []
     tables = {}
     for test in tests:
         tried = {each.trial.task.compensation for each in test.trials}
@@ -93,12 +93,12 @@ def held_tables(
     return tables
 
 
-def held_by(bench: Bench, tried: Container[str]) -> tuple[Held, ...]:
+def held_by(bench: Bench, tried: Container[str]) -> tuple[HeldValue, ...]:
     """What was identified of those compensations that were tried; what several hold alike is one.
 
     Of these the narrowest interval counts: a sum of parts knows less than what they were made of.
     """
-    found: list[Held] = []
+    found: list[HeldValue] = []
     for name in bench.compensation:
         for each in _of_twin(bench, name) if identified_name(name) in tried else ():
             place = next((n for n, other in enumerate(found) if _alike(each, other)), None)
@@ -112,17 +112,17 @@ def held_by(bench: Bench, tried: Container[str]) -> tuple[Held, ...]:
     return tuple(sorted(found, key=lambda each: order.index(each.quantity)))  # stable
 
 
-def _alike(one: Held, other: Held) -> bool:
+def _alike(one: HeldValue, other: HeldValue) -> bool:
     return one.stated == other.stated and _identified_alike(one, other)
 
 
-def _identified_alike(one: Held, other: Held) -> bool:
+def _identified_alike(one: HeldValue, other: HeldValue) -> bool:
     return (one.quantity, one.conditions) == (other.quantity, other.conditions) and math.isclose(
         one.found.value, other.found.value, rel_tol=SAME
     )
 
 
-def _of_twin(bench: Bench, name: str) -> Iterator[Held]:
+def _of_twin(bench: Bench, name: str) -> Iterator[HeldValue]:
     twin = identified_name(name)
     if twin not in bench.compensation or why_altered(bench, twin):
         return
@@ -142,7 +142,7 @@ def _of_twin(bench: Bench, name: str) -> Iterator[Held]:
             continue
         half = NORMAL_95 * sigma
         found = Estimate(quantity, value, UNITS[quantity], value - half, value + half, LEVEL)
-        yield Held(name, quantity, conditions, _number(stated, quantity, conditions), found)
+        yield HeldValue(name, quantity, conditions, _number(stated, quantity, conditions), found)
 
 
 def _as_bench(bench: Bench, name: str) -> Bench | None:
@@ -194,7 +194,7 @@ def _uncertainty(
 
 
 def _table(
-    numbers: Sequence[Held],
+    numbers: Sequence[HeldValue],
     test: AnalysedTest,
     benches: Benches,
     published: Published,
@@ -241,7 +241,7 @@ def _table(
     )
 
 
-def _row(number: Held, cell: PublishedCell | None, simulated: Sequence[Bench]) -> Row:
+def _row(number: HeldValue, cell: PublishedCell | None, simulated: Sequence[Bench]) -> Row:
     """Without a true value where the simulated benches have none, or several."""
     true = {_number(bench, number.quantity, number.conditions) for bench in simulated}
     value = true.pop() if len(true) == 1 else None
@@ -264,7 +264,7 @@ def _row(number: Held, cell: PublishedCell | None, simulated: Sequence[Bench]) -
 
 
 def _printed(
-    number: Held, published: Published, known: Mapping[str, Value]
+    number: HeldValue, published: Published, known: Mapping[str, Value]
 ) -> PublishedCell | None:
     """What is published of a number: of one bristle for all friction, of all or of one of them."""
     quantity = STRONGEST if number.quantity == AT_REST else number.quantity

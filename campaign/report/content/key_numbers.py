@@ -11,7 +11,7 @@ from campaign.axis_kind import axis_terms
 from campaign.experiments.post_processing.draws import draws_of
 from campaign.experiments.shared.common import short_label
 from campaign.published.draws import without_seed
-from campaign.published.evidence import speaks_to
+from campaign.published.evidence import concerns
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import shown_line
@@ -140,7 +140,7 @@ def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> t
     """What is printed of it, and whether it is reproduced; of doubtful cells nothing."""
     known = test.evidence().known
     for line in lines:
-        if line.status is not Status.INCONSISTENT and speaks_to(finding, line.cell, known):
+        if line.status is not Status.INCONSISTENT and concerns(finding, line.cell, known):
             shown = shown_line(line)
             return f"{shown.published} {shown.unit}".rstrip(), shown.good
     return "", False

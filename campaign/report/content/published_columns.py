@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from campaign.published.evidence import speaks_to
+from campaign.published.evidence import concerns
 from campaign.published.values import Cell as PublishedCell
 from campaign.published.values import PublishedTable, heading_of
 from campaign.report.content.lines import cell_name
@@ -81,7 +81,7 @@ def cell_of(
             cell
             for table in published
             for cell in table.cells
-            if cell.relation in NUMBERS and speaks_to(finding, cell, known)
+            if cell.relation in NUMBERS and concerns(finding, cell, known)
         ),
         None,
     )

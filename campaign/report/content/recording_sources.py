@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pydantic import ValidationError
 
 from campaign.api.analysis import AnalysedTest
-from campaign.importing.description import Described, Made
+from campaign.importing.description import ChannelSource, RecordingDescription
 from campaign.text import number
 
 LISTED = 4
@@ -33,16 +33,18 @@ def recorded_from(test: AnalysedTest) -> Iterator[tuple[str, str]]:
         yield "What was made of it", _listed(remarks, "remarks", "; ")
 
 
-def _described(test: AnalysedTest) -> Iterator[Described]:
+def _described(test: AnalysedTest) -> Iterator[RecordingDescription]:
     for archived in test.trials:
         if archived.trial.recording:
             try:
-                yield Described.model_validate(archived.trial.recording, context={"si": True})
+                yield RecordingDescription.model_validate(
+                    archived.trial.recording, context={"si": True}
+                )
             except ValidationError:  # of another version of this program
                 continue
 
 
-def _channel(made: Made) -> str:
+def _channel(made: ChannelSource) -> str:
     if made.how in ("derivative", "integral"):
         return f"{made.name}: {made.how} of {made.source}"
     if made.how == "copy":

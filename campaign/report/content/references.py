@@ -28,7 +28,7 @@ from campaign.physics.stated_values import stated_value
 from campaign.physics.true_values import QUANTITIES
 from campaign.reason import Cause
 from campaign.references.values import ReferenceValue
-from campaign.references.verdict import Judged, Verdict, with_verdicts
+from campaign.references.verdict import JudgedNumber, Verdict, with_verdicts
 from campaign.report.content.truth import SIMULATED, conditions_text, duplicate_of, is_of
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.result import Cell, Column, Finding, Table
@@ -61,7 +61,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ReferenceComparison:
     """What a source states beside what a test found, and what that comes to in a sentence.
 
     Attributes:
@@ -71,7 +71,7 @@ class Compared:
 
     table: Table
     told: str
-    pairs: tuple[tuple[Judged, str], ...] = ()
+    pairs: tuple[tuple[JudgedNumber, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,13 @@ class References:
         problems: rows of files that no finding is of.
     """
 
-    stated: Mapping[str, Compared]
-    files: Mapping[str, tuple[Compared, ...]]
+    stated: Mapping[str, ReferenceComparison]
+    files: Mapping[str, tuple[ReferenceComparison, ...]]
     problems: tuple[str, ...]
 
 
 Files = Mapping[Path, Sequence[ReferenceValue]]
-Found = tuple[AnalysedTest, Source, Sequence[Judged]]
+Found = tuple[AnalysedTest, Source, Sequence[JudgedNumber]]
 
 
 def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
@@ -103,8 +103,8 @@ def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -
             found += filter(None, [_stated(run, test)])
             found += (_of_file(p, values, units[test.name]) for p, values in files.items())
     verdicts = iter(with_verdicts([pair for _, _, pairs in found for pair in pairs]))
-    stated: dict[str, Compared] = {}
-    others: dict[str, tuple[Compared, ...]] = {}
+    stated: dict[str, ReferenceComparison] = {}
+    others: dict[str, tuple[ReferenceComparison, ...]] = {}
     for test, source, pairs in found:
         own = [next(verdicts) for _ in pairs]
         if not own:
@@ -226,15 +226,17 @@ def _is_in(finding: Finding, mean: Finding) -> bool:
     return finding.quantity == mean.quantity and where.items() <= finding.conditions.items()
 
 
-def _pair(reference: Estimate, finding: Finding, known: Sequence[Finding]) -> Judged:
+def _pair(reference: Estimate, finding: Finding, known: Sequence[Finding]) -> JudgedNumber:
     again = duplicate_of(finding, known)
-    pair = Judged.of(
+    pair = JudgedNumber.of(
         reference, finding.known, quantity=finding.quantity, conditions=finding.conditions
     )
     return pair.not_judged(AGAIN(others=again)) if again else pair
 
 
-def _compared(pairs: Sequence[Judged], source: Source, units: TestUnits) -> Compared:
+def _compared(
+    pairs: Sequence[JudgedNumber], source: Source, units: TestUnits
+) -> ReferenceComparison:
     told = _told_of(pairs, source, units)
     table = Table(
         key=source.key,
@@ -256,10 +258,10 @@ def _compared(pairs: Sequence[Judged], source: Source, units: TestUnits) -> Comp
             "are expected to be false (Benjamini and Hochberg)."
         ),
     )
-    return Compared(table, told, tuple((pair, _name(pair, units)) for pair in pairs))
+    return ReferenceComparison(table, told, tuple((pair, _name(pair, units)) for pair in pairs))
 
 
-def _row(pair: Judged, units: TestUnits) -> Mapping[str, Cell]:
+def _row(pair: JudgedNumber, units: TestUnits) -> Mapping[str, Cell]:
     return {
         "quantity": quantity_words(pair.quantity),
         "conditions": conditions_text(pair.conditions, units),
@@ -272,7 +274,7 @@ def _row(pair: Judged, units: TestUnits) -> Mapping[str, Cell]:
     }
 
 
-def _told_of(pairs: Sequence[Judged], source: Source, units: TestUnits) -> str:
+def _told_of(pairs: Sequence[JudgedNumber], source: Source, units: TestUnits) -> str:
     """Which numbers are not what was stated, or that all are; "" where nothing could be judged."""
     changed = [pair for pair in pairs if pair.verdict is Verdict.DIFFERENT]
     tested = sum(pair.testable for pair in pairs)
@@ -291,7 +293,7 @@ def _told_of(pairs: Sequence[Judged], source: Source, units: TestUnits) -> str:
     return "; ".join(told)
 
 
-def _told(pair: Judged, units: TestUnits) -> str:
+def _told(pair: JudgedNumber, units: TestUnits) -> str:
     words, change = _name(pair, units), pair.found.change
     if math.isnan(change.value):
         return words
@@ -300,7 +302,7 @@ def _told(pair: Judged, units: TestUnits) -> str:
     return size if None in (low, high) or low == high else f"{size} ({low} to {high} %)"
 
 
-def _name(pair: Judged, units: TestUnits) -> str:
+def _name(pair: JudgedNumber, units: TestUnits) -> str:
     where = conditions_text(pair.conditions, units)
     return f"{quantity_words(pair.quantity)} ({where})" if where else quantity_words(pair.quantity)
 

@@ -33,7 +33,7 @@ KINDS = ("kind", "model", "method")
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayUnit:
     """A number in the SI unit `si` is shown in `unit`; one of these is `factor` SI units."""
 
     si: str
@@ -57,7 +57,7 @@ class TestUnits:
     test: AnalysedTest
     written: Mapping[str, str] = field(default_factory=dict)
 
-    def of(self, path: str) -> Shown | None:
+    def of(self, path: str) -> DisplayUnit | None:
         """The unit of what stands at a path, of an option or of what trials are told apart by."""
         if path not in self._known:
             self._known[path] = self._find(path)
@@ -113,14 +113,14 @@ class TestUnits:
         return replace(table, columns=tuple(columns))
 
     @cached_property
-    def _known(self) -> dict[str, Shown | None]:
+    def _known(self) -> dict[str, DisplayUnit | None]:
         return {}
 
     @cached_property
     def _swept(self) -> frozenset[str]:
         return frozenset(path for each in self.test.trials for path in each.trial.point)
 
-    def _find(self, path: str) -> Shown | None:
+    def _find(self, path: str) -> DisplayUnit | None:
         for name in filter(None, (path, self.listed_by(path))):
             quantity = self._quantity(name)
             if quantity is not None:
@@ -143,13 +143,13 @@ class TestUnits:
         bench = self.test.bench
         return quantity.of(bench.sides) if quantity and bench else quantity
 
-    def _of_column(self, path: str) -> Shown | None:
+    def _of_column(self, path: str) -> DisplayUnit | None:
         """As the analysis tabulates it, where an experiment alone knows what its points are."""
         for table in self.test.result.tables:
             for column in table.columns:
                 if column.name == path and column.unit:
                     unit = column.display or column.unit
-                    return Shown(column.unit, unit, convert(1.0, unit, column.unit))
+                    return DisplayUnit(column.unit, unit, convert(1.0, unit, column.unit))
         return None
 
     def _tables(self, path: str, values: Sequence[Any]) -> Iterator[str]:
@@ -182,14 +182,14 @@ def short_number(value: float) -> str:
     return number(rounded, fewest)
 
 
-def _shown(quantity: Quantity, unit: str | None) -> Shown:
+def _shown(quantity: Quantity, unit: str | None) -> DisplayUnit:
     """In the unit that was written, where that is one of the quantity; else in its own."""
     for each in filter(None, (unit, quantity.display)):
         try:
-            return Shown(quantity.si, each, quantity.parse_own(f"1 {each}"))
+            return DisplayUnit(quantity.si, each, quantity.parse_own(f"1 {each}"))
         except ValueError:
             continue
-    return Shown(quantity.si, quantity.si, 1.0)
+    return DisplayUnit(quantity.si, quantity.si, 1.0)
 
 
 def _within(shape: Shape | None) -> Quantity | None:
@@ -200,7 +200,7 @@ def _within(shape: Shape | None) -> Quantity | None:
     return shape.quantity if shape is not None else None
 
 
-def _plain(value: Any, unit: Shown | None) -> str:
+def _plain(value: Any, unit: DisplayUnit | None) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):

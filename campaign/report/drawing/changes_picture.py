@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from campaign.references.verdict import Judged, Verdict
+from campaign.references.verdict import JudgedNumber, Verdict
 from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER
 
@@ -24,7 +24,7 @@ LABEL = 58
 """Letters of a row's name."""
 
 
-def with_change(pairs: Sequence[tuple[Judged, str]]) -> list[tuple[Judged, str]]:
+def with_change(pairs: Sequence[tuple[JudgedNumber, str]]) -> list[tuple[JudgedNumber, str]]:
     """Those that are drawn: what is not judged is left out, unless nothing else is there."""
     known = [
         each for each in pairs if None not in (each[0].found.change.low, each[0].found.change.high)
@@ -32,7 +32,7 @@ def with_change(pairs: Sequence[tuple[Judged, str]]) -> list[tuple[Judged, str]]
     return ([each for each in known if each[0].testable] or known)[:MOST]
 
 
-def draw_changes(shown: Sequence[tuple[Judged, str]]) -> str:
+def draw_changes(shown: Sequence[tuple[JudgedNumber, str]]) -> str:
     """Every change in percent with its interval, filled where declared; with names of the rows.
 
     shown: of `with_change`, at least one.
@@ -72,7 +72,7 @@ def rows(ax: Axes, count: int) -> None:
         ax.axhline(row + 0.5, color=HAIRLINE.light, linewidth=0.4, zorder=0)
 
 
-def _limit(pairs: Sequence[Judged]) -> float:
+def _limit(pairs: Sequence[JudgedNumber]) -> float:
     """Half of the axis (percent): all values and, up to three times as far, their intervals."""
     values = max(abs(100 * pair.found.change.value) for pair in pairs)
     ends = max(
@@ -83,7 +83,7 @@ def _limit(pairs: Sequence[Judged]) -> float:
     return 1.08 * max(min(ends, max(3 * values, 20.0)), values, 0.1)
 
 
-def _draw_change(ax: Axes, pair: Judged, row: int, limit: float) -> None:
+def _draw_change(ax: Axes, pair: JudgedNumber, row: int, limit: float) -> None:
     change = pair.found.change
     low, value, high = (
         min(max(100 * (end or 0.0), -limit), limit)

@@ -12,7 +12,7 @@ from campaign.result import Figure
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawingFiles:
     """A finished drawing.
 
     Attributes:

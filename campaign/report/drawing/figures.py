@@ -37,7 +37,7 @@ from campaign.report.drawing.curves import (
 )
 from campaign.report.drawing.decimate import POINTS
 from campaign.report.drawing.legends import add_legend, published_signs
-from campaign.report.drawing.mark_labels import Marked, draw_marks, place_labels
+from campaign.report.drawing.mark_labels import PanelMarks, draw_marks, place_labels
 from campaign.report.drawing.math_type import in_svg
 from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
@@ -445,12 +445,12 @@ def _share_scales(sets: Sequence[_Drawn]) -> None:
             ax.set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
 
 
-def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]) -> Marked:
+def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]) -> PanelMarks:
     """Ticks, marks, and what is said of an empty panel, once its limits are known."""
     ax, panel = drawn.ax, drawn.panel
     scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
     _label_axes(ax, panel, room)
-    marked = Marked(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
+    marked = PanelMarks(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
     draw_marks(marked)  # they may widen what is in view
     number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
     set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))

@@ -43,7 +43,7 @@ WAYS = tuple(math.radians(angle) for angle in (45, 0, 135, 180, -45, -135, 90, -
 
 
 @dataclass
-class Marked:
+class PanelMarks:
     """The marks of one panel while they are drawn.
 
     Attributes:
@@ -66,7 +66,7 @@ class Marked:
         return self.chosen[mark.series].light if mark.series in self.chosen else MUTED.light
 
 
-def draw_marks(marked: Marked) -> None:
+def draw_marks(marked: PanelMarks) -> None:
     """Lines, stretches and dots; labels are told `place_labels`."""
     ax = marked.ax
     for mark in marked.marks:
@@ -91,7 +91,7 @@ def draw_marks(marked: Marked) -> None:
                     _beside(marked, y, mark.label, colour)
 
 
-def _stretch(marked: Marked, mark: Mark, x: float | None, y: float | None, colour: str) -> None:
+def _stretch(marked: PanelMarks, mark: Mark, x: float | None, y: float | None, colour: str) -> None:
     assert mark.until is not None  # noqa: S101 (for the type checker; the caller looked)
     shade: dict[str, Any] = {"color": colour, "alpha": 0.13, "linewidth": 0, "zorder": 0.5}
     if x is not None:
@@ -114,14 +114,14 @@ def _in_view(ends: tuple[float, float], value: float) -> bool:
     return min(ends) <= value <= max(ends)
 
 
-def _above(marked: Marked, x: float, label: str, colour: str) -> None:
+def _above(marked: PanelMarks, x: float, label: str, colour: str) -> None:
     ax = marked.ax
     if label and _in_view(ax.get_xlim(), x):
         at = ax.get_xaxis_transform()
         marked.above.append(_text(ax, label, (x, 1.0), at, (0, GAP), "center", "bottom", colour))
 
 
-def _beside(marked: Marked, y: float, label: str, colour: str) -> None:
+def _beside(marked: PanelMarks, y: float, label: str, colour: str) -> None:
     ax = marked.ax
     if label and _in_view(ax.get_ylim(), y):
         at, text = ax.get_yaxis_transform(), textwrap.fill(label, WRAP)
@@ -153,7 +153,7 @@ def _text(
     )
 
 
-def place_labels(sheet: Canvas, panels: Sequence[Marked]) -> None:
+def place_labels(sheet: Canvas, panels: Sequence[PanelMarks]) -> None:
     """Give every label its place, and make room for those outside of their axes."""
     from campaign.report.drawing.margins import Margins
 
@@ -188,7 +188,7 @@ def _extent(text: Annotation) -> Bbox:
     return box.expanded(SPARE, 1.0)
 
 
-def _stack_above(sheet: Canvas, marked: Marked) -> None:
+def _stack_above(sheet: Canvas, marked: PanelMarks) -> None:
     """Labels over the axes: within their width, in as many rows as keep them apart."""
     ends: list[float] = []
     axes = marked.ax.get_window_extent()
@@ -205,7 +205,7 @@ def _stack_above(sheet: Canvas, marked: Marked) -> None:
         marked.ax.set_title(marked.ax.get_title(loc="left"), pad=pad)
 
 
-def _spread_beside(sheet: Canvas, marked: Marked) -> None:
+def _spread_beside(sheet: Canvas, marked: PanelMarks) -> None:
     """Labels right of the axes: each at its level, moved up where it would meet the one below."""
     per_point = sheet.dpi / 72
     lowest = -math.inf
@@ -218,7 +218,7 @@ def _spread_beside(sheet: Canvas, marked: Marked) -> None:
         lowest = bottom + height + per_point
 
 
-def _place_points(sheet: Canvas, marked: Marked) -> bool:
+def _place_points(sheet: Canvas, marked: PanelMarks) -> bool:
     """Labels of dots, each in the nearest free place; whether one had to go into the margin."""
     ax, outside = marked.ax, []
     for text in marked.inside:
@@ -241,7 +241,7 @@ def _place_points(sheet: Canvas, marked: Marked) -> bool:
 
 def _beside_dot(
     sheet: Canvas,
-    marked: Marked,
+    marked: PanelMarks,
     dot: tuple[float, float],
     label: str,
     colour: str,

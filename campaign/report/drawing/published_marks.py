@@ -160,7 +160,7 @@ def _range(x: Array) -> Array:
     return np.geomspace(low, high, FINE) if low > 0 else np.linspace(low, high, FINE)
 
 
-def told(marks: Marks) -> str:
+def published_text(marks: Marks) -> str:
     """A sentence for each sort of sign: which tables it stands for; "" without any."""
     every = [each for group in marks.values() for each in group]
     sentences = []

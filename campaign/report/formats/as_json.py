@@ -26,7 +26,7 @@ from campaign.report.formats import report_data as data
 from campaign.report.page.article import Article, Part
 from campaign.report.page.folder import Comparison, Section, ShownFigure, ShownTable
 from campaign.report.page.layout import Layout
-from campaign.report.page.pieces import Folded, Items, Paragraph, Piece
+from campaign.report.page.pieces import FoldedSection, Items, Paragraph, Piece
 from campaign.units import factor
 
 POINTS = 400
@@ -80,7 +80,7 @@ def _part(part: Part) -> data.Section:
 
 def _unfolded(pieces: Iterable[Piece]) -> Iterator[Piece]:
     for piece in pieces:
-        if isinstance(piece, Folded):
+        if isinstance(piece, FoldedSection):
             yield from _unfolded(piece.pieces)
         else:
             yield piece

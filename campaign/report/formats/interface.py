@@ -16,7 +16,7 @@ def _nothing() -> None:
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenPage:
     """A report or another page whose HTML, tables and figures are written already.
 
     Attributes:
@@ -48,6 +48,6 @@ class Format:
 
     name: str
     summary: str
-    write: Callable[[Written], None]
+    write: Callable[[WrittenPage], None]
     require: Callable[[], None] = _nothing
     pdf_figures: bool = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 
 from campaign.plain_text import on_a_page
-from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.interface import Format, WrittenPage
 from campaign.report.formats.latex_tables import grid_lines
 from campaign.report.latex_text import breakable, latex
 from campaign.report.page.folder import ShownFigure
@@ -54,7 +54,7 @@ WRAPPER = r"""% Typesets report.tex alone: pdflatex main, twice. Write your own 
 """
 
 
-def write(written: Written) -> None:
+def write(written: WrittenPage) -> None:
     """Add `report.tex`, `main.tex`, `report.bib` and the figures as PDF."""
     pdfs, name = written.pdfs, written.name
     pieces = (each for piece in written.pieces for each in plain(piece))
@@ -68,7 +68,7 @@ def write(written: Written) -> None:
         (written.folder / name).write_bytes(page)
 
 
-def _in_their_sections(pieces: Iterable[Piece], written: Written) -> Iterator[list[str]]:
+def _in_their_sections(pieces: Iterable[Piece], written: WrittenPage) -> Iterator[list[str]]:
     """The lines of each piece; before a heading, what floats finds its place."""
     floating = False
     for piece in pieces:
@@ -83,7 +83,7 @@ def _in_their_sections(pieces: Iterable[Piece], written: Written) -> Iterator[li
         yield lines
 
 
-def _lines(piece: Piece, written: Written) -> Iterator[str]:
+def _lines(piece: Piece, written: WrittenPage) -> Iterator[str]:
     match piece:
         case Heading():
             yield rf"\{SECTIONS[piece.level]}{{{latex(piece.text)}}}"

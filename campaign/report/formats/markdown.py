@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from campaign.plain_text import on_a_page
-from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.interface import Format, WrittenPage
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.pieces import (
     Facts,
@@ -29,7 +29,7 @@ _FIRST = re.compile(r"^([-+=:%]|\d+(?=[.)]))")
 """What begins a list, a rule, a definition or a title at the beginning of a line."""
 
 
-def write(written: Written) -> None:
+def write(written: WrittenPage) -> None:
     """Add `NAME.md`."""
     pieces = (each for piece in written.pieces for each in plain(piece))
     text = "\n\n".join(map(_written, pieces)) + "\n"

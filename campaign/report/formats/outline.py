@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
-from campaign.report.content.first_screen import Answer, Opening
+from campaign.report.content.first_screen import Answer, FirstScreen
 from campaign.report.content.lines import ShownLine
 from campaign.report.page.damage_notice import Notice
 from campaign.report.page.folder import FOUND, Comparison, Section, ShownFigure
@@ -99,7 +99,7 @@ def _opening(layout: Layout) -> Iterator[Piece]:
         yield layout.telling
 
 
-def _remarks(opening: Opening) -> Iterator[str]:
+def _remarks(opening: FirstScreen) -> Iterator[str]:
     for answer in opening.in_short.answers:
         yield from (f"{answer.title}: {remark}" for remark in answer.remarks)
     yield from opening.in_short.remarks
@@ -109,7 +109,7 @@ def _problem(answer: Answer) -> list[str]:
     return [f"No result: {answer.problem}."] if answer.problem else []
 
 
-def _key_numbers(opening: Opening) -> Grid:
+def _key_numbers(opening: FirstScreen) -> Grid:
     rows = tuple(
         (
             group.title,

@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from campaign.errors import UsageError
-from campaign.report.formats.interface import Format, Written
+from campaign.report.formats.interface import Format, WrittenPage
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SECONDS = 180.0
@@ -56,7 +56,7 @@ def require() -> None:
         )
 
 
-def write(written: Written) -> None:
+def write(written: WrittenPage) -> None:
     """Add `NAME.pdf`. Raises UsageError when the browser cannot print it."""
     require()
     with tempfile.TemporaryDirectory(prefix="campaign-pdf-") as scratch:

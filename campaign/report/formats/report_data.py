@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, JsonValue
 
-from campaign.report.content.first_screen import Opening
+from campaign.report.content.first_screen import FirstScreen
 
 FORMAT = 2
 """Rises when a field changes its meaning or goes; a new one may come at any time."""
@@ -410,7 +410,7 @@ class ReportData(_Part):
 
     format: int = FORMAT
     run: Run
-    opening: Opening
+    opening: FirstScreen
     """As on top of the page; its numbers are in the tests' `conclusions`."""
     scoreboard: Scoreboard
     tests: tuple[Test, ...]

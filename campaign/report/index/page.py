@@ -18,7 +18,7 @@ from campaign.archive import RunSummary, list_runs
 from campaign.archive.layout.header import PARTIAL
 from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
-from campaign.report.index.report_summary import told_by
+from campaign.report.index.report_summary import summary_of_report
 from campaign.report.output import MARKER
 from campaign.report.page.packaged_templates import fill_packaged
 from campaign.report.palette import variables
@@ -107,7 +107,7 @@ def render(results: Path, packaged_templates: Path) -> str:
 def entry_of(run: RunSummary) -> Entry:
     """A run in words."""
     folder = run.path.with_name(f"{run.path.stem}-report")
-    told = told_by(folder)
+    told = summary_of_report(folder)
     link = _address(told.page, run.path.parent) if told.page else ""
     thumbnail = f"data:image/svg+xml,{quote(told.sketch)}" if told.sketch else ""
     if told.figure:

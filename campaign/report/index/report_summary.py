@@ -26,7 +26,7 @@ NOT_TELLING = ("scoreboard", "draws", "incidents-")
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportSummary:
     """What a report says; everything may be missing.
 
     Attributes:
@@ -46,11 +46,11 @@ class Told:
     figure: Path | None = None
 
 
-def told_by(folder: Path) -> Told:
-    """What the report in `folder` says; an empty `Told` where there is none."""
+def summary_of_report(folder: Path) -> ReportSummary:
+    """What the report in `folder` says; an empty `ReportSummary` where there is none."""
     page = folder / PAGE
     if not page.is_file():
-        return Told()
+        return ReportSummary()
     tree = _tree(folder / DATA)
     opening = _mapping(tree.get("opening"))
     answers = [_mapping(answer) for answer in _sequence(opening.get("answers"))]
@@ -61,7 +61,7 @@ def told_by(folder: Path) -> Told:
     wanted = list(_wanted(telling, answers))
     shown = next(_figures(tree, wanted), {})
     small = sketch(shown)
-    return Told(
+    return ReportSummary(
         page,
         next(_sentences(answers), ""),
         _text(opening.get("compared")),

@@ -59,7 +59,7 @@ class Article:
             yield from part.pieces
 
 
-def damage_told(what: str, damaged: Sequence[object]) -> str:
+def damage_text(what: str, damaged: Sequence[object]) -> str:
     """That an archive is damaged, and what that costs."""
     places = f"{len(damaged)} place{'s' if len(damaged) > 1 else ''}"
     return f"{what}: the archive is damaged in {places}; what cannot be read takes no part."

@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 @dataclass
-class Making:
+class PageParts:
     """What is collected while a page is laid out."""
 
     folder: Folder = field(default_factory=Folder)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from campaign.references.verdict import Judged, Verdict
+from campaign.references.verdict import JudgedNumber, Verdict
 from campaign.report.drawing.changes_picture import draw_changes, with_change
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.page.folder import Folder, ShownFigure
 
 
 def changes_figure(
-    pairs: Sequence[tuple[Judged, str]], folder: Folder, key: str
+    pairs: Sequence[tuple[JudgedNumber, str]], folder: Folder, key: str
 ) -> ShownFigure | None:
     """Pairs with their names, those declared different first; None without a change to draw."""
     pairs = sorted(pairs, key=lambda each: each[0].verdict is not Verdict.DIFFERENT)
@@ -20,7 +20,7 @@ def changes_figure(
         return None
     declared = [name for pair, name in pairs if pair.verdict is Verdict.DIFFERENT]
     return folder.picture(
-        Drawn.of(draw_changes(shown)),
+        DrawingFiles.of(draw_changes(shown)),
         "Changes in percent",
         "Each sign is a number with a reference, the bar the 95 % interval of its change. Filled: "
         "declared different. Hollow: no difference is shown, or it is not judged (diamonds).",

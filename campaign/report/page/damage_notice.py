@@ -30,7 +30,7 @@ class Notice:
     download: Download
 
 
-def told_on_page(run: RunReader, damaged: Sequence[Damage], folder: Folder) -> Notice:
+def notice_on_page(run: RunReader, damaged: Sequence[Damage], folder: Folder) -> Notice:
     """The notice; adds `tables/damaged.csv` to the folder, and a word to its figures' files."""
     name = Path(run.path.name)
     words = in_one_line(name, damaged)

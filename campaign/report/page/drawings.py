@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Protocol
 from campaign.api.analysis import AnalysedTest
 from campaign.published.scoreboard import Scoreboard
 from campaign.published.values import Published
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import draw, draw_sheet, series_of
-from campaign.report.drawing.published_marks import Marks, PublishedBeside, told
+from campaign.report.drawing.published_marks import Marks, PublishedBeside, published_text
 from campaign.report.drawing.scoreboard_picture import draw_overview
 from campaign.report.palette import Look, looks_of_page
 from campaign.result import Figure
@@ -40,7 +40,7 @@ class Drawable(Protocol):
     def work(self) -> int:
         """How long it takes, compared with others."""
 
-    def made(self) -> Drawn | None:
+    def made(self) -> DrawingFiles | None:
         """The drawing; None when there is nothing to draw."""
 
 
@@ -54,9 +54,9 @@ class Overview:
     def work(self) -> int:
         return len(self.scoreboard.lines)
 
-    def made(self) -> Drawn | None:
+    def made(self) -> DrawingFiles | None:
         svg = draw_overview(self.scoreboard)
-        return None if svg is None else Drawn.of(svg)
+        return None if svg is None else DrawingFiles.of(svg)
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class Drawing:
         """The drawing as a matplotlib figure."""
         return draw_sheet(self.figure, self.marks, self.looks)
 
-    def made(self) -> Drawn:
-        return Drawn.of(self.svg(), self.figure)
+    def made(self) -> DrawingFiles:
+        return DrawingFiles.of(self.svg(), self.figure)
 
 
 def drawings_of(tests: Sequence[AnalysedTest], compared: Published) -> dict[Key, Drawing]:
@@ -108,5 +108,5 @@ def drawings_of(tests: Sequence[AnalysedTest], compared: Published) -> dict[Key,
 
 def _drawing(figure: Figure, beside: PublishedBeside, looks: Mapping[str, Look]) -> Drawing:
     marks = beside.marks(figure)
-    caption = f"{figure.caption} {told(marks)}".rstrip()
+    caption = f"{figure.caption} {published_text(marks)}".rstrip()
     return Drawing(replace(figure, caption=caption), marks, looks)

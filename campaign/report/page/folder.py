@@ -11,7 +11,7 @@ from campaign.api.analysis import AnalysedTest
 from campaign.plain_text import on_a_page
 from campaign.report.content import tables
 from campaign.report.content.lines import ShownLine
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import inline
 from campaign.report.drawing.label_size import legible_width, view_box
 from campaign.report.drawing.pdf import taken
@@ -172,7 +172,7 @@ class Folder:
     def figure(
         self,
         figure: Figure,
-        drawn: Drawn,
+        drawn: DrawingFiles,
         published: tuple[str, ...],
         *names: str,
         trials: tuple[int, ...] = (),
@@ -197,7 +197,13 @@ class Folder:
         )
 
     def picture(
-        self, drawn: Drawn, title: str, caption: str, alt: str, *names: str, command: str = ""
+        self,
+        drawn: DrawingFiles,
+        title: str,
+        caption: str,
+        alt: str,
+        *names: str,
+        command: str = "",
     ) -> ShownFigure:
         """The same for a picture that no analysis made."""
         from markupsafe import Markup

@@ -18,11 +18,11 @@ from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
 from campaign.report.content.published_columns import as_compared, with_published
-from campaign.report.content.references import Compared
+from campaign.report.content.references import ReferenceComparison
 from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
-from campaign.report.drawing.drawing_files import Drawn
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.strips import draw_strips
 from campaign.report.page.changes import changes_figure
 from campaign.report.page.drawings import (
@@ -45,11 +45,11 @@ from campaign.report.page.names import figure_name, stood_for
 from campaign.result import Figure, Table
 from campaign.trial import Role
 
-DrawAll = Callable[[Mapping[Key, Drawable]], Callable[[Key], Drawn | None]]
+DrawAll = Callable[[Mapping[Key, Drawable]], Callable[[Key], DrawingFiles | None]]
 """Begins to make drawings; returns what waits for one of them, None when it cannot be made so."""
 
 
-def drawn_here(drawings: Mapping[Key, Drawable]) -> Callable[[Key], Drawn | None]:
+def draw_on_demand(drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
     """Nothing is drawn beforehand: each drawing is made where it is laid out."""
     return lambda key: None
 
@@ -59,9 +59,9 @@ class _Made:
     """Drawings, and those of them that are drawn."""
 
     drawings: Mapping[Key, Drawing]
-    drawn: Callable[[Key], Drawn | None]
+    drawn: Callable[[Key], DrawingFiles | None]
 
-    def of(self, test: AnalysedTest, figure: Figure) -> tuple[Drawing, Drawn]:
+    def of(self, test: AnalysedTest, figure: Figure) -> tuple[Drawing, DrawingFiles]:
         """Raises whatever drawing raises."""
         key = test.name, figure.key
         drawing = self.drawings.get(key) or Drawing(figure)
@@ -146,7 +146,7 @@ class Layout:
         return next((f for name, f in shown if f.data and (name, f.data.key) == wanted), None)
 
 
-def lay_out(document: Document, draw_all: DrawAll = drawn_here, command: str = "") -> Layout:
+def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str = "") -> Layout:
     """Draw and number everything, in the order of the page; `draw_all` draws the tests' figures.
 
     command: what a reader is told to type for this report; made from the run's name when empty.
@@ -247,7 +247,9 @@ def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
     return folder.shown_table(table, (), f"incidents-{table.key}")
 
 
-def overview(scoreboard: Scoreboard, folder: Folder, drawn: Drawn | None) -> ShownFigure | None:
+def overview(
+    scoreboard: Scoreboard, folder: Folder, drawn: DrawingFiles | None
+) -> ShownFigure | None:
     """The picture on top of the page."""
     if drawn is None:
         return None
@@ -268,7 +270,7 @@ def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
     if svg is None:
         return None
     return folder.picture(
-        Drawn.of(svg),
+        DrawingFiles.of(svg),
         "Published values among the draws of a random bench",
         "Each tick is the bench with another seed of its scatter, the dot their median, the band"
         " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
@@ -286,11 +288,13 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     return download
 
 
-Expected = tuple[Table | None, Sequence[Compared | None]]
+Expected = tuple[Table | None, Sequence[ReferenceComparison | None]]
 """What is true of a test, and its references: the bench file first."""
 
 
-def _changes(problems: list[str], compared: Compared, maker: _Maker) -> ShownFigure | None:
+def _changes(
+    problems: list[str], compared: ReferenceComparison, maker: _Maker
+) -> ShownFigure | None:
     """The picture of a comparison of two numbers or more."""
     if len(compared.pairs) < 2:
         return None

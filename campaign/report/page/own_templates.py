@@ -106,7 +106,7 @@ def _misnamed(
     for name in references:
         if name not in names and name not in named:
             what = f"no template of the report is called {name!r}, and none of these includes it"
-            yield f"{own / name}: {what}{meant(name, names)}"
+            yield f"{own / name}: {what}{nearest_name(name, names)}"
 
 
 def _wrong_references(
@@ -152,7 +152,10 @@ def _wrong_blocks(
     blocks = sorted(set(_blocks(environment, parent, ())))
     for block in _outermost_blocks(tree):
         if block.name not in blocks:
-            yield block.lineno, f"{parent} has no block {block.name!r}{meant(block.name, blocks)}"
+            yield (
+                block.lineno,
+                f"{parent} has no block {block.name!r}{nearest_name(block.name, blocks)}",
+            )
     outside = f"stands outside of all blocks and would not be shown; {parent} has the blocks "
     for node in tree.body:
         if line := _line_of_words(node):
@@ -171,7 +174,7 @@ def _blocks(environment: Environment, name: str, seen: tuple[str, ...]) -> Itera
             yield from _blocks(environment, reference.name, (*seen, name))
 
 
-def meant(word: str, names: Iterable[str]) -> str:
+def nearest_name(word: str, names: Iterable[str]) -> str:
     """The nearest of the names, or all of them where none is near."""
     known = sorted(names)
     return nearest(word, known) or (f"; there are {', '.join(known)}" if known else "")

@@ -85,7 +85,7 @@ class Files:
 
 
 @dataclass(frozen=True)
-class Folded:
+class FoldedSection:
     """What a reader unfolds; formats that cannot fold show it."""
 
     form: ClassVar = "folded"
@@ -94,7 +94,16 @@ class Folded:
 
 
 Piece = (
-    Heading | Paragraph | Items | Facts | ShownFigure | ShownTable | Grid | Source | Files | Folded
+    Heading
+    | Paragraph
+    | Items
+    | Facts
+    | ShownFigure
+    | ShownTable
+    | Grid
+    | Source
+    | Files
+    | FoldedSection
 )
 
 
@@ -122,7 +131,7 @@ def plain(piece: Piece) -> tuple[Piece, ...]:
         case Files():
             told = (f"{text} {download.file}" for text, download in piece.told)
             return (Paragraph("; ".join(told) + "."),)
-        case Folded():
+        case FoldedSection():
             inner = (each for inner in piece.pieces for each in plain(inner))
             return Paragraph(f"{piece.summary}:"), *inner
         case _:

@@ -33,7 +33,7 @@ from jinja2.utils import missing
 
 from campaign.api.analysis import one_line
 from campaign.errors import UsageError
-from campaign.report.page.own_templates import check_own_templates, meant
+from campaign.report.page.own_templates import check_own_templates, nearest_name
 
 PREFIX = "campaign"
 """What the packaged templates are called by, where a laboratory's own has taken their name."""
@@ -98,7 +98,11 @@ class Templates:
             ) from None
         except UndefinedError as error:
             unknown = re.fullmatch(r"'(\w+)' is undefined", str(error))
-            told = f"there is no name '{unknown[1]}'{meant(unknown[1], context)}" if unknown else ""
+            told = (
+                f"there is no name '{unknown[1]}'{nearest_name(unknown[1], context)}"
+                if unknown
+                else ""
+            )
             raise UsageError(f"{self._place(error) or name}: {told or error}") from None
         except TemplateError as error:
             raise UsageError(f"{self._place(error) or name}: {one_line(error)}") from None
@@ -139,7 +143,7 @@ class _Told(StrictUndefined):
         names = [*map(str, there)] if isinstance(there, Mapping) else dir(there)
         names = [name for name in names if name[:1] != "_" and name != wanted]
         plain = there is None or isinstance(there, str | int | float)
-        return told if plain else told + meant(str(wanted), names)
+        return told if plain else told + nearest_name(str(wanted), names)
 
 
 def _called(thing: object) -> str:

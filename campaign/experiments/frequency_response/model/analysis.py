@@ -50,7 +50,7 @@ from campaign.experiments.responses.signals import Excited, usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_tables, sources_table
 from campaign.options import Options
-from campaign.parameter import Identified, Parameter, Unseen
+from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.result import Amount, Conclusion, Finding, Result
 from campaign.text import words
@@ -154,7 +154,7 @@ def identified(data: TestData) -> Result:
             *_undetermined(parameters),
             *validation_conclusions(validation),
         ),
-        identified=Identified(
+        identified=IdentifiedRig(
             parameters,
             correlations=_correlations(told, parameters),
             unseen=_unseen(validation),

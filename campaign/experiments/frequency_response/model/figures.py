@@ -11,7 +11,11 @@ from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.frequency_response.figures import closed_loop_figures
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name
-from campaign.experiments.responses.figures import Fitted, coherence_figure, response_figures
+from campaign.experiments.responses.figures import (
+    FittedResponse,
+    coherence_figure,
+    response_figures,
+)
 from campaign.result import Figure, Mark
 
 FINE = 800
@@ -37,7 +41,7 @@ def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
     yield coherence_figure(sources)
 
 
-def _fitted(each: FrequencyFit, side: Side, masses: Masses) -> Fitted:
+def _fitted(each: FrequencyFit, side: Side, masses: Masses) -> FittedResponse:
     lines: list[tuple[str, Array, ComplexArray]] = []
     fit = each.fits.get(side)
     if fit is not None:
@@ -53,4 +57,4 @@ def _fitted(each: FrequencyFit, side: Side, masses: Masses) -> Fitted:
         lines.append((label, fine, masses.drive.value(fine, place)))
     modes = [mode for mode in each.modes.get(side, ()) if mode.frequency.has_interval]
     marks = tuple(Mark(f"{mode.frequency.value:.3g} Hz", x=mode.frequency.value) for mode in modes)
-    return Fitted(lines, marks, None if fit is None else fit.fit.value)
+    return FittedResponse(lines, marks, None if fit is None else fit.fit.value)

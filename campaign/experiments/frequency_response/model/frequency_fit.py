@@ -13,7 +13,7 @@ from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.extrema import extrema, relative_scatter
 from campaign.estimation.frequency.modes import Mode, chosen_modes
-from campaign.estimation.frequency.orders import Chosen, chosen_order
+from campaign.estimation.frequency.orders import ChosenOrder, chosen_order
 from campaign.estimation.frequency.two_mass import two_mass
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.servo import ServoCharacteristics, characteristics
@@ -70,7 +70,7 @@ class FrequencyFit:
     """
 
     source: Source
-    fits: Mapping[Side, Chosen]
+    fits: Mapping[Side, ChosenOrder]
     modes: Mapping[Side, tuple[Mode, ...]]
     local: Mapping[Side, ElasticMode] = field(default_factory=dict)
     margins: ServoCharacteristics | None = None
@@ -107,7 +107,7 @@ class Masses:
 
 def found_in(source: Source, band: Band) -> FrequencyFit:
     """Fits, modes and margins of one source."""
-    fits: dict[Side, Chosen] = {}
+    fits: dict[Side, ChosenOrder] = {}
     remarks: list[str] = []
     modes: dict[Side, tuple[Mode, ...]] = {}
     if few := too_few(source):

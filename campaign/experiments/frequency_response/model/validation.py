@@ -192,11 +192,11 @@ def _nearest(fits: Sequence[Model], source: Source, side: Side) -> list[Model]:
     for name in dict.fromkeys(each.name for each in fits):
         some = [each for each in fits if each.name == name and each.side == side]
         if some:
-            found.append(min(some, key=lambda each: apart(each.source, source)))
+            found.append(min(some, key=lambda each: size_difference(each.source, source)))
     return found
 
 
-def apart(one: Source, other: Source) -> float:
+def size_difference(one: Source, other: Source) -> float:
     """How unlike two excitations are in size, as a logarithm; infinite where one has none."""
     if one.rms <= 0 or other.rms <= 0:
         return math.inf
@@ -204,7 +204,7 @@ def apart(one: Source, other: Source) -> float:
 
 
 def _other_size(source: Source, fitted: Source) -> Iterator[str]:
-    if math.log(OTHER_SIZE) < apart(source, fitted) < math.inf:
+    if math.log(OTHER_SIZE) < size_difference(source, fitted) < math.inf:
         yield (
             f"{source.name}: its torque has an rms of {source.rms:.3g} N·m, that of what was "
             f"fitted ({fitted.name}) {fitted.rms:.3g} N·m: with friction the response differs."

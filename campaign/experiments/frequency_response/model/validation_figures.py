@@ -14,7 +14,7 @@ from campaign.experiments.frequency_response.model.validation import (
     Model,
     Prediction,
     Validation,
-    apart,
+    size_difference,
 )
 from campaign.experiments.responses.figures import FREQUENCY, TORQUE, decibel, panels
 from campaign.experiments.responses.sources import fitted_part
@@ -297,7 +297,7 @@ def validation_conclusions(validation: Validation) -> Iterator[Conclusion]:
     """Of each model a sentence: of the unseen response whose excitation is most like its own."""
     for name in dict.fromkeys(each.model.name for each in validation.predictions):
         some = [each for each in validation.predictions if each.model.name == name]
-        each = min(some, key=lambda one: apart(one.model.source, one.source))
+        each = min(some, key=lambda one: size_difference(one.model.source, one.source))
         told = f"Unseen, {each.source.name}: the response is predicted by the {name} "
         parts: list[str | Amount] = [told + each.against.verdict]
         if each.output is not None:
