@@ -102,8 +102,8 @@ def _rates(
     """Relative rates, each smoothed as much as its sensor needs."""
     if not threshold > 0:
         return
-    if np.all(np.isfinite(angle)) and count_of(angle) > 0:
-        unsure = max(count_of(angle), SIGMAS * math.sqrt(2.0) * noise_of(angle))
+    if np.all(np.isfinite(angle)) and (count := count_of(angle)) > 0:
+        unsure = max(count, SIGMAS * math.sqrt(2.0) * noise_of(angle))
         span = max(1, math.ceil(unsure / (threshold * step)))
         if span < len(angle):
             yield _Rate((angle[span:] - angle[:-span]) / (span * step), span, "the encoder")
