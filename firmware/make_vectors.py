@@ -68,7 +68,7 @@ EXAMPLES: list[tuple[int, wire.Message]] = [
     (5, wire.Samples(1, 0, 0, 2, struct.pack("<dhdh", 0.5, 100, -0.5, -100))),
     (6, wire.Event(1, 1, 0.002, "the rate that ends the trial was reached")),
     (7, wire.End(1, 2, wire.Outcome.FAULT, wire.Fault.DRIVE, 2, True, "drive fault 17")),
-    (8, wire.Lost(1, 0, 3)),
+    (8, wire.LostRecords(1, 0, 3)),
     (9, wire.Latch(True, 3, wire.LatchCause.STOPPED, 2.5, "stop")),
     (10, wire.Holder(True, 0.0125, "ada@lab-3 pid 4711, run")),
 ]  # fmt: skip
