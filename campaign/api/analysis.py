@@ -186,7 +186,7 @@ def find(
 ) -> TestAnalysis:
     """What the analysis of one test finds in its trials; see `analyse_run`."""
     name, kind = name_of(test), str(test.get("kind", ""))
-    trials = run.trials_of(name)
+    trials = tuple(run.trials_of(name))
     if measure_anew:
         trials = tuple(trial.unmeasured() for trial in trials)
     experiment, unusable = _experiment(kind, experiments)
@@ -292,7 +292,7 @@ def _gone_on(run: RunReader, test: str) -> str:
 
     What one resume accepted lasts until the next, which is compared with the beginning again.
     """
-    numbers = {archived.trial.number for archived in run.trials_of(test)}
+    numbers = {each.number for each in run.outlines if each.test == test}
     changed = False
     for entry in run.story.entries:
         if isinstance(entry, RunResumed):

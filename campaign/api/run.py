@@ -71,9 +71,8 @@ class RunView:
 
         views = self._tests()
         planned = Counter(trial.test for trial in self.archive.plan)
-        done = Counter(
-            t.trial.test for t in self.archive.trials if t.ending.outcome is Outcome.COMPLETED
-        )
+        told = self.archive.outlines
+        done = Counter(each.test for each in told if each.outcome is Outcome.COMPLETED)
         rows = [
             (view.kind, view.title, planned[view.name], len(view), done[view.name])
             for view in views
@@ -140,9 +139,8 @@ class RunView:
         Raises UsageError when it was not executed, ArchiveError when it was and cannot be read.
         """
         number = trial_number(number) if isinstance(number, str) else number
-        for archived in self.archive.trials:
-            if archived.trial.number == number:
-                return TrialView(archived, damaged=self.damaged)
+        if archived := self.archive.executed(number):
+            return TrialView(archived, damaged=self.damaged)
         if lost := lost_trials(self.archive).get(number):
             raise ArchiveError(f"{self.path}: trial {number} cannot be read: {in_words(lost)}")
         planned = any(trial.number == number for trial in self.archive.plan)
@@ -172,7 +170,7 @@ class RunView:
     def _tests(self) -> list[TestView]:
         """The protocol's tests, and any other that a trial belongs to."""
         told = {str(test.get("name", "")): test for test in self.archive.tests}
-        kinds = {t.trial.test: t.trial.kind for t in self.archive.trials}
+        kinds = {each.test: each.kind for each in self.archive.outlines}
         views = []
         for name in dict.fromkeys((*told, *kinds)):
             test = told.get(name, {})

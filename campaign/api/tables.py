@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from campaign.archive import ArchivedTrial
@@ -36,9 +36,14 @@ def trials_table(trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()
     called `point.` and its path. A trial that cannot be read has no row: `attrs["damaged"]` names
     it, in words.
     """
+    return _table([(each.trial.number, _row(each)) for each in trials], damaged)
+
+
+def _table(
+    rows: Sequence[tuple[int, dict[str, object]]], damaged: Iterable[Damage]
+) -> pd.DataFrame:
     import pandas as pd
 
-    rows = [(archived.trial.number, _row(archived)) for archived in trials]
     paths = dict.fromkeys(path for _, row in rows for path in row if path not in COLUMNS)
     table = pd.DataFrame(
         [row for _, row in rows],
@@ -60,17 +65,18 @@ def metrics_by_trial(
     """
     import pandas as pd
 
-    trials = tuple(trials)
-    table = trials_table(trials, damaged)
+    rows: list[tuple[int, dict[str, object]]] = []
     units: dict[str, str] = {}
     found: dict[str, dict[int, float | None]] = {}
     for archived in trials:
+        rows.append((archived.trial.number, _row(archived)))
         for each in archived.estimates:
             units[each.name] = each.unit
             low, high = each.combined
             told = {each.name: each.value, f"{each.name}_low": low, f"{each.name}_high": high}
             for name, value in told.items():
                 found.setdefault(name, {})[archived.trial.number] = value
+    table = _table(rows, damaged)
     columns = pd.DataFrame({n: pd.Series(v, dtype=float) for n, v in found.items()}, table.index)
     wide = pd.concat([table, columns], axis=1)
     wide.attrs = {**table.attrs, "units": units}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -44,7 +44,7 @@ class TestView:
     kind: str
     title: str
     options: Tree
-    archived: tuple[ArchivedTrial, ...] = field(repr=False)
+    archived: Sequence[ArchivedTrial] = field(repr=False)
     run: Path = field(default=Path(), repr=False)
     damaged: tuple[Damage, ...] = field(default=(), repr=False)
     strict: bool = field(default=False, repr=False)
@@ -76,7 +76,7 @@ class TestView:
         def analyse(trials: Trials) -> Result:
             return result_of(experiment, TestData(self.name, self.kind, self.options, trials))
 
-        trials = self.archived
+        trials = tuple(self.archived)
         if self.measure_anew:
             trials = tuple(trial.unmeasured() for trial in trials)
         result, _, found = without_damaged(self.run, trials, analyse)

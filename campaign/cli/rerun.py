@@ -101,9 +101,8 @@ def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
     Raises UsageError when there is none, ArchiveError when it cannot be read.
     """
     number = trial_number(wanted)
-    for archived in run.trials:
-        if archived.trial.number == number:
-            return archived
+    if archived := run.executed(number):
+        return archived
     if lost := lost_trials(run).get(number):
         raise ArchiveError(f"{run.path}: trial {number} cannot be read: {in_words(lost)}")
     planned = any(each.number == number for each in run.plan)

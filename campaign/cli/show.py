@@ -54,7 +54,7 @@ def _print(run: RunReader, story: Lines) -> None:
     print_line()
     headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
     tests, shown = _tests(run), on_a_terminal()
-    begun = {trial.trial.test for trial in run.trials}
+    begun = {each.test for each in run.outlines}
     if told := [row for row in tests if row[0] in begun or not shown]:
         none = [
             each.value for k, each in enumerate(Outcome, 3) if all(row[k] == "0" for row in told)
@@ -62,8 +62,8 @@ def _print(run: RunReader, story: Lines) -> None:
         print_table(headings, told, spare=(*none, "kind"))
     if idle := [row[0] for row in tests if row[0] not in begun and shown]:
         print_line(f"no trial was executed of {', '.join(idle)}")
-    failed = [trial for trial in run.trials if trial.ending.outcome is not Outcome.COMPLETED]
-    rows = [(t.trial.name, t.trial.label, t.ending.outcome.value, t.ending.reason) for t in failed]
+    failed = [each for each in run.outlines if each.outcome is not Outcome.COMPLETED]
+    rows = [(_name(t.number), t.label, t.outcome.value, t.reason) for t in failed]
     _section(("trial", "what", "outcome", "reason"), rows)
     _section(("trial", "attempt", "outcome", "reason"), [_attempt(a) for a in _repeated(story)])
     _section(("when", "trial", "decision", "reason"), [_decision(d) for d in story.all(Decision)])
@@ -226,7 +226,7 @@ def _plug_in(record: Tree) -> str:
 def _tests(run: RunReader) -> list[tuple[str, ...]]:
     kinds = {planned.test: planned.kind for planned in run.plan}
     planned = Counter(planned.test for planned in run.plan)
-    ended = Counter((trial.trial.test, trial.ending.outcome) for trial in run.trials)
+    ended = Counter((each.test, each.outcome) for each in run.outlines)
     return [
         (test, kind, str(planned[test]), *(str(ended[test, outcome]) for outcome in Outcome))
         for test, kind in kinds.items()

@@ -17,7 +17,8 @@ import pytest
 
 from campaign.api.analysis import TestAnalysis, analyse_run
 from campaign.archive import open_run
-from campaign.archive.reading import run_reader
+from campaign.archive.layout.journal_summary import Lines, read_lines
+from campaign.archive.reading import run_reader, sealed_run
 from campaign.experiments import experiments
 from campaign.report import processes
 from campaign.report.build import render
@@ -140,12 +141,15 @@ def test_a_test_that_is_found_is_gone_on_with_before_the_last_is(archive: Path) 
 def test_the_journal_is_parsed_once_for_a_report(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = open_run(archive)
     parsed: list[bytes] = []
-    original = run_reader.read_lines
-    monkeypatch.setattr(
-        run_reader, "read_lines", lambda content: (parsed.append(content), original(content))[1]
-    )
+
+    def counted(content: bytes, *, lean: bool = False) -> Lines:
+        parsed.append(content)
+        return read_lines(content, lean=lean)
+
+    for module in (sealed_run, run_reader):
+        monkeypatch.setattr(module, "read_lines", counted)
+    run = open_run(archive)
     document_of(run, experiments())
     assert parsed == [run.journal.encode()]
 

@@ -64,7 +64,7 @@ def trial_number(damage: Damage) -> int | None:
 
 def lost_trials(run: RunReader) -> dict[int, Damage]:
     """The executed trials that are not among `run.trials`, by number, each with what is wrong."""
-    there = {archived.trial.number for archived in run.trials}
+    there = {each.number for each in run.outlines} if run.damaged else set()
     lost = ((trial_number(damage), damage) for damage in reversed(run.damaged))
     return {n: damage for n, damage in lost if n is not None and n not in there}
 
@@ -87,7 +87,7 @@ def of_test(run: RunReader, test: str) -> tuple[Damage, ...]:
     A trial that cannot be read is known by its line of the plan.
     """
     tests = {planned.number: planned.test for planned in run.plan}
-    tests |= {archived.trial.number: archived.trial.test for archived in run.trials}
+    tests |= {each.number: each.test for each in run.outlines}
     return tuple(
         damage
         for damage in run.damaged

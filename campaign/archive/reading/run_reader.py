@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,6 +15,7 @@ from campaign.archive.layout.journal import JOURNAL, TrialsFollowed
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import Damage
+from campaign.archive.reading.lazy_trials import LazyTrials, Outline
 from campaign.recording import SafeState
 from campaign.trial import Tree, Trial
 
@@ -54,7 +55,8 @@ class RunReader:
             and its bench is not known to be safe.
         ended: ISO 8601; empty when incomplete.
         plan: every planned trial, executed or not; those that followed come last.
-        trials: the executed ones, in plan order, failed ones included.
+        trials: the executed ones, in plan order, failed ones included. Of a sealed run each is
+            parsed again when it is asked for; `outlines` tells of all of them without that.
         journal: verbatim.
         full_plan: every planned trial, whole.
         damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a
@@ -66,6 +68,7 @@ class RunReader:
             there were stages. The header counts the trials of the plan without them.
         root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
             is in progress.
+        read_story: `story`, where whoever opened the run has read it.
     """
 
     path: Path
@@ -75,13 +78,14 @@ class RunReader:
     safe_state: SafeState
     ended: str
     plan: tuple[PlannedTrial, ...]
-    trials: tuple[ArchivedTrial, ...]
+    trials: Sequence[ArchivedTrial]
     journal: str = field(repr=False)
     full_plan: FullPlan = field(repr=False)
     damaged: tuple[Damage, ...] = ()
     earlier_attempts: Mapping[int, tuple[ArchivedTrial, ...]] = field(default_factory=dict)
     root: str = ""
     stages: tuple[TrialsFollowed, ...] = ()
+    read_story: Lines | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
@@ -97,9 +101,23 @@ class RunReader:
         """The protocol's tests: name, kind, title, normalised options ..."""
         return self.header.tests
 
-    def trials_of(self, test: str) -> tuple[ArchivedTrial, ...]:
+    def trials_of(self, test: str) -> Sequence[ArchivedTrial]:
         """The executed trials of one test, in plan order."""
+        if isinstance(self.trials, LazyTrials):
+            return self.trials.of(test)
         return tuple(trial for trial in self.trials if trial.trial.test == test)
+
+    @property
+    def outlines(self) -> Iterable[Outline]:
+        """What each of `trials` is and how it ended; no record is parsed for it."""
+        if isinstance(self.trials, LazyTrials):
+            return self.trials.outlines
+        return map(Outline.of, self.trials)
+
+    def executed(self, number: int) -> ArchivedTrial | None:
+        """The executed trial of that number; None where there is none."""
+        places = (place for place, each in enumerate(self.outlines) if each.number == number)
+        return next((self.trials[place] for place in places), None)
 
     @property
     def sealed(self) -> bool:
@@ -107,8 +125,8 @@ class RunReader:
 
     @cached_property
     def story(self) -> Lines:
-        """What the journal says, line by line."""
-        return read_lines(self.journal.encode())
+        """What the journal says, line by line; of a sealed run without what was measured."""
+        return self.read_story or read_lines(self.journal.encode())
 
     @cached_property
     def sha256(self) -> str:

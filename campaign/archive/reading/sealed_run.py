@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import ENTRY, entry_names, file_name
+from campaign.archive.layout.entries import ENTRY, entry_name, entry_names, file_name
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
@@ -22,10 +22,11 @@ from campaign.archive.layout.record import Trees, TrialRecord, parse_trees
 from campaign.archive.layout.run_folder import parse_plan
 from campaign.archive.layout.storage import storable
 from campaign.archive.reading import safe_hdf5
-from campaign.archive.reading.archived_metrics import measured_in, with_metrics
+from campaign.archive.reading.archived_metrics import with_metrics
 from campaign.archive.reading.archived_samples import RecordedSamples, archived_trial
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
+from campaign.archive.reading.lazy_trials import LazyTrials, Outline
 from campaign.archive.reading.packed_trial_reader import packed_record, parse_record
 from campaign.archive.reading.provenance import read_provenance
 from campaign.archive.reading.run_reader import Glance, RunReader, interrupted_trials
@@ -46,9 +47,10 @@ def read_sealed(path: Path) -> RunReader:
         header = _header(texts, damaged)
         if texts.seal is not None and texts.seal.run != header.name:
             damaged.add(f"/run/{SEAL}", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
-        story = read_lines(damaged.read(lambda: texts.text("journal/data"), "").encode())
+        journal = damaged.read(lambda: texts.text("journal/data"), "").encode()
+        story = read_lines(journal, lean=True)
         note_journal(story, damaged)
-        trials, earlier = _Trials.read(path, file, texts, damaged).archived(story, damaged)
+        trials, earlier = _Trials.read(path, texts, story, file, damaged).archived(file, damaged)
         plan: tuple[PlannedTrial, ...] = damaged.read(
             lambda: parse_plan(path, texts.text("plan/data")), ()
         )
@@ -64,6 +66,7 @@ def read_sealed(path: Path) -> RunReader:
             plan=plan + planned_in(stages),
             trials=trials,
             journal=story.text,
+            read_story=story,
             full_plan=FullPlan(path, partial(_plan_texts, path), stages),
             damaged=tuple(damaged.found),
             earlier_attempts=earlier,
@@ -168,6 +171,7 @@ class _Trials:
     the index, or again in the trial's own group should the index be damaged.
 
     Attributes:
+        story: the journal.
         groups: names of what the file holds.
         lines: of the index, by their digests.
         whole: whether the index is as it was sealed: then it tells of a trial as the journal does.
@@ -176,7 +180,7 @@ class _Trials:
     """
 
     path: Path
-    file: h5py.File
+    story: Lines
     groups: frozenset[str]
     lines: Mapping[str, str]
     whole: bool
@@ -184,7 +188,9 @@ class _Trials:
     not_kept: Mapping[str, str]
 
     @classmethod
-    def read(cls, path: Path, file: h5py.File, texts: SealedTexts, damaged: DamageList) -> _Trials:
+    def read(
+        cls, path: Path, texts: SealedTexts, story: Lines, file: h5py.File, damaged: DamageList
+    ) -> _Trials:
         index, whole = _text_or_rest(texts, "index/data", damaged)
         trees, _ = _text_or_rest(texts, "trees/data", damaged)
         lines = {text_digest(line): line for line in index.splitlines()}
@@ -192,44 +198,64 @@ class _Trials:
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, file, groups, lines, whole, _good_trees(trees), not_kept)
+        return cls(path, story, groups, lines, whole, _good_trees(trees), not_kept)
 
     def archived(
-        self, story: Lines, damaged: DamageList
-    ) -> tuple[tuple[ArchivedTrial, ...], dict[int, tuple[ArchivedTrial, ...]]]:
-        """The trials that count, and the attempts before them by number; the rest is noted."""
-        trials: list[ArchivedTrial] = []
+        self, file: h5py.File, damaged: DamageList
+    ) -> tuple[LazyTrials, dict[int, tuple[ArchivedTrial, ...]]]:
+        """The trials that count, and the attempts before them by number; the rest is noted.
+
+        Every record is parsed here once, which shows what is wrong with it, and let go of.
+        """
+        outlines: list[Outline] = []
+        kept: dict[int, TrialFinished | ArchivedTrial] = {}
         earlier: dict[int, list[ArchivedTrial]] = {}
-        measured = measured_in(story.entries)
-        attempts = self._told(story)
+        attempts = self._told()
         unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
         if unknown:
             damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
         for entry, told in entry_names(attempts).items():
             with damaged.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
-                archived = with_metrics(self._archived(entry, told), measured.get(told.record))
+                archived, in_index = self._archived(entry, told, file)
                 if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
-                    earlier.setdefault(told.trial, []).append(archived)
-                else:
-                    trials.append(archived)
-        return tuple(trials), {number: tuple(found) for number, found in earlier.items()}
+                    earlier.setdefault(told.trial, []).append(self._measured(archived, told))
+                    continue
+                outlines.append(Outline.of(archived))
+                kept[told.trial] = told if in_index else self._measured(archived, told)
+        before = {number: tuple(found) for number, found in earlier.items()}
+        return LazyTrials(outlines, partial(self._again, kept)), before
 
-    def _told(self, story: Lines) -> list[TrialFinished]:
+    def _again(
+        self, kept: Mapping[int, TrialFinished | ArchivedTrial], number: int
+    ) -> ArchivedTrial:
+        """A trial whose record was parsed before, and is in the index or was kept."""
+        if isinstance(told := kept[number], ArchivedTrial):
+            return told
+        return self._measured(self._archived(entry_name(number), told)[0], told)
+
+    def _measured(self, archived: ArchivedTrial, told: TrialFinished) -> ArchivedTrial:
+        return with_metrics(archived, self.story.measured_of(told.record))
+
+    def _told(self) -> list[TrialFinished]:
         """Every finished attempt that the journal tells of; the index makes up for lost lines."""
-        told = {(each.trial, each.attempt): each for each in story.attempts}
-        if self.whole and not story.whole:
+        told = {(each.trial, each.attempt): each for each in self.story.attempts}
+        if self.whole and not self.story.whole:
             known = {each.record for each in told.values()}
             for digest in self.lines.keys() - known:
                 finished = _as_finished(parse_record(self.path, "/run/index", self.lines[digest]))
                 told.setdefault((finished.trial, finished.attempt), finished)
         return list(told.values())
 
-    def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
+    def _archived(
+        self, entry: str, told: TrialFinished, file: h5py.File | None = None
+    ) -> tuple[ArchivedTrial, bool]:
+        """A trial, and whether the index has all of it; with `file` its own group is enough."""
         trees: Trees = self.trees
         if (line := self.lines.get(told.record)) is not None:
             record = parse_record(self.path, f"/{entry}", line)
-        if line is None or not record.tree_names <= trees.keys():
-            record, trees = read_entry(self.path, self.file, entry, told.record)
+        in_index = line is not None and record.tree_names <= trees.keys()
+        if file is not None and not in_index:
+            record, trees = read_entry(self.path, file, entry, told.record)
         if (record.number, record.attempt) != (told.trial, told.attempt):
             raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
         # Where its samples are there, whatever is said of them, they are held against the record.
@@ -238,7 +264,8 @@ class _Trials:
             raise ArchiveError(
                 f"{self.path}: /{entry}: is missing, and the journal says that it finished"
             )
-        return archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
+        archived = archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
+        return archived, in_index
 
 
 def _as_finished(record: TrialRecord) -> TrialFinished:

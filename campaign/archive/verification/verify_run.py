@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import ENTRY, entry_names
+from campaign.archive.layout.entries import ENTRY, entry_name, entry_names
 from campaign.archive.layout.files import PART, sha256_of
 from campaign.archive.layout.full_plan import PLAN_TREES, PLAN_TRIALS
 from campaign.archive.layout.journal import JOURNAL
@@ -115,7 +115,9 @@ class _Check(EntryCheck):
             for entry in sorted(gone):
                 reasons.setdefault(not_kept[entry], []).append(entry)
             # What the index says of a trial without a group was read when the run was opened.
-            for archived in (*run.trials, *chain(*run.earlier_attempts.values())):
+            told_of = enumerate(run.outlines)
+            without = (run.trials[n] for n, each in told_of if entry_name(each.number) in gone)
+            for archived in chain(without, *run.earlier_attempts.values()):
                 if (entry := archived.entry) in gone:
                     fingerprint = archived.trial.fingerprint
                     self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)

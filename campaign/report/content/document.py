@@ -50,6 +50,7 @@ class Document:
     """
 
     run: RunReader
+    trials: tuple[ArchivedTrial, ...]
     tests: tuple[AnalysedTest, ...]
     published: Published
     scoreboard: Scoreboard
@@ -81,7 +82,7 @@ class Document:
     @property
     def seeds(self) -> str:
         """The seeds of its trials, in a few words."""
-        seeds = sorted({trial.trial.seed for trial in self.run.trials})
+        seeds = sorted({trial.trial.seed for trial in self.trials})
         if len(seeds) <= 4:
             return ", ".join(str(seed) for seed in seeds)
         return f"{len(seeds)} seeds from {seeds[0]} to {seeds[-1]}, one per trial in the archive"
@@ -95,8 +96,7 @@ class Document:
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
         """The executed trials that did not complete."""
-        trials = self.run.trials
-        return tuple(each for each in trials if each.ending.outcome is not Outcome.COMPLETED)
+        return tuple(each for each in self.trials if each.ending.outcome is not Outcome.COMPLETED)
 
     @property
     def lost(self) -> int:
@@ -106,7 +106,7 @@ class Document:
     @property
     def not_executed(self) -> int:
         """How many planned trials were not executed."""
-        return max(0, len(self.run.plan) - len(self.run.trials) - self.lost)
+        return max(0, len(self.run.plan) - len(self.trials) - self.lost)
 
 
 def document_of(
@@ -123,17 +123,19 @@ def document_of(
     `measure_anew`, `found`: as for `analyse_run`. `shown`: trials that have pages of their own,
     with all of their samples. `files`: of reference values.
     """
+    trials = tuple(run.trials)  # held: a page asks for them in many places
     happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
     of_tests = (damage for test in tests for damage in test.damaged)
-    _, of_pages = readable(run.path, [t for t in run.trials if t.trial.number in shown])
+    _, of_pages = readable(run.path, [t for t in trials if t.trial.number in shown])
     damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
     references = compared_with(run, tests, files)
     return Document(
         run,
+        trials,
         tests,
         published,
         scoreboard,
@@ -142,7 +144,7 @@ def document_of(
         happened,
         opening_of(run, tests, scoreboard, truths, references, damaged),
         damaged,
-        ANEW if measure_anew else _measured_by(run.trials),
+        ANEW if measure_anew else _measured_by(trials),
     )
 
 

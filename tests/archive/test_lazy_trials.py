@@ -1,0 +1,99 @@
+"""Records of a sealed run are parsed once when it is opened, and let go of."""
+
+import pickle
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import campaign
+from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive.layout import journal_summary
+from campaign.archive.reading import sealed_run
+from campaign.archive.reading.archived_metrics import ArchivedMetrics
+from campaign.archive.writing.trial_writer import Keeping
+from campaign.cli.show import show_archive
+from campaign.errors import ExitCode
+from campaign.estimate import Estimate
+from campaign.recording import Ending, Outcome, SafeState
+
+TRIALS = 7
+FAILED = 3
+FOUND = ArchivedMetrics((Estimate("peak", 0.25, "rad/s", 0.2, 0.3, 0.95, "m"),), "campaign 0")
+
+
+@pytest.fixture
+def path(tmp_path: Path, kit) -> Path:
+    """A run of trials without samples, each measured, one failed."""
+    trials = [kit.trial(number) for number in range(1, TRIALS + 1)]
+    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    for trial in trials:
+        recorder = writer.begin(trial, Keeping("none"))
+        recorder.start(kit.CHANNELS)
+        recorder.append(*kit.samples(10, trial.number))
+        ending = Ending(Outcome.COMPLETED)
+        if trial.number == FAILED:
+            ending = Ending(Outcome.LIMIT, "too fast", SafeState.CONFIRMED)
+        recorder.finish(ending, kit.STARTED, kit.ENDED)
+        recorder.measure(lambda archived: FOUND)
+    return writer.seal(RunStatus.FAILED_TRIALS, ended=kit.ENDED)
+
+
+@pytest.fixture
+def parsed(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """How many records and lines of the journal were parsed."""
+    counts: Counter[str] = Counter()
+    for module, name in ((sealed_run, "parse_record"), (journal_summary, "_parse")):
+        original = getattr(module, name)
+
+        def counted(*told, original=original, name=name):
+            counts[name] += 1
+            return original(*told)
+
+        monkeypatch.setattr(module, name, counted)
+    return counts
+
+
+ONCE = {"parse_record": TRIALS, "_parse": 2 * TRIALS + 2}
+"""Each record; a line for the start, one for the end, and two for each trial."""
+
+
+def test_show_parses_every_record_and_every_line_once(path, parsed, capsys) -> None:
+    assert show_archive(str(path), path.parent, as_json=False) is ExitCode.DONE
+    assert parsed == ONCE
+    assert "trial-00003" in capsys.readouterr().out
+
+
+def test_what_is_told_of_an_opened_run_parses_no_record_again(path, parsed) -> None:
+    view = campaign.open(path)
+    assert f"{TRIALS} of {TRIALS} trials executed" in repr(view)
+    assert view.tests.loc["map", "completed"] == TRIALS - 1
+    assert len(view["map"]) == TRIALS
+    assert parsed == ONCE
+    assert view.trial(FAILED).ending.reason == "too fast"
+    assert parsed["parse_record"] == TRIALS + 1
+
+
+def test_a_table_parses_a_trial_once_more_and_keeps_none(path, parsed) -> None:
+    view = campaign.open(path)
+    assert view.metrics()["peak"].tolist() == [0.25] * TRIALS
+    assert parsed["parse_record"] == 2 * TRIALS
+    held = view.archive.trials[0]
+    assert view.archive.trials_of("map")[0] is held
+    assert parsed["parse_record"] == 2 * TRIALS + 1
+    assert view.archive.trials[0] is held
+    del held
+    assert view.archive.trials[0].estimates == FOUND.estimates
+    assert parsed["parse_record"] == 2 * TRIALS + 2
+
+
+def test_trials_are_a_sequence_like_a_tuple(path) -> None:
+    run = open_run(path)
+    trials = tuple(run.trials)
+    assert run.trials == trials
+    assert run.trials != trials[1:]
+    assert run.trials[1:3] == trials[1:3]
+    assert run.trials[-1] == trials[-1]
+    assert pickle.loads(pickle.dumps(run)).trials == trials
+    assert run.executed(FAILED) == trials[FAILED - 1]
+    assert run.executed(TRIALS + 1) is None
