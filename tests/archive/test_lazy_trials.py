@@ -11,10 +11,10 @@ from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout import journal_summary
 from campaign.archive.reading import sealed_run
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
-from campaign.archive.writing.trial_writer import Keeping
 from campaign.cli.show import show_archive
 from campaign.errors import ExitCode
 from campaign.estimate import Estimate
+from campaign.policy import SampleRetention
 from campaign.recording import Ending, Outcome, SafeState
 
 TRIALS = 7
@@ -28,7 +28,7 @@ def path(tmp_path: Path, kit) -> Path:
     trials = [kit.trial(number) for number in range(1, TRIALS + 1)]
     writer = RunWriter.create(tmp_path, kit.header(), trials)
     for trial in trials:
-        recorder = writer.begin(trial, Keeping("none"))
+        recorder = writer.begin(trial, SampleRetention("none"))
         recorder.start(kit.CHANNELS)
         recorder.append(*kit.samples(10, trial.number))
         ending = Ending(Outcome.COMPLETED)
