@@ -207,8 +207,9 @@ def _verdict(found: Identification) -> str:
     }
     counts = {name: len(own) - open_ones[name] for name, own in parameters.items()}
     by = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
-    told = f"{sum(counts.values())} parameters identified{f' ({by})' if by else ''}"
-    return f"{told}, {sum(open_ones.values())} not determined"
+    total = sum(counts.values())
+    identified = f"{total} parameter{'' if total == 1 else 's'} identified"
+    return f"{identified}{f' ({by})' if by else ''}, {sum(open_ones.values())} not determined"
 
 
 def _tell(section: Section) -> None:
