@@ -38,7 +38,7 @@ from campaign.execution.guardian import (
 from campaign.execution.safety import NOT_SAFE, SAFE
 from campaign.plain_text import printable
 
-_NOTICE = "\nstopping: archive closes; Ctrl-C again leaves it unclosed\n"
+_NOTICE = "\nstopping: closing the archive; press Ctrl-C again to abort\n"
 """Short enough for a narrow terminal: what wraps it breaks words."""
 NOTHING_BEGUN = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
