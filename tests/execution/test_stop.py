@@ -387,7 +387,7 @@ def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[in
 def test_who_insists_before_anything_was_begun_leaves_at_once(tmp_path: Path):
     code, said = insisted(tmp_path, "asked(); hang(ctypes.CDLL)")
     assert code == 130
-    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+    assert said.endswith("abort\n\nstopped at once; nothing was begun\n")
 
 
 @on_posix
@@ -403,7 +403,7 @@ def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
     code, said = insisted(tmp_path, f"{does}; hang(ctypes.CDLL)")
     assert (tmp_path / "safe").exists()
     assert code == 130
-    assert said.endswith("unclosed\n\nkept\n")
+    assert said.endswith("abort\n\nkept\n")
 
 
 @on_posix
@@ -412,7 +412,7 @@ def test_a_program_without_standard_error_of_its_own_is_left_as_well(tmp_path: P
         tmp_path, "asked(); sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)"
     )
     assert code == 130
-    assert said.endswith("unclosed\n\nstopped at once; nothing was begun\n")
+    assert said.endswith("abort\n\nstopped at once; nothing was begun\n")
 
 
 @on_posix
