@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
+import pytest
 
 from campaign.archive import RunStatus, RunWriter
 from campaign.archive.verification.verify_run import verify_run
+from campaign.archive.writing import sealed_file
 from campaign.archive.writing.long_text import SHORT
+from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
 from campaign.recording import Ending, Event, Outcome
 from tests.archive.forging import canonical, sha256
@@ -63,3 +67,23 @@ def test_texts_written_in_pieces_are_what_the_folder_had(tmp_path: Path, kit, mo
         for note, text in texts.items():
             assert file[f"run/{note}/data"][()].decode().startswith(text)
         assert len(file["run/index/data"][()].splitlines()) == 5 * FEW
+
+
+def test_a_text_that_grows_while_it_is_sealed_lies_on_nothing(
+    tmp_path: Path, kit, monkeypatch
+) -> None:
+    """What follows its room in the file was read back before."""
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
+    writer = begun(tmp_path, kit, 5 * FEW)
+    plan, read = writer.folder / "plan.jsonl", sealed_file.SealedFile._index
+
+    def growing(file: sealed_file.SealedFile, folder: Path) -> Iterator[bytes]:
+        with plan.open("ab") as more:
+            more.write(b"{}\n")
+        yield from read(file, folder)
+
+    monkeypatch.setattr(sealed_file.SealedFile, "_index", growing)
+    with pytest.raises(ArchiveError, match="a text was changed while it was sealed"):
+        writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
+    assert writer.folder.is_dir()
+    assert not writer.folder.with_suffix(".nxs").exists()

@@ -117,6 +117,8 @@ class SealedFile:
             for offset, long in rooms.items():
                 raw.seek(offset)
                 raw.writelines(long.pieces())
+                if raw.tell() != offset + long.size:  # longer, it lies on samples now
+                    raise ArchiveError(f"{folder}: a text was changed while it was sealed")
 
     def _index(self, folder: Path) -> Iterator[bytes]:
         """The records, each with its end, in the order of trials; they are on the disk anyway."""
