@@ -69,21 +69,29 @@ def test_texts_written_in_pieces_are_what_the_folder_had(tmp_path: Path, kit, mo
         assert len(file["run/index/data"][()].splitlines()) == 5 * FEW
 
 
-def test_a_text_that_grows_while_it_is_sealed_lies_on_nothing(
-    tmp_path: Path, kit, monkeypatch
+@pytest.mark.parametrize(
+    ("mode", "place", "told"),
+    [
+        ("ab", 0, "a text was changed while it was sealed"),
+        ("r+b", 100, "does not match its checksum"),
+    ],
+)
+def test_a_text_that_changes_while_it_is_sealed_leaves_the_folder(
+    tmp_path: Path, kit, monkeypatch, mode: str, place: int, told: str
 ) -> None:
-    """What follows its room in the file was read back before."""
+    """A longer one would lie on samples that were read back before."""
     monkeypatch.setattr(os, "fsync", lambda descriptor: None)
     writer = begun(tmp_path, kit, 5 * FEW)
     plan, read = writer.folder / "plan.jsonl", sealed_file.SealedFile._index
 
-    def growing(file: sealed_file.SealedFile, folder: Path) -> Iterator[bytes]:
-        with plan.open("ab") as more:
-            more.write(b"{}\n")
+    def changing(file: sealed_file.SealedFile, folder: Path) -> Iterator[bytes]:
+        with plan.open(mode) as raw:
+            raw.seek(place)
+            raw.write(b"{}\n")
         yield from read(file, folder)
 
-    monkeypatch.setattr(sealed_file.SealedFile, "_index", growing)
-    with pytest.raises(ArchiveError, match="a text was changed while it was sealed"):
+    monkeypatch.setattr(sealed_file.SealedFile, "_index", changing)
+    with pytest.raises(ArchiveError, match=told):
         writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     assert writer.folder.is_dir()
     assert not writer.folder.with_suffix(".nxs").exists()

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from campaign.archive.layout.storage import storable
-
 SHORT = 32_000
 """Bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes."""
 
@@ -35,9 +33,9 @@ def text_of(pieces: Callable[[], Iterable[bytes]]) -> str | LongText:
 
 
 def file_pieces(path: Path, size: int | None = None) -> Iterator[bytes]:
-    """The first `size` bytes of a file, or all of it, as they can be stored."""
+    """The first `size` bytes of a file of JSON lines, or all of it; they have no NUL."""
     with path.open("rb") as file:
         left = path.stat().st_size if size is None else size
         while block := file.read(min(_BLOCK, left)):
             left -= len(block)
-            yield block.replace(b"\0", storable("\0").encode())
+            yield block
