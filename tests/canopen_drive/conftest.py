@@ -26,7 +26,9 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def fast(monkeypatch: pytest.MonkeyPatch) -> float:
     """The relay's clock; a simulated drive with this `speed` counts heartbeats as fast."""
     monkeypatch.setattr(relay, "time", FastClock(SPEED))
-    monkeypatch.setattr(proof, "REACTION", SPEED * proof.REACTION)  # a busy machine is not as fast
+    # What waits for the drive waits as long as before: a busy machine is not as fast.
+    monkeypatch.setattr(proof, "REACTION", SPEED * proof.REACTION)
+    monkeypatch.setattr(relay, "ENABLE", SPEED * relay.ENABLE)
     return SPEED
 
 

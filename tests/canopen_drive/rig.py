@@ -24,7 +24,7 @@ BENCH = {
     "name": "desk", "axis": {"name": "desk", "inertia": 0.1}, "friction": {}, "limits": LIMITS,
 }  # fmt: skip
 RAMP = {"shape": "polyline", "times": [0.2, 0.4, 1.2, 1.6, 2.0], "values": [0.0, 0.1, 0.1, -0.1, 0]}
-PATIENT: dict[str, Any] = {"late": 60.0, "silence": 60.0, "heartbeat": 2.0}
+PATIENT: dict[str, Any] = {"late": 60.0, "silence": 60.0, "heartbeat": 5.0}
 """No machine is too busy for these."""
 
 

@@ -52,6 +52,7 @@ def ended(name: str, drive: SimulatedDrive, what: Any, **options: Any) -> Ending
 
         drive.on_sync = act
         ending, _ = execute(connected, trial(2, **LONG))
+        assert ("happens",) in drive.log[at:], ending
         at = drive.log.index(("happens",), at)
         stays_off(drive, at)
         return ending
@@ -129,7 +130,7 @@ def test_a_drive_that_started_anew_between_trials_is_set_and_proved_again(drives
             drive.put(index, 0, sub)
         since = len(drive.log)
         assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
-        assert drive.get(0x1016, 1) == 127 << 16 | 2000
+        assert drive.get(0x1016, 1) == 127 << 16 | 5000
         assert drive.get(0x6007) == 3
         assert "fault" in [event[1] for event in drive.log[since:]], "its silence was not tried"
 
