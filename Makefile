@@ -24,15 +24,9 @@ help:
 	@echo "make format   put the code into the project's format"
 	@echo "make clean    remove the environment and everything built (results/ stays)"
 
-# What the report answers first: for each test its title, the numbers, and how they meet the truth.
-ANSWERS := import json, sys; \
-	found = json.load(open(sys.argv[1], encoding="utf-8"))["opening"]["answers"]; \
-	print(*(f"{line}\n" for each in found for line in (each["title"].upper(), *each["sentences"], each["truth"]) if line), sep="")
-
 demo: $(VENV)/installed
 	@echo "running protocols/quickstart.toml on the simulated bench"
 	@run=$$($(BIN)/campaign run protocols/quickstart.toml --report) && report=$${run%.nxs}-report \
-		&& echo && $(BIN)/python -c '$(ANSWERS)' "$$report/report.json" \
 		&& echo "archive  $$run" && echo "report   $$report/report.html"
 
 # Files stay whole, for what their tests share, in the order that tests/conftest.py gives them.

@@ -116,6 +116,11 @@ class Estimate:
         return self.low is not None or self.high is not None
 
     @property
+    def is_determined(self) -> bool:
+        """Whether there is a number that says something."""
+        return math.isfinite(self.value) and self.origin is not Origin.NOT_DETERMINED
+
+    @property
     def says_enough(self) -> bool:
         """Whether there is an interval, a bound, or a reason for neither."""
         return self.has_interval or self.kind in ("at least", "at most") or bool(self.reason)

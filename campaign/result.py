@@ -113,42 +113,6 @@ def bare(cell: Cell) -> Value:
 
 
 @dataclass(frozen=True)
-class Amount:
-    """A number within a sentence: an estimate (SI), and the unit that a reader is shown."""
-
-    estimate: Estimate
-    display: str = ""
-
-
-@dataclass(frozen=True)
-class Factor:
-    """How many times more or less, within a sentence: an estimate of a ratio.
-
-    Words are said only of an interval that lies on one side of 1; of any other it is said that the
-    data show no difference.
-
-    Attributes:
-        above: what a ratio above 1 means: `less`, where it is the error without over that with.
-        below: what one below 1 means; the reciprocal is told.
-    """
-
-    estimate: Estimate
-    above: str = "more"
-    below: str = "less"
-
-
-@dataclass(frozen=True)
-class Conclusion:
-    """A sentence that a test comes to: words, and the numbers between them.
-
-    `Conclusion(("Friction at rest is ", Amount(static, "N m"), "."))`. A sentence is made from
-    estimates, never from text that somebody expected to be true.
-    """
-
-    parts: tuple[str | Amount | Factor, ...]
-
-
-@dataclass(frozen=True)
 class Column:
     """A column of a table.
 
@@ -355,7 +319,7 @@ class Result:
 
     Attributes:
         notes: sentences for the report: caveats, assumptions, what failed and why.
-        conclusions: what the test comes to, the most important sentence first.
+        key_numbers: what was asked for, the most important first; `findings`, or ratios of them.
         telling: key of the figure that tells it best; "" for the first.
         doubts: recordings that something is wrong with; `notes` say the same. Whoever calls an
             analysis adds them.
@@ -366,14 +330,14 @@ class Result:
     figures: tuple[Figure, ...] = ()
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
-    conclusions: tuple[Conclusion, ...] = ()
+    key_numbers: tuple[Finding, ...] = ()
     telling: str = ""
     doubts: tuple[RecordingDoubt, ...] = ()
     identified: IdentifiedRig = NOTHING_IDENTIFIED
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing but sentences."""
+        """Whether there is nothing but notes."""
         return not (self.figures or self.findings or any(each.rows for each in self.tables))
 
     @property

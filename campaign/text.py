@@ -134,6 +134,11 @@ def of_trials(numbers: Iterable[int]) -> str:
     return f"Trial{'s' if len(set(numbers)) > 1 else ''} {in_rows(numbers)}" if numbers else ""
 
 
+def count(number: int, one: str, many: str = "") -> str:
+    """`1 map`, `3 maps`."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
 QUANTITIES = {
     "coulomb_torque": "Coulomb friction Tc",
     "static_torque": "static friction Ts",

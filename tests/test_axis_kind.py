@@ -38,13 +38,15 @@ from campaign.physics.limit_watch import LimitWatch
 from campaign.physics.limits import margins
 from campaign.protocol.limit_check import in_display_units
 from campaign.protocol.problems import find_faults
+from campaign.published.scoreboard import Scoreboard
 from campaign.reason import Reason
 from campaign.report.content.first_screen import _answer
 from campaign.report.content.references import References
 from campaign.report.content.tables import remarks
 from campaign.report.content.truth import _bias
+from campaign.report.content.written_units import TestUnits
 from campaign.resources import protocols_folder
-from campaign.result import Amount, Axis, Column, Conclusion, Figure, Panel, Result, Table
+from campaign.result import Axis, Column, Figure, Finding, Panel, Result, Table
 from campaign.trial import Task
 from campaign.unit_grammar import parse_unit
 from campaign.units import ANGLE, OBSERVER_GAIN, POSITION, angle_text, rate_text
@@ -282,12 +284,14 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
     """In data it has one code for every axis."""
     found = Estimate("f", 3.0, "N", 2.0, 4.0, 0.95, systematic=(Systematic("torque constant"),))
     table = Table("t", "T", (Column("f", "F", "N"),), ({"f": found},))
-    said = Result(conclusions=(Conclusion(("F is ", Amount(found, "N"), ".")),))
+    said = Result(key_numbers=(Finding.of(found, {}),))
     test = SimpleNamespace(
         name="t", title="T", kind="k", problem="", trials=(), failed=(), result=said, sides=DIRECT
     )
     remark = "Of unknown size, and in no interval: force constant."
-    assert _answer(test, None, References({}, {}, ())).remarks == (remark,)  # type: ignore[arg-type]
+    units = TestUnits(test)  # type: ignore[arg-type]
+    answer = _answer(test, None, References({}, {}, ()), Scoreboard(), units)  # type: ignore[arg-type]
+    assert answer.remarks == (remark,)
     with axis_terms(DIRECT):
         assert list(remarks(table)) == [remark]
         assert systematic(found) == "force constant unknown"
@@ -317,8 +321,7 @@ def test_a_result_is_told_in_its_axis_units_and_phases_stay_angles() -> None:
     table = Table("t", "Torques", columns, ({"torque": torque, "phase_margin": margin},))
     axes = Axis("Rate", "rad/s", "deg/s"), Axis("Phase", "rad", "deg")
     figure = Figure("f", "Torque", "The torque.", "A torque.", (Panel(*axes, ()),))
-    words = Conclusion(("Torque ", Amount(torque, "N m"), Amount(margin, "deg")))
-    result = Result((table,), (figure,), notes=("A torque.",), conclusions=(words,))
+    result = Result((table,), (figure,), notes=("A torque.",))
     assert in_axis_units(result) is result
     with axis_terms(LEAD):
         told = in_axis_units(result)
@@ -335,8 +338,6 @@ def test_a_result_is_told_in_its_axis_units_and_phases_stay_angles() -> None:
     )
     panel = told.figures[0].panels[0]
     assert (panel.x.unit, panel.x.display, panel.y.unit) == ("m/s", "mm/s", "rad")
-    amounts = [part for part in told.conclusions[0].parts if isinstance(part, Amount)]
-    assert [each.display for each in amounts] == ["N", "deg"]
     assert told.notes == ("A force.",)
 
 

@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from html import escape as html_escape
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from campaign.errors import UsageError
 from campaign.estimate import Estimate, Systematic
 from campaign.reason import Cause
 from campaign.recording import Channel, Ending, Outcome, Recording
-from campaign.result import NOT_FOUND, Finding
+from campaign.result import NOT_FOUND, Finding, Result
 from tests.archives import archived, plan_of, simulated_run
 
 PAGE = (Path(__file__).parents[1] / "docs" / "reading-archives.md").read_text(encoding="utf-8")
@@ -257,10 +256,11 @@ def test_in_a_notebook_each_shows_itself_and_hostile_text_is_only_text(run):
     trial = run.trial(1)._repr_html_()
     assert trial.startswith("<p><code>&lt;trial-00001")
     results = run.results
-    (name,) = results.conclusions
-    for sentence in results.conclusions[name]:
-        assert f"<li>{html_escape(sentence)}</li>" in results._repr_html_()
+    for quantity in results.key_numbers["quantity"]:
+        assert f"<td>{quantity}</td>" in results._repr_html_()
     hostile = "<script>alert(1)</script>"
     (test,) = results.found.tests
-    found = replace(results.found, tests=(replace(test, title=hostile, sentences=(hostile,)),))
+    named = replace(test.result.findings[0], quantity=hostile)
+    bad = replace(test, name=hostile, problem=hostile, result=Result(key_numbers=(named,)))
+    found = replace(results.found, tests=(bad,))
     assert "<script" not in replace(results, found=found)._repr_html_()

@@ -26,7 +26,7 @@ from campaign.archive.writing.results_file import write_results
 from campaign.cli.report import report_run
 from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.estimate import Estimate
-from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.result import Finding, Result
 from tests.archives import PROTOCOL, simulated_run
 from tests.system.user import completed
 
@@ -283,9 +283,8 @@ def test_an_analysis_that_failed_is_a_problem_and_costs_no_other(run, monkeypatc
     assert found.findings.empty
 
 
-def test_conclusions_are_sentences_and_conditions_may_be_called_anything(run):
+def test_key_numbers_are_findings_and_conditions_may_be_called_anything(run):
     found = Estimate("error", 5e-4, "rad", 4e-4, 6e-4, 0.95)
-    said = Conclusion(("The error is ", Amount(found, "mrad"), "."))
     findings = (Finding.of(found, {"test": "mine", "value": 3.0}),)
     opened = campaign.open(run)
     from campaign.api.analysis import analyse_run
@@ -293,10 +292,10 @@ def test_conclusions_are_sentences_and_conditions_may_be_called_anything(run):
     from campaign.published.scoreboard import Scoreboard
 
     (test,) = analyse_run(opened.archive, experiments())
-    made = replace(test, result=Result(findings=findings, conclusions=(said,)))
+    made = replace(test, result=Result(findings=findings, key_numbers=findings))
     write_results(run, results_of(opened.archive, [made], Scoreboard()))
     results = opened.results
-    assert results.conclusions == {"stabilization": ("The error is 0.50 ± 0.10 mrad.",)}
+    assert results.key_numbers.equals(results.findings)
     (row,) = results.findings.to_dict("records")
     assert (row["test"], row["condition.test"], row["condition.value"]) == (
         "stabilization",

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from campaign import __version__
 from campaign.api.analysis import AnalysedTest, analyse_run, published_of, source_of, title_of
-from campaign.api.conclusion_sentences import sentence
 from campaign.api.damage_warnings import tell, warn
 from campaign.api.estimates import findings_table
 from campaign.api.plots import plot
@@ -52,14 +51,17 @@ class Results:
     archive: RunReader = field(repr=False)
 
     @property
-    def conclusions(self) -> dict[str, tuple[str, ...]]:
-        """By test, the sentences it comes to, the most important first."""
-        return {test.name: test.sentences for test in self.found.tests}
+    def key_numbers(self) -> pd.DataFrame:
+        """What each test was asked for, the most important first; columns as of `findings`."""
+        return self._numbers([(t.name, t.result.key_numbers) for t in self.found.tests])
 
     @property
     def findings(self) -> pd.DataFrame:
         """One row per number of any test (SI): `test`, then the columns of a test's `findings`."""
-        pairs = [(test.name, each) for test in self.found.tests for each in test.result.findings]
+        return self._numbers([(t.name, t.result.findings) for t in self.found.tests])
+
+    def _numbers(self, by_test: Sequence[tuple[str, Sequence[Finding]]]) -> pd.DataFrame:
+        pairs = [(name, each) for name, findings in by_test for each in findings]
         frame = findings_table(_beside_test([finding for _, finding in pairs]))
         frame.insert(0, "test", [name for name, _ in pairs])
         frame.attrs["damaged"] = list(self.found.damaged)
@@ -111,12 +113,14 @@ class Results:
         return f"<results of {self.found.run}: {tests}; {self.origin}>"
 
     def _repr_html_(self) -> str:
-        """In a notebook: what each test comes to, or why it has no result."""
+        """In a notebook: the key numbers, and which tests have no result."""
         parts = [f"<p><code>{escape(repr(self))}</code></p>"]
-        for test in self.found.tests:
-            told = (*test.sentences, *([f"No result: {test.problem}."] if test.problem else []))
-            items = "".join(f"<li>{escape(each)}</li>" for each in told)
-            parts.append(f"<h4>{escape(test.title)}</h4><ul>{items}</ul>")
+        numbers = self.key_numbers
+        if len(numbers):
+            shown = numbers[["test", "quantity", "value", "low", "high", "unit", "reason"]]
+            parts.append(shown.to_html(index=False))
+        for name, problem in self.problems.items():
+            parts.append(f"<p>{escape(name)}: no result: {escape(problem)}.</p>")
         return "".join(parts)
 
 
@@ -218,7 +222,6 @@ def _of_test(test: AnalysedTest) -> ResultsOfTest:
         test.kind,
         test.title,
         test.result,
-        tuple(map(sentence, test.result.conclusions)),
         test.problem,
         "campaign" if plug_in is None else plug_in.distribution,
         __version__ if plug_in is None else plug_in.version,

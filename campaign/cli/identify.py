@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from campaign.api.conclusion_sentences import of_unknown_size
+from campaign.api.estimate_text import of_unknown_size
 from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import axis_terms

@@ -207,18 +207,25 @@ def print_json(tree: Any) -> None:
 
 
 def print_table(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], *, spare: Sequence[str] = ()
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    spare: Sequence[str] = (),
+    beside: bool = False,
 ) -> None:
     """A table for people on a terminal, tab-separated lines for other programs.
 
     On a terminal no word is broken: columns that are `spare` are left out, the first of them first,
     until the others fit, and rows that fit in no way stand one cell below the other. What was left
     out is named in a line below.
+
+    beside: on standard error.
     """
-    out = console()
+    out = error_console() if beside else console()
     if not out.is_terminal:
         for row in (headings, *rows):
-            print_text("\t".join(_plain(" ".join(cell.split())) for cell in row) + "\n")
+            line = "\t".join(_plain(" ".join(cell.split())) for cell in row)
+            (sys.stderr if beside else _ours or sys.stdout).write(f"{line}\n")
         return
     columns = [[heading, *cells] for heading, *cells in _columns(headings, rows)]
     fitting = _fitting(out, columns, list(spare))

@@ -8,12 +8,13 @@ from __future__ import annotations
 import webbrowser
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from shlex import quote
 from typing import TYPE_CHECKING, cast
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.cli.output import print_note
+from campaign.cli.output import print_note, print_table
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
 from campaign.report.processes import (
@@ -26,6 +27,7 @@ from campaign.report.processes import (
 if TYPE_CHECKING:
     from campaign.archive.writing.results_file import PreparedResults
     from campaign.report.content.document import Document
+    from campaign.report.content.first_screen import FirstScreen
     from campaign.report.content.references import Files
     from campaign.report.drawing.figures import Column
 
@@ -108,6 +110,7 @@ def _page(
     finally:
         for each in written:
             each.discard()
+    _print_key_numbers(report.layout.document.opening)
     lacking = [test for test in report.layout.document.tests if test.lacks_result]
     codes = [say_damaged(path, report.damaged), *([ExitCode.NO_RESULT] if lacking else [])]
     for problem in (*report.problems, *report.left_out):
@@ -120,6 +123,17 @@ def _page(
     if open_it and not webbrowser.open(report.path.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
     return report.path, worst_exit_code(codes)
+
+
+def _print_key_numbers(opening: FirstScreen) -> None:
+    from campaign.report.formats.outline import key_numbers
+
+    for answer in opening.shown:
+        if answer.numbers:
+            where = f" ({answer.where})" if answer.where else ""
+            print_note(f"{answer.title}{where}", style="bold")
+            grid = key_numbers([replace(answer, where="")])
+            print_table(grid.headers, grid.rows, beside=True)
 
 
 def _published(results: PreparedResults) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import option_quantity, plain
 from campaign.archive import RunReader
-from campaign.comparison.quantity_words import option_quantity, plain
 from campaign.comparison.same_quantity import PairedTest, Pairing
 from campaign.physics.bench import Bench
 from campaign.physics.bench_knowledge import number_at

@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import display_unit
 from campaign.comparison.draws import SIMULATION
 from campaign.comparison.not_judged import DERIVED, FOLLOWS, doubt
-from campaign.comparison.quantity_words import display_unit
 from campaign.comparison.same_quantity import PairedTest
 from campaign.estimate import Origin
 from campaign.estimation.difference import BOUNDS

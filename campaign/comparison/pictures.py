@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from campaign.api.quantity_words import axis_quantity_name, condition_words
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.overlays import Letters
-from campaign.comparison.quantity_words import axis_quantity_name, condition_words
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
 from campaign.references.verdict import Verdict

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import axis_quantity_name, condition_words
 from campaign.comparison.circumstances import Change
 from campaign.comparison.draws import common_draws
 from campaign.comparison.finding_pairs import Pair
-from campaign.comparison.quantity_words import axis_quantity_name, condition_words
 from campaign.comparison.run_comparison import Against, size_of
 from campaign.estimate import Estimate
 from campaign.estimation.difference import BOUNDS, in_unit

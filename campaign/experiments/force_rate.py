@@ -9,7 +9,7 @@ et al. as Canudas de Wit et al. (1995) show it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,6 @@ from campaign.estimate import Estimate
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.estimation.sampled_curve import at_sample, bracketed, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
@@ -32,7 +31,6 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.shared.model_clauses import Rows, amount_of, at_ends, each_model
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import (
@@ -40,9 +38,7 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
-    Conclusion,
     Curve,
-    Factor,
     Figure,
     Finding,
     Panel,
@@ -178,8 +174,7 @@ def _analyse(data: TestData) -> Result:
         note="The breakaway torque is the largest friction torque before the load slides. "
         + OF_ONE,
     )
-    conclusions = force_rate_conclusions(listed, found, parts.Settings.of(data, ForceRateOptions))
-    return Result((table,), (_figure(rows),), findings, tuple(notes), conclusions)
+    return Result((table,), (_figure(rows),), findings, tuple(notes))
 
 
 def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
@@ -278,31 +273,6 @@ def _histories(
                 recording = item.recording()
                 applied = item.trial.task.disturbance.sample(recording.time)
                 yield title, Curve(applied, recording[FRICTION_TORQUE], label, series)
-
-
-def force_rate_conclusions(
-    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings
-) -> tuple[Conclusion, ...]:
-    """Breakaway torque on the slowest and on the fastest ramp, of each model."""
-
-    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
-        told = at_ends(own, ("torque_rate", "N m/s", ""), "breakaway")
-        slow, fast = (amount_of(row, "breakaway") for row in (own[0], own[-1]))
-        if slow is None or fast is None or slow is fast or len(own) < 2:
-            return told
-        ratio = parts.ratio_of(slow.estimate, fast.estimate)
-        return (
-            *told,
-            ", ",
-            Factor(ratio, above="less on the fastest", below="more on the fastest"),
-        )
-
-    return (
-        parts.conclusion(
-            "Breakaway torque by rate of the applied torque: ",
-            each_model(rows, places, settings, tell),
-        ),
-    )
 
 
 EXPERIMENT = Experiment(

@@ -8,7 +8,7 @@ faster the swing, the wider the loop (Figure 2.10).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,6 @@ from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, drop_interval_if_deterministic
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
@@ -31,7 +30,6 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.shared.model_clauses import Rows, at_ends, each_model, without_rounding
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
@@ -40,7 +38,6 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
-    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -255,8 +252,7 @@ def _analyse(data: TestData) -> Result:
         across=min(2, len(loops)),
         trials=trials_of(items[0] for place in found for items in place.by("frequency").values()),
     )
-    conclusions = friction_lag_conclusions(rows, found, parts.Settings.of(data, FrictionLagOptions))
-    return Result((table,), (figure,), findings, failures_note(data), conclusions)
+    return Result((table,), (figure,), findings, failures_note(data))
 
 
 def _what_shows(place: ConditionGroup, loops: list[Loop]) -> str:
@@ -314,22 +310,6 @@ def _series(loop: Loop) -> str:
 
 def _rates(display: str) -> Axis:
     return Axis("Rate", "rad/s", display)
-
-
-def friction_lag_conclusions(
-    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings
-) -> tuple[Conclusion, ...]:
-    """Width of the loops at the slowest and the fastest swing, of each model."""
-
-    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
-        return at_ends(own, ("frequency", "Hz", ""), "width")
-
-    return (
-        parts.conclusion(
-            "Friction while the rate rises, less that while it falls, at the mean rate: ",
-            each_model(without_rounding(rows, "width"), places, settings, tell),
-        ),
-    )
 
 
 EXPERIMENT = Experiment(

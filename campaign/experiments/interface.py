@@ -19,6 +19,7 @@ from campaign.experiments.post_processing.axis_units import (
     in_axis_units,
 )
 from campaign.experiments.post_processing.draws import draws_of, merged
+from campaign.experiments.post_processing.key_numbers import KeyQuantity, key_numbers
 from campaign.experiments.post_processing.recording_checks import (
     doubt,
     doubted,
@@ -215,6 +216,7 @@ class Experiment:
             stop, of the options and the bench of a point whose trials were made. What a test's
             points say alike is told once.
         model: how `campaign identify` uses its analysis.
+        key_numbers: which findings answer what a test asks, the most important first.
     """
 
     name: str
@@ -235,6 +237,7 @@ class Experiment:
     warnings: Callable[[Any, Bench], Iterable[str]] | None = None
     most_samples: int | None = None
     model: Model = NO_MODEL
+    key_numbers: tuple[KeyQuantity, ...] = ()
 
 
 EMPTY = Result()
@@ -264,7 +267,9 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
     of other kinds, which a model may suit, are those of other analyses, and not used.
     """
     with axis_terms(_sides(data)):
-        return in_axis_units(_result_of(experiment, data))
+        result = in_axis_units(_result_of(experiment, data))
+        chosen = key_numbers(result.findings, experiment.key_numbers)
+        return replace(result, key_numbers=chosen)
 
 
 def _sides(data: TestData) -> Sides:

@@ -13,12 +13,10 @@ from campaign.channels import RELATIVE_ANGLE
 from campaign.estimation.intervals import of_series, shifted_by
 from campaign.estimation.sampled_curve import shifted
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.common import failures_note
-from campaign.experiments.shared.model_clauses import MOST, Rows, amount_of, setting_of
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.result import Cell, Column, Conclusion, Result, Table
+from campaign.result import Cell, Column, Result, Table
 from campaign.signals import Polyline
 from campaign.trial import Role, Task, TrialRequest
 from campaign.units import Angle, AngularAcceleration, AngularRate, Frequency, Time
@@ -107,7 +105,7 @@ def _analyse(data: TestData) -> Result:
         thesis=(),
         note="The rate loop follows a rate; what friction holds back on the way, it does not undo.",
     )
-    return Result((table,), notes=notes, conclusions=move_conclusions(rows))
+    return Result((table,), notes=notes)
 
 
 def _row(data: TrialData) -> dict[str, Cell]:
@@ -127,28 +125,6 @@ def _row(data: TrialData) -> dict[str, Cell]:
             reached = shifted_by(reached, "resolution of the encoder", count / math.sqrt(12.0))
         row |= {"reached": reached, "deviation": shifted("deviation", reached, -target)}
     return row
-
-
-def move_conclusions(rows: Rows) -> tuple[Conclusion, ...]:
-    """How far each move ended from the end of its command."""
-    told = [
-        (setting_of(row, "target", "rad", "deg"), " was missed by ", off)
-        for row in rows
-        if (off := amount_of(row, "deviation", "deg"))
-    ]
-    if not told:
-        return (
-            parts.conclusion("Where the axis was moved to is not known: no angle was recorded"),
-        )
-    more = len(told) - MOST
-    left: tuple[parts.Parts, ...] = (
-        ((f"{parts.count(more, 'more move')} in the table",),) if more > 0 else ()
-    )
-    return (
-        parts.conclusion(
-            "The end of the command at ", parts.listed((*told[:MOST], *left), "; ", "; ")
-        ),
-    )
 
 
 EXPERIMENT = Experiment(

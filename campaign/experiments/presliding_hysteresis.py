@@ -18,12 +18,10 @@ from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared import default_ramps
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
-from campaign.experiments.shared.model_clauses import Rows, amount_of, at_ends, each_model
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -32,7 +30,6 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
-    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -222,9 +219,7 @@ def _analyse(data: TestData) -> Result:
         across=2,
         trials=trials_of(item for place in found for item in place.trials),
     )
-    settings = parts.Settings.of(data, PreslidingHysteresisOptions)
-    conclusions = hysteresis_conclusions(rows, found, settings, (display, energy))
-    return Result((table,), (figure,), findings, failures_note(data), conclusions)
+    return Result((table,), (figure,), findings, failures_note(data))
 
 
 def _what_shows(
@@ -284,30 +279,6 @@ def _amplitude(amplitude: float, display: str) -> str:
     if display == "urad":
         return f"± {amplitude * 1e6:.3g} µrad"
     return f"± {in_words(amplitude, 'rad', 'mrad')}"
-
-
-def hysteresis_conclusions(
-    rows: Rows, places: Sequence[ConditionGroup], settings: parts.Settings, units: tuple[str, str]
-) -> tuple[Conclusion, ...]:
-    """Energy and loss factor of the smallest and the largest loop, of each model.
-
-    units: of amplitude and energy, as they are shown.
-    """
-    amplitude, energy = units
-
-    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
-        along = ("amplitude", "rad", amplitude)
-        told = at_ends(own, along, "energy", energy)
-        factors = [a for r in (own[0], own[-1])[: len(own)] if (a := amount_of(r, "loss_factor"))]
-        words = "loss factor " if len(factors) == 1 else "loss factors "
-        return (*told, f" ({words}", *parts.listed([(each,) for each in factors]), ")")
-
-    return (
-        parts.conclusion(
-            "Energy lost in a cycle of displacement: ", each_model(rows, places, settings, tell)
-        ),
-        parts.conclusion("A spring has a loss factor of 0, dry sliding one of 4/π = 1.27"),
-    )
 
 
 EXPERIMENT = Experiment(

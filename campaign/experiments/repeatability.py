@@ -19,7 +19,6 @@ from campaign.estimation.scatter import relative_scatter
 from campaign.estimation.stribeck import PARAMETERS, SYMBOLS, UNITS
 from campaign.estimation.velocity_map import doubts
 from campaign.experiments.friction_map import default_options
-from campaign.experiments.friction_map.conclusions import repeatability_conclusions
 from campaign.experiments.friction_map.curves import fit_map
 from campaign.experiments.friction_map.points import measure, points_of, steady
 from campaign.experiments.friction_map.repeated_maps import (
@@ -38,6 +37,7 @@ from campaign.experiments.friction_map.runs import (
 )
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts
@@ -80,21 +80,11 @@ def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
         yield MapSet(name, where, fits, fits.estimates("free"))
 
 
-def relative_deviation(values: Sequence[float]) -> float:
-    """Standard deviation over mean, of these values and no others (n, not n - 1).
-
-    Table 4.4's deviations of Tc and vs follow with n from its own columns, and with n - 1 none.
-    NaN where the mean is zero.
-    """
-    mean = float(np.mean(values))
-    return float(np.std(values)) / mean if mean != 0.0 else math.nan
-
-
 def _analyse(data: TestData) -> Result:
     notes = [*failures_note(data), *settling_notes(item.trial for item in data.completed())]
     sets = list(_sets(data, notes))
     if not sets:
-        return Result(notes=tuple(notes), conclusions=repeatability_conclusions((), 0))
+        return Result(notes=tuple(notes))
     if len(sets) == 1:
         notes.append("One map says nothing about repeatability; repeat it, or sweep the day.")
     for each in sets:
@@ -107,9 +97,7 @@ def _analyse(data: TestData) -> Result:
         deviations = {name: _deviation(sets, name) for name in SCORED}
         figures.append(scatter_figure(sets, means, deviations, shown))
     findings = tuple(_findings(sets))
-    speeds = [float(str(item.trial.point["speed"])) for item in data.completed()]
-    conclusions = repeatability_conclusions(findings, len(sets), speeds)
-    return Result((_table(sets),), tuple(figures), findings, tuple(notes), conclusions)
+    return Result((_table(sets),), tuple(figures), findings, tuple(notes))
 
 
 def _by_map(sets: Sequence[MapSet], parameter: str) -> Array:
@@ -222,4 +210,11 @@ EXPERIMENT = Experiment(
     warnings=map_warnings,
     requires=REQUIRED,
     can_use=CAN_USE,
+    key_numbers=(
+        *(
+            key(name, statistic=statistic)
+            for statistic in ("mean", "relative standard deviation")
+            for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
+        ),
+    ),
 )

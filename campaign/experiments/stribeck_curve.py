@@ -8,7 +8,7 @@ sliding (Figure 2.9, Equation 4.6); what the measurement adds is that it does ge
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,6 @@ from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_series
 from campaign.estimation.sampled_curve import drop_interval_if_deterministic, largest
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
@@ -30,18 +29,15 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.shared.model_clauses import MOST, Rows, amount_of, each_model
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.reason import Cause
 from campaign.result import (
-    Amount,
     Array,
     Axis,
     Cell,
     Column,
-    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -220,13 +216,7 @@ def _analyse(data: TestData) -> Result:
         one_scale=True,
         trials=trials_of(item for place, _ in found for item in place.trials),
     )
-    conclusions = stribeck_conclusions(
-        rows,
-        [place for place, _ in found],
-        {place.label: each.known for (place, _), each in zip(found, findings, strict=True)},
-        parts.Settings.of(data, StribeckCurveOptions),
-    )
-    return Result((table,), (figure,), tuple(findings), failures_note(data), conclusions)
+    return Result((table,), (figure,), tuple(findings), failures_note(data))
 
 
 def _least(fine: Array, torque: Array) -> int | None:
@@ -316,46 +306,6 @@ def _signed(torque: Estimate, sign: float) -> Estimate:
     low = None if torque.high is None else -torque.high
     high = None if torque.low is None else -torque.low
     return replace(torque, value=-torque.value, low=low, high=high)
-
-
-def stribeck_conclusions(
-    rows: Rows,
-    places: Sequence[ConditionGroup],
-    deviations: Mapping[str, Estimate],
-    settings: parts.Settings,
-) -> tuple[Conclusion, ...]:
-    """Least and largest friction in the positive direction, and how far readings lie off the curve.
-
-    deviations: the largest, by the label of the place.
-    """
-
-    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
-        found = [
-            (torque, rate)
-            for row in own
-            if (torque := amount_of(row, "torque")) and (rate := amount_of(row, "rate", "deg/s"))
-            if parts.determined(torque.estimate) and rate.estimate.value > 0
-        ]
-        if not found:
-            return ("no reading in the positive direction has a torque",)
-        found.sort(key=lambda each: abs(each[0].estimate.value))
-        (least, slow), (most, fast) = found[0], found[-1]
-        return ("from ", least, " at ", slow, " to ", most, " at ", fast)
-
-    off: list[parts.Parts] = [
-        ((f"{label}: ", Amount(each, "percent")) if label else (Amount(each, "percent"),))
-        for label, each in list(deviations.items())[:MOST]
-    ]
-    return (
-        parts.conclusion(
-            "In the positive direction friction of steady sliding is ",
-            each_model(rows, places, settings, tell),
-        ),
-        parts.conclusion(
-            "In either direction the largest deviation from the model's own curve is ",
-            parts.listed(off, "; ", "; "),
-        ),
-    )
 
 
 EXPERIMENT = Experiment(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from campaign.channels import COMMAND
 from campaign.experiments.friction_map import default_options
-from campaign.experiments.friction_map.conclusions import map_conclusions
 from campaign.experiments.friction_map.figures import example_figure
 from campaign.experiments.friction_map.map_fit import stretches_found
 from campaign.experiments.friction_map.map_result import one_map
@@ -26,8 +25,8 @@ from campaign.experiments.friction_map.runs import (
 )
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared.common import failures_note, grouped
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.result import Result
 
 
@@ -40,15 +39,11 @@ def _analyse(data: TestData) -> Result:
     for number, group in enumerate(groups, start=1):
         parts.append(one_map(group, f"-{number}" if len(groups) > 1 else "")[0])
     findings = [finding for part in parts for finding in part.findings]
-    speeds = [float(str(item.trial.point["speed"])) for item in data.completed()]
     return Result(
         tuple(table for part in parts for table in part.tables),
         (*(figure for part in parts for figure in part.figures), *example_figure(data)),
         tuple(findings),
         (*notes, *(note for part in parts for note in part.notes)),
-        # Of maps with too few speeds for a curve each has its own.
-        tuple(each for part in parts for each in part.conclusions)
-        or map_conclusions(findings, speeds, Settings.of(data, PilotedMapOptions)),
     )
 
 
@@ -68,4 +63,11 @@ EXPERIMENT = Experiment(
     recorded=stretches_found,
     windows=tuple(DIRECTIONS),
     model=MODEL,
+    key_numbers=(
+        *(
+            key(name, direction=direction, exponent="free")
+            for direction in DIRECTIONS
+            for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
+        ),
+    ),
 )

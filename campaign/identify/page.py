@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from campaign import __version__
-from campaign.api.conclusion_sentences import remarks, sentence
+from campaign.api.estimate_text import remarks
 from campaign.api.estimates import row_of
 from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.identify.agreement import disagreements
@@ -122,8 +122,7 @@ def _found(
     for section, result in shown:
         for each in section.identified.warnings:
             yield Paragraph(f"{section.model.name}: {each.text}.", "warning")
-        yield from (Paragraph(sentence(each), "lead") for each in result.conclusions)
-        yield from (Paragraph(text, "note") for text in remarks(result.conclusions))
+        yield from (Paragraph(t, "note") for t in remarks(f.known for f in result.key_numbers))
     if shown:
         table = making.folder.shown_table(parameters_table(found.sections), (), "parameters")
         yield replace(table, stacked=True)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import axis_quantity_name, condition_words, display_unit
 from campaign.comparison.not_judged import DERIVED, FOLLOWS
-from campaign.comparison.quantity_words import axis_quantity_name, condition_words, display_unit
 from campaign.comparison.same_quantity import pair_tests
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.contrast import is_student

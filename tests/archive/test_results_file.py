@@ -33,12 +33,9 @@ from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
 from campaign.result import (
-    Amount,
     Axis,
     Column,
-    Conclusion,
     Curve,
-    Factor,
     Figure,
     Finding,
     Mark,
@@ -121,10 +118,9 @@ def results(**fields: object) -> RunResults:
         Finding.of(found, {"direction": "up", "speed": 1.0, "count": 3, "on": True, "no": None}),
         Finding("static_torque", math.nan, "N m", {"direction": "down"}),
     )
-    said = Conclusion(("Friction is ", Amount(found, "N m"), ", ", Factor(found, "less", "more")))
-    result = Result((table(),), (map_figure(),), findings, ("Beware.",), (said,), "the-map")
+    result = Result((table(),), (map_figure(),), findings, ("Beware.",), findings[:1], "the-map")
     tests = (
-        ResultsOfTest("map", "velocity_map", "A map", result, ("Friction is 5.",)),
+        ResultsOfTest("map", "velocity_map", "A map", result),
         ResultsOfTest("broken", "breakaway", "Broken", Result(), problem="it failed"),
     )
     found = RunResults(
@@ -180,7 +176,7 @@ def test_what_is_read_is_what_was_written_to_the_last_bit(run):
     assert list(again.tests[0].result.findings[0].conditions) == [
         "direction", "speed", "count", "on", "no",
     ]  # fmt: skip
-    assert isinstance(again.tests[0].result.conclusions[0].parts[3], Factor)
+    assert again.tests[0].result.key_numbers == again.tests[0].result.findings[:1]
     curve = again.tests[0].result.figures[0].panels[0].curves[1]
     np.testing.assert_array_equal(curve.x, [-3.0, -2.0, -1.0])  # of those that share an x
 

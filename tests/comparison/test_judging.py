@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import condition_words
 from campaign.comparison.finding_pairs import pairs_of
-from campaign.comparison.quantity_words import condition_words
 from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.tables import change_of
 from campaign.estimate import Estimate

@@ -485,14 +485,12 @@ def broke_away(samples: int) -> tuple[Any, ...]:
 def test_a_load_that_slid_too_fast_for_its_samples_is_not_said_to_have_stayed() -> None:
     result = analyse("breakaway", broke_away(3))
     assert any("too few for its torque; a higher sample_rate holds" in n for n in result.notes)
-    (only,) = result.conclusions
-    told = "".join(str(part) for part in only.parts)
-    assert told == "The load slid, and no recording shows at which torque it broke away."
+    assert result.key_numbers == ()
     short = execute(trials("breakaway", bench(), {**TWO, "peak_torque": "10 N m"}))
     stayed = analyse("breakaway", short)
     assert any("the rate never reached" in note for note in stayed.notes)
     assert not any("sample_rate" in note for note in stayed.notes)
-    assert "".join(map(str, stayed.conclusions[0].parts)) == "No ramp came to a breakaway torque."
+    assert stayed.key_numbers == ()
 
 
 def test_a_plan_tells_that_without_the_inertia_no_torque_will_be_told() -> None:

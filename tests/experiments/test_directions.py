@@ -147,4 +147,3 @@ def test_a_mode_of_a_raw_response_passes_the_gate(monkeypatch: pytest.MonkeyPatc
     best: Any = SimpleNamespace(source=None, margins=None)
     found = {each.estimate.name: each for each in frequency_response._parameters(masses, best)}
     assert found["resonance"].estimate.reason in TOO_WIDE
-    assert not list(frequency_response._conclusions(best, masses))

@@ -79,12 +79,6 @@ def rows(found: Result) -> Mapping[str, Mapping[str, Any]]:
     return {str(row["of"]): row for row in table.rows}
 
 
-def words(found: Result) -> str:
-    return " ".join(
-        part if isinstance(part, str) else "#" for each in found.conclusions for part in each.parts
-    )
-
-
 @pytest.mark.slow
 def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
     found = identified(AMPLITUDES[0])
@@ -101,7 +95,6 @@ def test_one_amplitude_tells_the_response_and_not_the_axis() -> None:
         assert whose["the response"][name].has_interval
         assert not holds(whose["the response"][name], truths()[name])
         assert not whose["the axis"][name].has_interval
-    assert "At this excitation the response is that of a drive" in words(found)
     assert any("Repeat it at half the amplitude" in note for note in found.notes)
 
 
@@ -121,7 +114,6 @@ def test_two_amplitudes_tell_the_axis() -> None:
     assert parameters["antiresonance"].bench == "appendage.frequency"
     # Friction damps the mode more than anything else does: nothing of that goes to the bench.
     assert parameters["antiresonance_damping"].bench == ""
-    assert "The drive resonates at" in words(found)
 
 
 # The rule, by numbers alone

@@ -119,7 +119,6 @@ def test_an_interface_that_slips_is_no_number() -> None:
     assert told
     assert not any(each.has_interval for each in told)
     assert all(each.reason for each in told)
-    assert "tells not all" in str(result.conclusions[0].parts[2])
 
 
 def test_the_assumed_damping_stands_beside_the_measured_one() -> None:

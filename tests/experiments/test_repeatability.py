@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimation.scatter import relative_scatter
 from campaign.experiments.friction_map.repeated_maps import scatter_figure
-from campaign.experiments.repeatability import DOUBTFUL, MapSet, relative_deviation
+from campaign.experiments.repeatability import DOUBTFUL, MapSet
 from campaign.experiments.repeatability import _deviation as deviation_of
 from campaign.experiments.repeatability import _mean as over_maps
 from tests.experiments.laboratory import MADE_UP, analyse, execute, finding, table, trials
@@ -36,11 +37,8 @@ FAST = {
 )
 def test_the_statistics_of_table_4_4(columns, mean: float, percent: float) -> None:
     assert np.mean(columns) == pytest.approx(mean, rel=2e-3)
-    assert round(100 * relative_deviation(columns), 1) == percent
-
-
-def test_a_parameter_that_is_zero_in_all_maps_has_no_relative_deviation() -> None:
-    assert np.isnan(relative_deviation([0.0] * 6))
+    deviation = relative_scatter("deviation", np.array(columns).reshape(3, 2)).value
+    assert round(100 * deviation, 1) == percent
 
 
 def sets_of(values: Sequence[float], **more: object) -> list[MapSet]:

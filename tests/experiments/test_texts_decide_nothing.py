@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.api.conclusion_sentences import sentence
 from campaign.estimate import Estimate
 from campaign.reason import Cause, Reason
 from campaign.result import Result
@@ -28,7 +27,7 @@ def without_text(given: Any) -> Any:
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Everything of a result, its reasons as codes but in sentences."""
+    """Everything of a result, its reasons as codes but in notes."""
     return {
         "findings": [
             (each.quantity, sorted(map(str, each.conditions.items())), without_text(each.known))
@@ -43,7 +42,8 @@ def numbers(result: Result) -> dict[str, Any]:
             for figure in result.figures
             for panel in figure.panels
         ],
-        "sentences": [*result.notes, *map(sentence, result.conclusions)],
+        "key numbers": [(e.quantity, without_text(e.known)) for e in result.key_numbers],
+        "notes": [*result.notes],
         "doubts": [(each.number, each.fatal, each.reason.code) for each in result.doubts],
     }
 
@@ -73,6 +73,6 @@ def test_codes_in_place_of_texts_change_no_number(
     monkeypatch.setattr(Cause, "__call__", by_text)
     usual = numbers(analyse(case.kind, items))
     for text in sorted(codes, key=len, reverse=True):  # a reason may be within another
-        usual["sentences"] = [each.replace(text, codes[text]) for each in usual["sentences"]]
+        usual["notes"] = [each.replace(text, codes[text]) for each in usual["notes"]]
     monkeypatch.setattr(Cause, "__call__", by_code)
     assert numbers(analyse(case.kind, items)) == usual

@@ -26,7 +26,7 @@ from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.resources import templates_folder
-from campaign.result import Amount, Conclusion
+from campaign.result import Finding
 from campaign.text import words
 from tests.estimation.coverage import holds
 from tests.estimation.rigs import Rig
@@ -68,9 +68,10 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
     first, *rest = section.identified.parameters
     doubt = Systematic("friction, at this excitation")
     doubted = replace(first, estimate=replace(first.estimate, systematic=(doubt,)))
-    said = Conclusion(("It has an inertia of ", Amount(doubted.estimate), "."))
     own = replace(section.identified, parameters=(doubted, *rest))
-    result = replace(section.result, conclusions=(said,), identified=own)
+    result = replace(
+        section.result, key_numbers=(Finding.of(doubted.estimate, {}),), identified=own
+    )
     told = replace(found, sections=(replace(section, result=result),))
     remark = "Of unknown size, and in no interval: friction, at this excitation."
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")

@@ -30,12 +30,11 @@ from campaign.report.formats.markdown import escaped, paragraph
 from campaign.report.formats.pdf import unfolded
 from campaign.report.latex_text import breakable, cell_numbers, column_head, latex
 from campaign.result import (
-    Amount,
     Axis,
     Column,
-    Conclusion,
     Curve,
     Figure,
+    Finding,
     Panel,
     Result,
     Table,
@@ -180,12 +179,12 @@ def test_markdown_s_tables_have_the_page_s_cells(folder: Path) -> None:
 
 
 def test_the_opening_says_in_markdown_what_it_says_on_the_page(made_up, tmp_path) -> None:
-    """The question, what is missing, remarks; a test without sentences stands there as well."""
+    """The question, what is missing, remarks; a test without numbers stands there as well."""
     run = made_up.made_up_run(tmp_path, tests={"stabilization": (), "velocity_map": ()})
 
     def says(data: TestData) -> Result:
         odd = Estimate.without_interval("rate", 1.0, "rad/s", Reason("test", "one recording only"))
-        return Result(conclusions=(Conclusion(("The rate was ", Amount(odd, "rad/s"), ".")),))
+        return Result(findings=(Finding.of(odd, {}),))
 
     kinds = {
         "stabilization": dataclasses.replace(made_up.EXPERIMENTS["stabilization"], analyse=says),

@@ -140,18 +140,18 @@ def test_what_the_report_says_is_the_verdict(results: Path):
         results,
         {
             "opening": {
-                "answers": [{"test": "x", "sentences": ["Of another test."]},
-                            {"test": "b", "figure": "late",
-                             "sentences": ["LuGre leaves a third.", "more"]}],
+                "answers": [{"test": "x", "numbers": [{"quantity": "of another test"}]},
+                            {"test": "b", "figure": "late", "numbers": [
+                                {"quantity": "error", "where": "LuGre", "value": "1.0 ± 0.1 mrad"},
+                                *[{"quantity": "more", "value": f"{n}"} for n in range(3)]]}],
                 "telling": ["b", "late"],
                 "compared": "7 of 8 values reproduced.",
             },
         },
     )  # fmt: skip
     page = shown(results)
-    assert "LuGre leaves a third. 7 of 8 values reproduced." in page.text
-    assert "Of another test." not in page.text
-    assert "more" not in page.text
+    assert "error, LuGre: 1.0 ± 0.1 mrad; more: 0; more: 1. 7 of 8 values reproduced." in page.text
+    assert "of another test" not in page.text
     assert [a["src"] for a in page.all("img")] == ["./sound-report/figures/b-late.svg"]
 
 
@@ -162,8 +162,8 @@ def test_what_the_report_says_is_the_verdict(results: Path):
         "[" * 100_000,
         [],
         {"opening": 7},
-        {"opening": {"answers": {"sentences": "x"}, "telling": "ab", "compared": ["x"]}},
-        {"opening": {"answers": [7, {"sentences": [7, None]}], "telling": [None, 3]}},
+        {"opening": {"answers": {"numbers": "x"}, "telling": "ab", "compared": ["x"]}},
+        {"opening": {"answers": [7, {"numbers": [7, None]}], "telling": [None, 3]}},
         {"opening": {"telling": ["../../..", "etc/passwd"]}},
     ],
 )
@@ -171,7 +171,7 @@ def test_a_report_that_says_nothing_usable_is_still_linked(results: Path, tree: 
     told(results, tree)
     found = summary_of_report(results / "sound-report")
     assert found.page is not None
-    assert (found.sentence, found.headline) == ("", "")
+    assert (found.numbers, found.headline) == ("", "")
     assert found.figure == results / "sound-report" / "figures" / "a-early.svg"
 
 

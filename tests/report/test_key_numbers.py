@@ -1,4 +1,4 @@
-"""Key numbers of the first screen: findings that sentences say, told apart by their conditions."""
+"""Key numbers of the first screen, told apart by their conditions."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from types import ModuleType
 import pytest
 
 from campaign.archive import RunReader
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Estimate
 from campaign.report.build import render
 from campaign.report.content.document import document_of
-from campaign.report.content.key_numbers import FEWEST, MOST, KeyNumber, KeyNumbers
-from campaign.result import Amount, Conclusion, Finding, Result, Value
+from campaign.report.content.first_screen import FEWEST, ROOM, Answer
+from campaign.report.content.key_numbers import KeyNumber
+from campaign.result import Finding, Value
 from tests.report.test_opening import experiments, figure, says
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
@@ -24,41 +25,28 @@ def found(name: str, value: float, unit: str = "N m", **conditions: Value) -> Fi
     return Finding.of(Estimate(name, value, unit, value - 0.1, value + 0.1, 0.95), conditions)
 
 
-def result(findings: Sequence[Finding], *said: Finding, **more: object) -> Result:
-    """One sentence says these findings, and a setting."""
-    setting = Amount(Estimate("setting", 1.0, "N m/s", origin=Origin.GIVEN))
-    parts = (setting, *(Amount(each.known) for each in said))
-    return Result(findings=tuple(findings), conclusions=(Conclusion(parts),), **more)
-
-
-def numbers(
-    made_up: ModuleType, folder: Path, tests: Mapping[str, Sequence[str]], **results: Result
-) -> tuple[KeyNumbers, ...]:
+def answers(
+    made_up: ModuleType,
+    folder: Path,
+    tests: Mapping[str, Sequence[str]],
+    **findings: Sequence[Finding],
+) -> tuple[Answer, ...]:
     run = made_up.made_up_run(folder, tests=tests)
-    kinds = {kind: lambda data, own=own: own for kind, own in results.items()}
-    return document_of(run, experiments(made_up, **kinds)).opening.key_numbers
+    kinds = {kind: says(*own) for kind, own in findings.items()}
+    return document_of(run, experiments(made_up, **kinds)).opening.shown
 
 
 def test_a_condition_that_is_no_option_has_its_unit(made_up: ModuleType, tmp_path: Path):
     one = found("stabilization_error", 1e-3, "rad", average_friction=33.0)
-    (own,) = numbers(made_up, tmp_path, {"breakaway": ()}, breakaway=result([one], one))
+    (own,) = answers(made_up, tmp_path, {"breakaway": ()}, breakaway=[one])
     assert own.numbers[0].where == "average friction 33 N·m"
 
 
-def test_a_setting_and_what_no_finding_is_are_no_key_numbers(made_up: ModuleType, tmp_path: Path):
+def test_a_number_has_its_interval_and_the_unit_of_its_test(made_up: ModuleType, tmp_path: Path):
     one = found("breakaway_torque", 31.4, direction="positive")
-    (own,) = numbers(
-        made_up,
-        tmp_path,
-        {"breakaway": ()},
-        breakaway=result([one], one, found("breakaway_torque", 12.0)),
-    )
-    assert own == KeyNumbers(
-        "breakaway",
-        "Breakaway",
-        "",
-        (KeyNumber("breakaway torque", "positive", "31.40 ± 0.10 N·m"),),
-    )
+    (own,) = answers(made_up, tmp_path, {"breakaway": ()}, breakaway=[one])
+    assert (own.test, own.title, own.where) == ("breakaway", "Breakaway", "")
+    assert own.numbers == (KeyNumber("breakaway torque", "positive", "31.40 ± 0.10 N·m"),)
 
 
 def test_what_all_of_a_test_share_is_said_once(made_up: ModuleType, tmp_path: Path):
@@ -66,38 +54,25 @@ def test_what_all_of_a_test_share_is_said_once(made_up: ModuleType, tmp_path: Pa
         found("breakaway_torque", 31.4 + k, direction=way, statistic="mean")
         for k, way in enumerate(("positive", "negative"))
     ]
-    (own,) = numbers(made_up, tmp_path, {"breakaway": ()}, breakaway=result(several, *several))
+    (own,) = answers(made_up, tmp_path, {"breakaway": ()}, breakaway=several)
     assert own.where == "mean"
     assert [each.where for each in own.numbers] == ["positive", "negative"]
 
 
-def test_of_two_findings_of_one_value_none_is_named(made_up: ModuleType, tmp_path: Path):
-    """Motor and gearbox broke away at the same torque: which of them a sentence says is unknown."""
-    motor, gearbox = (found("breakaway_torque", 4.5, component=c) for c in ("motor", "gearbox"))
-    load = found("breakaway_torque", 20.0, component="load")
-    (own,) = numbers(
-        made_up,
-        tmp_path,
-        {"breakaway": ()},
-        breakaway=result([motor, gearbox, load], gearbox, load),
-    )
-    assert [each.where for each in own.numbers] == ["load"]
-
-
 def test_the_first_screen_has_room_for_so_many(made_up: ModuleType, tmp_path: Path):
-    many = [found("breakaway_torque", 31.4 + k, measurement=k) for k in range(2 * MOST)]
+    many = [found("breakaway_torque", 31.4 + k, parameter=k) for k in range(2 * ROOM)]
     for folder in ("1", "6"):
         (tmp_path / folder).mkdir()
-    (own,) = numbers(made_up, tmp_path / "1", {"breakaway": ()}, breakaway=result(many, *many))
-    assert len(own.numbers) == MOST
+    (own,) = answers(made_up, tmp_path / "1", {"breakaway": ()}, breakaway=many)
+    assert len(own.numbers) == ROOM
     kinds = [f"kind_{k}" for k in range(6)]
-    several = numbers(
+    several = answers(
         made_up,
         tmp_path / "6",
         dict.fromkeys(kinds, ()),
-        **{kind: result(many, *many) for kind in kinds},
+        **dict.fromkeys(kinds, many),
     )
-    assert {len(each.numbers) for each in several} == {MOST // 6} != {FEWEST}
+    assert {len(each.numbers) for each in several} == {ROOM // 6} != {FEWEST}
 
 
 OWN = """
@@ -123,8 +98,8 @@ def test_published_values_stand_beside_and_a_mark_says_which_agree(
         for k, way in enumerate(("positive", "negative"))
     ]
     run = made_up.made_up_run(tmp_path, tests={"breakaway": ("1",)}, published=OWN)
-    kinds = experiments(made_up, breakaway=lambda data: result(ways, *ways))
-    (own,) = document_of(run, kinds).opening.key_numbers
+    kinds = experiments(made_up, breakaway=says(*ways))
+    (own,) = document_of(run, kinds).opening.shown
     assert [(n.published, n.agrees) for n in own.numbers] == [
         ("31.4 N·m", True),
         ("40 N·m", False),
@@ -133,7 +108,7 @@ def test_published_values_stand_beside_and_a_mark_says_which_agree(
 
 def test_true_values_of_a_simulated_bench_stand_beside(made_up: ModuleType, tmp_path: Path):
     ways = [found("coulomb_torque", 30.0, direction=way, exponent="free") for way in ("positive",)]
-    (own,) = numbers(made_up, tmp_path, {"velocity_map": ()}, velocity_map=result(ways, *ways))
+    (own,) = answers(made_up, tmp_path, {"velocity_map": ()}, velocity_map=ways)
     assert own.numbers[0].true == "30.235 N·m"
 
 

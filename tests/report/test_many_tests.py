@@ -18,7 +18,7 @@ from campaign.report.build import build_report
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import MANY, FirstScreen
 from campaign.report.formats import chosen_formats
-from campaign.result import Amount, Axis, Conclusion, Curve, Figure, Panel, Result
+from campaign.result import Axis, Curve, Figure, Finding, Panel, Result
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
 
@@ -33,27 +33,27 @@ REMARKED = {"measured_0": ONE_TRIAL, "measured_1": ONE_TRIAL, "measured_2": ONE_
 
 def number(
     name: str, half: float | None = None, *, given: bool = False, reason: Reason = NONE
-) -> Amount:
+) -> Finding:
     ends = (None, None) if half is None else (2.0 - half, 2.0 + half)
     origin = Origin.GIVEN if given else Origin.MEASURED
     reason = EXACT if half is None else reason
-    return Amount(Estimate(name, 2.0, "rad", *ends, 0.95, reason=reason, origin=origin))
+    told = Estimate(name, 2.0, "m", *ends, 0.95, reason=reason, origin=origin)
+    return Finding.of(told, {"parameter": name})
 
 
-SAID = {
+FOUND = {
     # Nothing is known of how far these are true: no interval, or one narrower than any digit.
-    **{f"exact_{n}": ((number("x"), number("x", 1e-9), number("x", 0.1, given=True)),) * 3
+    **{f"exact_{n}": (number("x"), number("y", 1e-9), number("z", 0.1, given=True))
        for n in range(3)},
-    **{f"measured_{n}": ((number("x", 0.1, reason=REMARKED.get(f"measured_{n}", NONE)),),
-                         (number("y"),)) for n in range(MANY - 1)},
-    "tells_late": ((number("x"),), (number("x", 0.1), number("y", 0.1))),
-    "tells_first": ((number("x", 0.1),), (number("y"),)),
+    **{f"measured_{n}": (number("x", 0.1, reason=REMARKED.get(f"measured_{n}", NONE)),)
+       for n in range(MANY - 1)},
+    "tells_little": (number("x"), number("y", 0.1)),
+    "tells_more": (number("x", 0.1), number("y", 0.1)),
 }  # fmt: skip
 
 
 def analyse(data: TestData) -> Result:
     name = data.name.replace("-", "_")
-    said = enumerate(SAID[name], start=1)
     x = np.arange(5.0)
     ends = {"low": x - 1, "high": x + 1} if name.startswith("exact") else {}
     axis, curve = Axis("Rate", "rad/s"), Curve(x, x, "measured", "measured", "points", **ends)
@@ -61,18 +61,16 @@ def analyse(data: TestData) -> Result:
         figures=(
             Figure("a", f"Figure {name}", "A caption.", "A line.", (Panel(axis, axis, [curve]),)),
         ),
-        conclusions=tuple(
-            Conclusion((f"Sentence {place} of {name}: ", *parts, ".")) for place, parts in said
-        ),
+        findings=FOUND[name],
     )
 
 
 @pytest.fixture(scope="module")
 def run(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> RunReader:
     """Of a kind each, but for the last two, which are of one."""
-    made = made_up.made_up_run(tmp_path_factory.mktemp("many"), tests=dict.fromkeys(SAID, ()))
+    made = made_up.made_up_run(tmp_path_factory.mktemp("many"), tests=dict.fromkeys(FOUND, ()))
     *others, last = made.header.tests
-    header = made.header.model_copy(update={"tests": (*others, {**last, "kind": "tells_late"})})
+    header = made.header.model_copy(update={"tests": (*others, {**last, "kind": "tells_little"})})
     return replace(made, header=header)
 
 
@@ -80,7 +78,7 @@ def run(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> RunRea
 def kinds(made_up: ModuleType) -> dict[str, Experiment]:
     return {
         kind: Experiment(kind, kind, made_up.ShakeOptions, lambda options, bench: (), analyse)
-        for kind in SAID
+        for kind in FOUND
     }
 
 
@@ -91,42 +89,42 @@ def opening(run: RunReader, kinds: dict[str, Experiment]) -> FirstScreen:
 
 def test_what_has_an_interval_stands_on_top_one_test_of_a_kind(opening: FirstScreen) -> None:
     measured = [f"measured-{n}" for n in range(MANY - 1)]
-    assert list(opening.main) == [*measured, "tells-first"], "which says it in its first sentence"
-    assert [each.test for each in opening.in_short.answers] == list(opening.main)
+    assert list(opening.main) == [*measured, "tells-more"], "of one kind the one that tells more"
+    assert [each.test for each in opening.shown] == list(opening.main)
 
 
 def test_the_figure_on_top_is_of_a_test_that_stands_there(opening: FirstScreen) -> None:
     """Though others draw intervals, and these do not."""
-    assert opening.telling == ("measured-0", "a")
+    assert opening.telling == ("tells-more", "a")
 
 
 def test_few_tests_stand_there_all(
     made_up: ModuleType, tmp_path: Path, kinds: dict[str, Experiment]
 ) -> None:
-    few = made_up.made_up_run(tmp_path, tests=dict.fromkeys(list(SAID)[:MANY], ()))
+    few = made_up.made_up_run(tmp_path, tests=dict.fromkeys(list(FOUND)[:MANY], ()))
     assert document_of(few, kinds).opening.main == ()
 
 
-def test_the_page_opens_with_a_sentence_of_each_and_each_test_says_all_of_its_own(
+def test_the_page_opens_with_the_main_tests_and_each_test_has_all_of_its_own(
     made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
 ) -> None:
-    """Of tests whose sentences say no finding; findings are key numbers."""
     report = build_report(
         run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
     )
     html = report.path.read_text(encoding="utf-8")
     top, below = html.split('<section id="opening"')[1].split("</section>", 1)
-    for name in SAID:
-        assert below.count(f"Sentence 1 of {name}:") == below.count(f"Sentence 2 of {name}:") == 1
-        on_top = name in ("tells_first", *(f"measured_{n}" for n in range(MANY - 1)))
-        assert (f"Sentence 1 of {name}:" in top) == on_top
-        assert f"Sentence 2 of {name}:" not in top
+    on_top = ("tells_more", *(f"measured_{n}" for n in range(MANY - 1)))
+    assert top.count('<th scope="row">') == sum(len(FOUND[name]) for name in on_top)
+    sections = re.findall(r'<section id="[^"]*" class="test">.*?</section>', below, re.DOTALL)
+    for name, section in zip(FOUND, sections, strict=True):
+        numbers = section.split('class="key-numbers"')[1].split("</table>")[0]
+        assert numbers.count('<th scope="row">') == len(FOUND[name])
 
 
 def test_what_is_not_in_an_interval_on_top_is_told_there(
     made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
 ) -> None:
-    """A remark of one below its sentence, one of several once below all, and of which."""
+    """Each remark once, with the tests that it is of."""
     report = build_report(
         run,
         tmp_path / "out",
@@ -139,13 +137,8 @@ def test_what_is_not_in_an_interval_on_top_is_told_there(
         top = text[text.index("What was found") :]
         top = re.split(r"</section>|\n## |\\(?:sub)*section", top)[0]
         assert top.count(f"{str(ONE_TRIAL)[1:]}.") == 1
-        assert ": The interval is of that one trial." in top
         assert top.count(f"{str(ONE_DAY)[1:]}.") == 1
-        places = [
-            top.index(said) for said in ("Sentence 1 of", str(ONE_DAY)[1:], str(ONE_TRIAL)[1:])
-        ]
-        assert places == sorted(places)
-        assert str(EXACT) not in top, "of the second sentences, which are not there"
+        assert str(EXACT) not in top, "of tests that are not there"
         assert top.count("and brackets behind a number") == 1
 
 

@@ -25,20 +25,17 @@ from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import FirstScreen
 from campaign.report.content.run_problems import without_trials
 from campaign.result import (
-    Amount,
     Axis,
-    Conclusion,
+    Column,
     Curve,
-    Factor,
     Figure,
     Finding,
     Panel,
     Result,
+    Table,
 )
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
-
-DIFFERENCE = re.compile(r"\b(less|more|better|worse)\b")
 
 
 def estimate(value: float, low: float | None = None, high: float | None = None) -> Estimate:
@@ -46,13 +43,12 @@ def estimate(value: float, low: float | None = None, high: float | None = None) 
     return Estimate("error", value, "rad", low, high, 0.95, reason=reason)
 
 
-def says(*conclusions: Conclusion, **more: object) -> Callable[[TestData], Result]:
-    return lambda data: Result(conclusions=conclusions, **more)
+def says(*findings: Finding, **more: object) -> Callable[[TestData], Result]:
+    return lambda data: Result(findings=findings, **more)
 
 
-def ratio(value: float, low: float, high: float) -> Conclusion:
-    factor = Factor(Estimate("r", value, "", low, high, 0.95), above="less", below="more")
-    return Conclusion(("LuGre leaves ", Amount(estimate(2e-4), "mrad"), ", ", factor, "."))
+def ratio(value: float, low: float | None, high: float | None) -> Finding:
+    return Finding.of(Estimate("error_reduction", value, "", low, high, 0.95), {})
 
 
 def figure(key: str, *, interval: bool = False) -> Figure:
@@ -79,7 +75,12 @@ def opening(made_up: ModuleType, folder: Path, /, *, run: RunReader | None = Non
 def spoken(found: FirstScreen) -> str:
     said = [found.asked, *found.wrong, found.compared]
     for answer in found.answers:
-        said += [*answer.sentences, *answer.remarks, answer.truth, answer.problem]
+        said += [
+            *(each.value for each in answer.numbers),
+            *answer.remarks,
+            answer.truth,
+            answer.problem,
+        ]
     return "\n".join(said)
 
 
@@ -90,33 +91,22 @@ def completed(run: RunReader) -> RunReader:
 
 def test_a_run_as_planned_says_what_was_asked_and_found(made_up: ModuleType, tmp_path: Path):
     run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
-    found = opening(made_up, tmp_path, run=run, stabilization=says(ratio(2.9, 2.7, 3.1)))
+    alone = Finding.of(estimate(2e-4), {})
+    found = opening(made_up, tmp_path, run=run, stabilization=says(ratio(2.9, 2.7, 3.1), alone))
     assert found.asked == "What was asked: 1 test of 4 trials on the bench simulink, simulated."
     assert found.wrong == ()
     assert found.compared == ""
     (answer,) = found.answers
-    assert answer.sentences == ("LuGre leaves 0.2 mrad, 2.9 times less (2.7 to 3.1).",)
+    assert [each.value for each in answer.numbers] == ["2.90 ± 0.20", "0.01146 °"]
     assert answer.remarks == ("Without an interval: a single value.",)
     assert (answer.title, answer.problem) == ("Stabilization", "")
-
-
-def test_a_method_that_makes_it_worse_is_told_so(made_up: ModuleType, tmp_path: Path):
-    found = opening(made_up, tmp_path, stabilization=says(ratio(0.8, 0.76, 0.84)))
-    assert found.answers[0].sentences == ("LuGre leaves 0.2 mrad, 1.25 times more (1.19 to 1.32).",)
-
-
-def test_no_difference_is_claimed_where_the_interval_holds_none(
-    made_up: ModuleType, tmp_path: Path
-):
-    found = opening(made_up, tmp_path, stabilization=says(ratio(1.4, 0.9, 2.2)))
-    assert not DIFFERENCE.search(" ".join(found.answers[0].sentences))
 
 
 def test_a_run_that_found_nothing_says_why(made_up: ModuleType, tmp_path: Path):
     note = "No reading has both a rate and a torque: friction in motion is not determined."
     run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
     found = opening(made_up, tmp_path, run=run, stabilization=lambda data: Result(notes=(note,)))
-    assert found.answers[0].sentences == ()
+    assert found.answers[0].numbers == ()
     assert found.answers[0].problem == note.rstrip(".")
     assert found.telling is None
 
@@ -125,17 +115,15 @@ def test_a_number_that_was_not_determined_is_none(made_up: ModuleType, tmp_path:
     open_ = Estimate(
         "e", math.nan, "rad", reason=Reason("test", "lost"), origin=Origin.NOT_DETERMINED
     )
-    said = Conclusion(("The error is ", Amount(open_, "mrad"), "."))
-    found = opening(made_up, tmp_path, stabilization=says(said))
-    assert found.answers[0].sentences == ("The error is not determined (lost).",)
+    found = opening(made_up, tmp_path, stabilization=says(Finding.of(open_, {})))
+    assert [each.value for each in found.answers[0].numbers] == ["not determined (lost)"]
 
 
-def test_an_analysis_without_sentences_is_no_failure(made_up: ModuleType, tmp_path: Path):
-    """What a plug-in that is older than sentences gives."""
+def test_an_analysis_with_tables_alone_is_no_failure(made_up: ModuleType, tmp_path: Path):
     run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
-    plain = Result(findings=(Finding("gain", 2.0, "dB", {}),))
+    plain = Result(tables=(Table("t", "T", (Column("a", "A", exact=True),), ({"a": 1},)),))
     found = opening(made_up, tmp_path, run=run, stabilization=lambda data: plain)
-    assert "no sentence" in found.answers[0].problem
+    assert "no key number" in found.answers[0].problem
     assert found.wrong == ()
 
 
@@ -318,7 +306,7 @@ def test_an_analysis_that_failed_is_named_and_costs_nobody_else(
         breakaway=made_up.broken,
     )
     assert found.wrong == ("No result of 1 of 2 tests: Breakaway.",)
-    assert found.answers[0].sentences
+    assert found.answers[0].numbers
     assert "no recording reached breakaway" in found.answers[1].problem
 
 
@@ -377,7 +365,7 @@ def test_a_run_without_published_values_has_no_scoreboard(
     assert "ublished" not in _section(html)
     assert "tables/scoreboard.csv" not in folder.files
     assert "on the bench ours, simulated" in _section(html)
-    assert "2.9 times less" in _section(html)
+    assert "2.90 ±\u00a00.20" in _section(html)
 
 
 def test_a_title_that_speaks_of_hardware_says_that_it_was_simulated(
@@ -424,10 +412,10 @@ def test_the_telling_figure_stands_on_top_and_nowhere_else(made_up: ModuleType, 
 @pytest.mark.parametrize(
     ("one", "other", "expected"),
     [
-        # Intervals go first, then what the data decide, then the protocol's order.
+        # Intervals go first, then how many numbers have one, then the protocol's order.
         ({"interval": False}, {"interval": True}, "velocity-map"),
         ({"interval": True}, {"interval": True}, "stabilization"),
-        ({"interval": True}, {"interval": True, "ratios": [(1.4, 0.9, 2.2)]}, "stabilization"),
+        ({"interval": True}, {"interval": True, "ratios": [(1.4, None, None)]}, "stabilization"),
         ({"interval": True}, {"interval": True, "ratios": [(2.9, 2.7, 3.1)]}, "velocity-map"),
         ({"interval": True}, {"interval": False, "ratios": [(2.9, 2.7, 3.1)]}, "stabilization"),
     ],
@@ -479,7 +467,9 @@ def test_hostile_text_is_only_text(made_up: ModuleType, tmp_path: Path):
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ()})
     bad = Ending(Outcome.LIMIT, hostile)
     run = replace(run, trials=tuple(replace(each, ending=bad) for each in run.trials))
-    kinds = experiments(made_up, stabilization=says(Conclusion((hostile,))))
+    kinds = experiments(
+        made_up, stabilization=says(Finding.of(Estimate(hostile, 1.0, "rad", 0.9, 1.1, 0.95), {}))
+    )
     report = build_report(
         run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
     )

@@ -172,7 +172,7 @@ def test_everything_seen_is_also_said(page: Page) -> None:
     plots = [a for a in page.all("svg") if a.get("role") == "img"]
     assert len(plots) == len(page.all("svg")) == len(page.all("figure")) == 4
     assert page.all("th")
-    assert all(a.get("scope") in ("col", "row") for a in page.all("th"))
+    assert all(a.get("scope") in ("col", "row", "rowgroup") for a in page.all("th"))
     assert page.all("html")[0]["lang"] == "en"
     assert len(page.all("h1")) == 1
 

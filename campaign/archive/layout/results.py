@@ -27,7 +27,6 @@ class ResultsOfTest:
     """What the analysis of one test found.
 
     Attributes:
-        sentences: its conclusions, in words.
         problem: why there is no result, in one line; empty when there is one.
         program, version: what analysed it: of an installed experiment its distribution.
     """
@@ -36,7 +35,6 @@ class ResultsOfTest:
     kind: str
     title: str
     result: Result
-    sentences: tuple[str, ...] = ()
     problem: str = ""
     program: str = "campaign"
     version: str = ""

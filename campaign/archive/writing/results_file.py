@@ -179,11 +179,14 @@ class _Writer:
         for field in ("name", "kind", "title", "problem"):
             hdf5.put_text(told, field, getattr(test, field))
         result = test.result
-        for note, sentences in (("conclusions", test.sentences), ("notes", result.notes)):
-            if sentences:
-                _note(process, note, "text/plain", "\n".join(sentences))
-        if result.findings:
-            put_findings(process, "findings", result.findings)
+        if result.notes:
+            _note(process, "notes", "text/plain", "\n".join(result.notes))
+        for told, findings in (
+            ("key_numbers", result.key_numbers),
+            ("findings", result.findings),
+        ):
+            if findings:
+                put_findings(process, told, findings)
         figures = {
             figure.key: next(iter(shown), "")
             for figure, key in zip(

@@ -34,7 +34,7 @@ from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systema
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen, is_value
 from campaign.reason import Cause
-from campaign.result import Amount, Conclusion, Finding, Result, Table
+from campaign.result import Finding, Result, Table
 from campaign.text import words
 from campaign.units import AngularRate, Frequency, Time
 
@@ -112,7 +112,6 @@ def identify(data: TestData, options: InverseDynamicsOptions) -> Result:
         figures=tuple(figures(found)),
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
         notes=tuple(_notes(found, data)),
-        conclusions=tuple(_conclusions(found, parameters)),
         identified=IdentifiedRig(
             parameters,
             correlations=_correlations(found),
@@ -264,26 +263,6 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
         )
     if len(data.trials) > 1:
         yield f"{len(data.trials)} trials were fitted together."
-
-
-def _conclusions(found: InverseDynamics, parameters: tuple[Parameter, ...]) -> Iterator[Conclusion]:
-    by_name = {each.estimate.name: each.estimate for each in parameters}
-    if "inertia" in by_name and not math.isnan(by_name["inertia"].value):
-        parts: list[str | Amount] = ["The inertia is ", Amount(by_name["inertia"], "kg m^2")]
-        if (late := by_name.get("delay")) is not None and found.best.delay != 0.0:
-            low, high = late.combined
-            surely = low is None or high is None or low > 0 or high < 0
-            tail = " later than it is recorded"
-            tail += "" if surely else ", or not at all later: its interval holds zero"
-            parts += [", and the force acts ", Amount(late, "ms"), tail]
-        yield Conclusion((*parts, "."))
-    best = found.best
-    if best.validation is not None:
-        parts = ["The model leaves ", Amount(best.validation, "percent"), " of an unseen torque"]
-        if best.gain is not None and best.gain.value != 0.0:
-            without = " of it than without delay and further terms"
-            parts += [", lower by ", Amount(best.gain, "percent"), without]
-        yield Conclusion((*parts, "."))
 
 
 def _correlations(found: InverseDynamics) -> dict[tuple[str, str], float]:

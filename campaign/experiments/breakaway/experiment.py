@@ -27,17 +27,16 @@ from campaign.estimation.relative_rate import (
     slides_from,
     stop_rate,
 )
-from campaign.experiments.breakaway.conclusions import breakaway_conclusions
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
 from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
-from campaign.experiments.breakaway.parameters import conclusions_of, parameters_of
+from campaign.experiments.breakaway.parameters import parameters_of
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_ramps
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
@@ -354,10 +353,6 @@ def _analyse(data: TestData) -> Result:
         figures += _figures(ramps, means, suffix)
         findings += findings_of(ramps, means)
         notes += remarks(ramps)
-    rates = [_options(item.trial).torque_rate for item in data.completed()]
-    known = any(bench_of(item.trial).axis.inertia is not None for item in data.completed())
-    slid = not findings and any(_slid(item) for item in data.completed())
-    settings = Settings.of(data, BreakawayOptions)
     asked = data.model is not None
     parameters = tuple(parameters_of(groups, curve_of, notes)) if asked else ()
     return Result(
@@ -365,12 +360,6 @@ def _analyse(data: TestData) -> Result:
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        (
-            *breakaway_conclusions(
-                findings, rates, settings, inertia_known=known or not rates, slid=slid
-            ),
-            *conclusions_of(parameters),
-        ),
         identified=IdentifiedRig(parameters),
     )
 
@@ -437,5 +426,10 @@ EXPERIMENT = Experiment(
         name="ramps",
         summary="breakaway torque, stiffness of the interface that slips last, and what the others "
         "carry, from ramps",
+    ),
+    key_numbers=(
+        key("breakaway_torque", statistic="mean"),
+        key("bristle_stiffness", statistic="mean"),
+        key("stiffness_at_rest", statistic="mean"),
     ),
 )

@@ -15,7 +15,6 @@ from campaign.estimation.presliding import Presliding
 from campaign.experiments.breakaway.means import CAUSES, Ramps, means_of
 from campaign.experiments.interface import TrialData
 from campaign.parameter import Parameter
-from campaign.result import Amount, Conclusion
 
 BREAKAWAY, STRONGEST = "breakaway_torque", "strongest_stiffness"
 WEAKER = "weaker_share"
@@ -78,18 +77,3 @@ def _weaker_shares(
             notes.append(f"{item.trial.label} shows no interfaces: {error}.")
             continue
         yield sum(torques[1:]) / sum(torques)
-
-
-def conclusions_of(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
-    """Of interfaces that slip before the strongest."""
-    told = {each.estimate.name: each.estimate for each in parameters}
-    if STRONGEST in told and WEAKER in told:
-        yield Conclusion(
-            (
-                "On ramps the interface that carries most has a stiffness of ",
-                Amount(told[STRONGEST]),
-                "; others, which carry ",
-                Amount(told[WEAKER], "percent"),
-                " of the torque, have slipped before.",
-            )
-        )

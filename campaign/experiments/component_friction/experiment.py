@@ -25,10 +25,10 @@ from campaign.estimation.readings import (
     mean_of_readings,
 )
 from campaign.estimation.relative_rate import STOP_FACTOR
-from campaign.experiments.component_friction.conclusions import component_conclusions
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
 from campaign.experiments.component_friction.sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.options import Options
@@ -218,7 +218,6 @@ def _analyse(data: TestData) -> Result:
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        component_conclusions(findings, [_options(each).torque_rate for each in data.completed()]),
     )
 
 
@@ -347,4 +346,9 @@ EXPERIMENT = Experiment(
         DRIVE_TORQUE: "the torque at which the component turns",
         GYRO_RATE: "the moment at which it turns",
     },
+    key_numbers=(
+        key("breakaway_torque", statistic="mean"),
+        key("breakaway_torque", statistic="standard deviation"),
+        key("load_share"),
+    ),
 )

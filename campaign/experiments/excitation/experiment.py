@@ -8,7 +8,7 @@ one's own are for whatever else is to be identified (`campaign identify`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -18,7 +18,6 @@ from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.experiments.any_motion.inverse_result import InverseDynamicsOptions, identify
 from campaign.experiments.excitation.account import metrics_of, options_of
 from campaign.experiments.excitation.commands import courses, start_of
-from campaign.experiments.excitation.conclusions import dynamics_conclusion, response_conclusion
 from campaign.experiments.excitation.figures import command_figure, plane_figure
 from campaign.experiments.excitation.options import ExcitationOptions
 from campaign.experiments.excitation.tables import reached_tables
@@ -34,8 +33,7 @@ from campaign.experiments.responses.figures import coherence_figure, response_fi
 from campaign.experiments.responses.signals import usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
-from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
-from campaign.experiments.shared.conclusion_parts import Parts, Settings, conclusion, shared
+from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.experiments.shared.default_options import NO_ROOM, PEAK, usual
 from campaign.experiments.shared.rig import MOST, Rig
 from campaign.experiments.shared.rounded_choices import Choices, share
@@ -153,32 +151,26 @@ def _analyse(data: TestData) -> Result:
     known = [item for item, _ in accounts]
     if not known:
         return Result(notes=tuple(notes))
-    settings, several = Settings.of(data, ExcitationOptions), swept(data, OWN)
-
-    def told(place: Place) -> Parts:
-        return settings.place({name: value for name, value in place.items() if name in several})
-
     groups = list(grouped(known, OWN).values())
     suffixes = [f"-{number}" for number in range(1, len(groups) + 1)] if len(groups) > 1 else [""]
     results = [
         Result(figures=tuple(map(command_figure, groups, suffixes))),
-        _responses([each for each in known if options_of(each.trial).signal != "fourier"], told),
+        _responses([each for each in known if options_of(each.trial).signal != "fourier"]),
     ]
     for group, suffix in zip(groups, suffixes, strict=True):
         if options_of(group[0].trial).signal == "fourier":
-            results.append(_of_series(data, group, suffix, told(conditions(group[0]))))
+            results.append(_of_series(data, group, suffix))
     tables = [*reached_tables(accounts), *(t for each in results for t in each.tables)]
     return Result(
         tuple(tables),
         tuple(figure for each in results for figure in each.figures),
         tuple(finding for each in results for finding in each.findings),
         tuple(dict.fromkeys([*notes, *(note for each in results for note in each.notes)])),
-        tuple(each for result in results for each in result.conclusions),
         telling=next((f.key for each in results[1:] for f in each.figures), ""),
     )
 
 
-def _responses(trials: Sequence[TrialData], told: Callable[[Place], Parts]) -> Result:
+def _responses(trials: Sequence[TrialData]) -> Result:
     """Of all that shakes, as `campaign identify` has them without options."""
     if not trials:
         return Result()
@@ -187,27 +179,28 @@ def _responses(trials: Sequence[TrialData], told: Callable[[Place], Parts]) -> R
         return Result(notes=(f"{why}.",))
     found, remarks = sources(own, bench_of(own[0].trial), READING)
     if not found:
-        said = tuple(conclusion(each.removesuffix(".")) for each in remarks)
-        return Result(notes=tuple(remarks), conclusions=said)
+        return Result(notes=tuple(remarks))
     found.sort(key=lambda each: each.trials)
     by_number = {each.trial.number: conditions(each) for each in own}
-    findings, conclusions = [], []
+    findings: list[Finding] = []
     for source in found:
-        place = shared([by_number[number] for number in source.trials])
-        place = {name: value for name, value in place.items() if name not in OWN}
+        first, *others = (by_number[number] for number in source.trials)
+        place = {
+            name: value
+            for name, value in first.items()
+            if name not in OWN and all(other.get(name) == value for other in others)
+        }
         findings += [Finding.of(each, place) for each in distortion_of(source)]
-        conclusions.append(response_conclusion(source, told(place)))
         remarks += source.remarks
     return Result(
         (sources_table(found), *distortion_tables(found)),
         (*response_figures(found), coherence_figure(found)),
         tuple(findings),
         tuple(remarks),
-        tuple(conclusions),
     )
 
 
-def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Parts) -> Result:
+def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
     """Inverse dynamics of one place of the sweep, with the terms that the series is made for."""
     options = options_of(group[0].trial)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
@@ -215,10 +208,8 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Pa
     try:
         found = identify(replace(data, trials=tuple(group)), asked)
     except ValueError as error:
-        text = f"{group[0].trial.label}: {error}"
-        return Result(notes=(f"{text}.",), conclusions=(conclusion(text),))
+        return Result(notes=(f"{group[0].trial.label}: {error}.",))
     findings = tuple(replace(each, conditions=place) for each in found.findings)
-    terms = [each for each in findings if each.quantity in options.terms]
     return Result(
         tuple(replace(each, key=f"{each.key}{suffix}") for each in found.tables),
         (
@@ -227,7 +218,6 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str, told: Pa
         ),
         findings,
         found.notes,
-        (dynamics_conclusion(terms, told, options.period),),
     )
 
 

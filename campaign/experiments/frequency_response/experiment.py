@@ -23,10 +23,6 @@ from campaign.estimation.refinement import MOST as MOST_REFINED
 from campaign.estimation.refinement import PHASE_SHARE, refinement
 from campaign.estimation.servo import characteristics
 from campaign.estimation.sine_point import SinePoint, sine_point
-from campaign.experiments.frequency_response.conclusions import (
-    closed_loop_conclusions,
-    open_loop_conclusions,
-)
 from campaign.experiments.frequency_response.figures import (
     closed_loop_figures,
     torque_figure,
@@ -45,7 +41,6 @@ from campaign.experiments.frequency_response.tables import (
     closed_notes,
     closed_tables,
     falling_amplitude,
-    is_extrapolated,
     method,
     modes,
     quality_note,
@@ -58,6 +53,7 @@ from campaign.experiments.interface import (
     bench_of,
     metrics,
 )
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,
@@ -66,7 +62,6 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.detected_trials import sine_response
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
@@ -74,7 +69,7 @@ from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate
 from campaign.reason import Cause
-from campaign.result import Conclusion, Figure, Finding, Result, Table
+from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Sine
 from campaign.trial import NONE_MORE, Most, OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import (
@@ -321,7 +316,6 @@ def _analyse(data: TestData) -> Result:
     tables: list[Table] = []
     figures: list[Figure] = []
     findings: list[Finding] = []
-    conclusions: list[Conclusion] = []
     if closed:
         tables += closed_tables(closed, paths)
         shown = [(s.label, method(s), s.response) for s in closed]
@@ -330,30 +324,19 @@ def _analyse(data: TestData) -> Result:
         findings += [finding for sweep in closed for finding in closed_findings(sweep)]
         findings += changes(closed)
         notes += closed_notes(closed)
-        settings = Settings.of(data, FrequencyResponseOptions)
-        beyond = [method(sweep) for sweep in closed if is_extrapolated(sweep)]
-        conclusions += closed_loop_conclusions(findings, _span(closed), beyond, settings)
     if opened:
         table, found, doubts = modes(opened, paths)
         tables.append(table)
         findings += found
         notes += doubts
         figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], found))
-        conclusions += open_loop_conclusions(table.rows, _span(opened))
     notes += quality_note(sweeps)
     return Result(
         tuple(tables),
         tuple(figures),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        tuple(conclusions),
     )
-
-
-def _span(sweeps: Sequence[Sweep]) -> tuple[float, float]:
-    """Lowest and highest frequency (Hz) of all of them."""
-    every = np.concatenate([sweep.response.frequency for sweep in sweeps])
-    return float(every.min()), float(every.max())
 
 
 def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
@@ -393,4 +376,10 @@ EXPERIMENT = Experiment(
         ),
     ),
     model=MODEL,
+    key_numbers=(
+        key("bandwidth"),
+        key("phase_margin"),
+        key("gain_margin"),
+        key("elastic_mode_frequency"),
+    ),
 )

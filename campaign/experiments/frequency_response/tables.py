@@ -43,12 +43,6 @@ QUANTITIES = (
 )
 
 
-def is_extrapolated(sweep: Sweep) -> bool:
-    """Whether its gain margin was read beyond the sweep."""
-    gain = sweep.found.crossing(sweep.found.gain_margin) if sweep.found else None
-    return gain is not None and gain.extrapolated
-
-
 def _values(found: ServoCharacteristics) -> dict[str, Estimate]:
     return {
         "bandwidth": found.bandwidth,

@@ -19,8 +19,8 @@ from campaign.experiments.friction_map.runs import DIRECTIONS, windows_of
 from campaign.experiments.friction_map.tables import MODEL_LABELS, fitted_torque
 from campaign.experiments.interface import TestData, with_samples
 from campaign.experiments.shared.captions import amount, listed, sentence, setting, surely_above
-from campaign.experiments.shared.conclusion_parts import count
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
+from campaign.text import count
 
 RATE = Axis("Rate", "rad/s", "deg/s")
 TORQUE = Axis("Friction torque", "N m", "N m")

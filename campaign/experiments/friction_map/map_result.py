@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from campaign.experiments.friction_map.conclusions import sliding_conclusions
 from campaign.experiments.friction_map.curves import Curves, fit_curves
 from campaign.experiments.friction_map.figures import fit_figure, map_figure, rate_figure
 from campaign.experiments.friction_map.pilot import settled_enough
@@ -41,7 +40,6 @@ def one_map(group: Sequence[TrialData], suffix: str = "") -> tuple[Result, Curve
             (rate_figure(fits, suffix),) if found else (),
             tuple(curve_findings(found, told)),
             tuple(notes),
-            tuple(sliding_conclusions(found, f"{where}: " if where else "")),
         )
         return result, fits
     shown = trials_of(group)

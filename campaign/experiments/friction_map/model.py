@@ -10,7 +10,6 @@ from dataclasses import replace
 
 from campaign.channels import DRIVE_TORQUE, JOINT_TORQUE, RELATIVE_RATE
 from campaign.estimate import Estimate
-from campaign.experiments.friction_map.conclusions import map_conclusions, sliding_conclusions
 from campaign.experiments.friction_map.curves import MEANINGS, Curves
 from campaign.experiments.friction_map.figures import rate_figure
 from campaign.experiments.friction_map.map_result import one_map
@@ -19,7 +18,6 @@ from campaign.experiments.friction_map.steady_recordings import KEYS, parameters
 from campaign.experiments.friction_map.stretches import StretchOptions
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Model, TestData, TrialData
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.parameter import IdentifiedRig, Parameter
 from campaign.reason import Reason
 from campaign.result import Finding, Result
@@ -51,9 +49,6 @@ def identified(data: TestData) -> Result:
     if runs:
         result, curves = one_map(runs)
         parameters = tuple(parameters_of(curves)) if curves.points else ()
-        speeds = [point.speed for point in curves.points]
-        told = result.conclusions or map_conclusions(result.findings, speeds, Settings({}))
-        result = replace(result, conclusions=told)
     else:
         sliding = sliding_of(data.trials, data.model)
         parameters, lost = sliding.parameters, sliding.left_out
@@ -64,7 +59,6 @@ def identified(data: TestData) -> Result:
             figures=tuple(map(rate_figure, sliding.maps)),
             findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
             notes=sliding.notes,
-            conclusions=tuple(sliding_conclusions(sliding.found)),
         )
         curves = sliding.maps[0] if sliding.maps else None
     if not parameters or curves is None:

@@ -18,7 +18,6 @@ from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, named, peak
 from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.experiments.model_output.conclusions import model_output_conclusions
 from campaign.experiments.model_output.figures import (
     UNCHANGED,
     cycle,
@@ -191,13 +190,11 @@ def _analyse(data: TestData) -> Result:
         note="Where the rate falls through zero a static model jumps, and a dynamic one still "
         "holds the torque of its bristles. " + OF_ONE,
     )
-    conclusions = model_output_conclusions(rows, options.amplitude, options.frequency)
     return Result(
         (table,),
         tuple(figures),
         tuple(findings),
         failures_note(data),
-        conclusions,
         telling=next((figure.key for figure in figures if figure.key.startswith("sine")), ""),
     )
 

@@ -7,7 +7,7 @@ or the property depends on the parameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from statistics import median_low
 from typing import Any
@@ -26,14 +26,14 @@ from campaign.experiments.model_properties.virtual_experiments import (
     numbers_of,
     requests,
 )
-from campaign.experiments.shared import conclusion_parts as parts
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared.common import COUNTED, failures_note
-from campaign.experiments.shared.friction_models import model_label, places
+from campaign.experiments.shared.friction_models import places
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.reason import Cause
-from campaign.result import Conclusion, Finding, Result
+from campaign.result import Finding, Result
 from campaign.trial import TrialRequest, canonical_json
 
 STEP = 1e-4
@@ -138,6 +138,9 @@ def _findings(judged: ModelVerdict) -> Iterator[Finding]:
     parameters = judged.sizes["parameters"] or 0
     count = Estimate("model_parameters", parameters, "", kind="count", reason=COUNTED())
     yield Finding.of(count, conditions)
+    met = sum(judged.sign(rule) == MARKS[MET] for rule in RULES)
+    told = Estimate("properties_met", met, "", kind="count", reason=COUNTED())
+    yield Finding.of(told, conditions)
 
 
 def _analyse(data: TestData) -> Result:
@@ -150,23 +153,7 @@ def _analyse(data: TestData) -> Result:
         figures(found, data),
         tuple(finding for each in found for finding in _findings(each)),
         tuple(notes),
-        (_conclusion(found),),
     )
-
-
-def _conclusion(found: Sequence[ModelVerdict]) -> Conclusion:
-    """Which models meet most rules, and which they do not meet, all sets counted."""
-    lacks = {
-        each.model: [rule.name for rule in RULES if each.sign(rule) != MARKS[MET]] for each in found
-    }
-    fewest = min(map(len, lacks.values()))
-    best = [model for model, lacking in lacks.items() if len(lacking) == fewest]
-    lacking = " and ".join(dict.fromkeys(", ".join(lacks[model]) or "none" for model in best))
-    most = f"{len(RULES) - fewest} of {len(RULES)}"
-    sets = parts.setting(float(len(found[0].numbers)))
-    models = ", ".join(map(model_label, best))
-    text = f" parameter sets, the {models} has most properties, {most}; not met: {lacking}"
-    return parts.conclusion("With all ", sets, text)
 
 
 EXPERIMENT = Experiment(
@@ -183,4 +170,5 @@ EXPERIMENT = Experiment(
         RELATIVE_ANGLE: "presliding, drift",
     },
     measure=_measure,
+    key_numbers=(key("properties_met"),),
 )

@@ -25,7 +25,6 @@ from campaign.experiments.friction_map.stretches import StretchOptions, force_of
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
 from campaign.experiments.motion.account import account_of
-from campaign.experiments.motion.conclusions import motion_conclusions
 from campaign.experiments.motion.figures import friction_figure, motion_figure
 from campaign.experiments.motion.tables import line_table, motion_findings, summary_table
 from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
@@ -133,7 +132,6 @@ def _analyse(data: TestData) -> Result:
         tuple(figures),
         tuple(finding for motion in motions for finding in motion_findings(motion)),
         tuple(dict.fromkeys(notes)),
-        motion_conclusions(motions),
         telling=next((each.key for each in figures if each.key.startswith("friction")), ""),
     )
 

@@ -16,8 +16,8 @@ from campaign.experiments.friction_map.figures import rate_caption, rate_panels
 from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.motion.account import Motion
 from campaign.experiments.shared.captions import amount, sentence
-from campaign.experiments.shared.conclusion_parts import count
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
+from campaign.text import count
 
 TIME = Axis("Time", "s", "s")
 

@@ -21,7 +21,6 @@ from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ER
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.experiments.interface import ChosenValue, Experiment, TestData, TrialData, bench_of
-from campaign.experiments.observer_gain.conclusions import observer_conclusions
 from campaign.experiments.observer_gain.figures import (
     error_figure,
     noise_figure,
@@ -38,6 +37,7 @@ from campaign.experiments.observer_gain.metrics import (
     own_observer,
     worst_ratio,
 )
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import with_changes
 from campaign.experiments.shared.pointing_error import windows_of
@@ -226,9 +226,7 @@ def _analyse(data: TestData) -> Result:
     ]
     findings = tuple(_findings(gains, own, inertia or bench.axis.inertia, options))
     notes = tuple(_notes(gains, data, limit, options))
-    ended = next((gain.unstable for gain in gains if np.isclose(gain.corner, own)), "")
-    conclusions = observer_conclusions(findings, own, ended, bench.controller.pointing_high_pass)
-    return Result((_table(gains),), tuple(figures), findings, notes, conclusions)
+    return Result((_table(gains),), tuple(figures), findings, notes)
 
 
 def _findings(
@@ -357,4 +355,9 @@ EXPERIMENT = Experiment(
     can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
     # Where the gain makes the loop unstable is one of its results.
     seeks_instability=True,
+    key_numbers=(
+        key("observer_corner_frequency"),
+        key("unstable_corner_frequency"),
+        key("stabilization_error_at_gain"),
+    ),
 )

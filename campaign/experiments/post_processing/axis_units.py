@@ -15,12 +15,9 @@ from campaign.estimate import Estimate
 from campaign.parameter import IdentifiedRig
 from campaign.reason import Reason
 from campaign.result import (
-    Amount,
     Axis,
     Cell,
     Column,
-    Conclusion,
-    Factor,
     Figure,
     Finding,
     Mark,
@@ -40,7 +37,6 @@ def in_axis_units(result: Result) -> Result:
         figures=tuple(map(_figure, result.figures)),
         findings=tuple(map(_finding, result.findings)),
         notes=tuple(map(in_axis_terms, result.notes)),
-        conclusions=tuple(map(_conclusion, result.conclusions)),
         identified=_identified(result.identified),
     )
 
@@ -79,20 +75,6 @@ def _reason(reason: Reason) -> Reason:
 def _is_phase(*names: str) -> bool:
     """Whether a number is an angle of no axis: a phase, a phase margin."""
     return any("phase" in name.lower() for name in names)
-
-
-def _conclusion(conclusion: Conclusion) -> Conclusion:
-    return Conclusion(tuple(map(_part, conclusion.parts)))
-
-
-def _part(part: str | Amount | Factor) -> str | Amount | Factor:
-    if isinstance(part, str):
-        return in_axis_terms(part)
-    estimate = estimate_in_axis_terms(part.estimate)
-    if isinstance(part, Factor):
-        return Factor(estimate, in_axis_terms(part.above), in_axis_terms(part.below))
-    phase = _is_phase(part.estimate.name)
-    return Amount(estimate, part.display if phase else axis_unit(part.display))
 
 
 def _finding(finding: Finding) -> Finding:

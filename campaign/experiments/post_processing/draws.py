@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from campaign.experiments.post_processing.merged_sentences import concluded
+from campaign.experiments.post_processing.key_numbers import by_draw
 from campaign.published.draws import SEED, together
 from campaign.result import Cell, Column, Finding, Result, Table, Value
-from campaign.trial import Trial, canonical_json
+from campaign.trial import Trial
 
 NOTES = 12
 """Most notes of an analysis that are repeated for other draws than the first."""
@@ -25,7 +25,7 @@ def draws_of(trials: Iterable[Trial]) -> tuple[Value, ...]:
 
 
 def merged(results: Mapping[Value, Result]) -> Result:
-    """The results of several draws, by seed: findings and sentences of all, else those of one.
+    """The results of several draws, by seed: findings of all, else those of one.
 
     A table says of every number of which several draws found one how these lie.
     """
@@ -48,9 +48,8 @@ def merged(results: Mapping[Value, Result]) -> Result:
         first.figures,
         found,
         (told, *first.notes, *notes),
-        concluded({own: result.conclusions for own, result in results.items()}),
-        first.telling,
-        tuple(doubt for result in results.values() for doubt in result.doubts),
+        telling=first.telling,
+        doubts=tuple(doubt for result in results.values() for doubt in result.doubts),
     )
 
 
@@ -73,12 +72,7 @@ def _table(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Table:
 
 
 def _rows(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Iterator[Mapping[str, Cell]]:
-    groups: dict[str, list[Finding]] = {}
-    for finding in found:
-        shared = {name: value for name, value in finding.conditions.items() if name != SEED}
-        key = canonical_json([finding.quantity, finding.unit, shared])
-        groups.setdefault(key, []).append(finding)
-    for group in groups.values():
+    for group in by_draw(found):
         if len(group) < 2:
             continue
         told = together(group, seeds)

@@ -44,7 +44,6 @@ from campaign.experiments.presliding_multisine.small_motions import (
 )
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
-from campaign.experiments.shared.conclusion_parts import conclusion, determined, setting
 from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.multisine import (
     PER_LINE,
@@ -54,7 +53,7 @@ from campaign.experiments.shared.multisine import (
 )
 from campaign.parameter import NOTHING_IDENTIFIED
 from campaign.physics.bench import Bench
-from campaign.result import Amount, Cell, Conclusion, Finding, Result
+from campaign.result import Cell, Finding, Result
 from campaign.trial import Task, TrialRequest
 
 OWN = ("amplitude", "realisation")
@@ -147,7 +146,6 @@ def _analyse(data: TestData) -> Result:
         tuple(figure for each in results for figure in each.figures),
         tuple(finding for each in results for finding in each.findings),
         tuple(dict.fromkeys(notes)),
-        tuple(each for result in results for each in result.conclusions),
         identified=results[0].identified if results else NOTHING_IDENTIFIED,
     )
 
@@ -173,7 +171,7 @@ def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result
     except ValueError as error:
         text = f"No fit of all trials together: {error}."
         tables = (table_of(rows, suffix),) if rows else ()
-        return Result(tables, notes=(*notes, text), conclusions=(conclusion(text.rstrip(".")),))
+        return Result(tables, notes=(*notes, text))
     joint = _told(found, group)
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
     shown = trials_of(group)
@@ -185,37 +183,17 @@ def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result
         amplitudes = np.array([each for each, _ in single] or sizes)
         alone = [each for _, each in single]
         figures.append(damping_figure(amplitudes, alone, joint, ratio, suffix, shown))
-    largest = max(options_of(group[0]).amplitudes) if planned else max(sizes)
     result = Result(
         (table_of([*rows, {"amplitude": "all", **joint}], suffix),),
         tuple(figures),
         tuple(Finding.of(each, place) for each in told),
         (*notes, *remarks(found)),
-        (_conclusion(joint, largest),),
     )
     if data.model is None:
         return result
     parameters, missed, more = identified(data, found, joint, planned)
     return replace(
         result, tables=(*result.tables, missed), notes=(*result.notes, *more), identified=parameters
-    )
-
-
-def _conclusion(joint: dict[str, Estimate], largest: float) -> Conclusion:
-    told = [joint[name] for name in QUANTITIES if name in joint]
-    shaken = ("Shaken by torques of up to ", setting(largest, "N m"))
-    if len(told) < len(QUANTITIES) or not all(e.has_interval and determined(e) for e in told):
-        reason = next((str(e.reason) for e in told if e.reason), "the fit gives no number")
-        return conclusion(*shaken, ", the load tells not all of its small motions: ", reason)
-    return conclusion(
-        *shaken,
-        ", the load moves as ",
-        Amount(joint["inertia"]),
-        " on bristles of stiffness ",
-        Amount(joint["stiffness_at_rest"]),
-        " and damping ",
-        Amount(joint["damping_at_rest"]),
-        ", the sums over all interfaces",
     )
 
 

@@ -19,7 +19,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import over_trials
 from campaign.estimation.threshold import Threshold
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.sensitivity.conclusions import sensitivity_conclusions
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.sensitivity.figures import (
     sensitivity_figure,
     thresholds_figure,
@@ -44,7 +44,6 @@ from campaign.experiments.shared.pointing_error import (
 )
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.complete import pointing_high_pass
 from campaign.result import Figure, Finding, Result, Value
 from campaign.signals import Sine
 from campaign.trial import Task, TrialRequest
@@ -225,12 +224,6 @@ def _analyse(data: TestData) -> Result:
         (*_figures(judged, limit, told, whole), *figures),
         tuple(findings),
         tuple(notes),
-        sensitivity_conclusions(
-            findings,
-            limit.value,
-            SYMBOLS,
-            pointing_high_pass(bench_of(measured[0].trial)),
-        ),
     )
 
 
@@ -272,4 +265,8 @@ EXPERIMENT = Experiment(
     },
     # A model stiffer than the bristles it stands for takes away more than there is.
     seeks_instability=True,
+    key_numbers=(
+        key("sensitivity_threshold"),
+        key("stabilization_error"),
+    ),
 )

@@ -36,11 +36,6 @@ def method(name: object) -> str:
     return f"the {METHOD_LABELS[str(name)]}" if str(name) in METHOD_LABELS else str(name)
 
 
-def loop_words(name: Value) -> str:
-    """`with the LuGre model`, by the name of a compensation."""
-    return "without compensation" if name == "none" else f"with {method(name)}"
-
-
 def short_label(name: str) -> str:
     """A compensation in one word where that is known; a bench's own name stands for itself."""
     return SHORT_LABELS.get(name, name)

@@ -30,9 +30,9 @@ from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.detected_trials import hull_sine
 from campaign.experiments.shared.pointing_error import (
     MEASURED,
@@ -45,7 +45,6 @@ from campaign.experiments.shared.pointing_error import (
     windows_of,
 )
 from campaign.experiments.stabilization.comparisons import compared, preload_of
-from campaign.experiments.stabilization.conclusions import stabilization_conclusions
 from campaign.experiments.stabilization.errors import BY_METHOD
 from campaign.experiments.stabilization.figures import stabilization_figures
 from campaign.experiments.stabilization.hull_motion import (
@@ -55,7 +54,6 @@ from campaign.experiments.stabilization.hull_motion import (
     SineMotion,
 )
 from campaign.experiments.stabilization.identified_compensations import (
-    beside_conclusions,
     beside_rows,
     beside_table,
 )
@@ -224,11 +222,6 @@ def _analyse(data: TestData) -> Result:
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
     findings += compared(errors)
     figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
-    ended = [
-        (_told(item, columns) | preload_of(item), str(item.ending.outcome))
-        for item in data.trials
-        if item.ending.outcome != "completed" and item.trial.role == "measurement"
-    ]
     extra = [path for path in paths if path not in columns]
     tables = [_table(rows, extra, _seen_through(high_pass))]
     beside = beside_rows(rows)
@@ -239,12 +232,6 @@ def _analyse(data: TestData) -> Result:
         tuple(figures),
         tuple(findings),
         failures_note(data),
-        (
-            *stabilization_conclusions(
-                findings, Settings.of(data, StabilizationOptions), ended, high_pass
-            ),
-            *beside_conclusions(beside),
-        ),
         telling=_telling([figure.key for figure in figures]),
     )
 
@@ -339,4 +326,9 @@ EXPERIMENT = Experiment(
         COMPENSATION_TORQUE: "figure of what the compensation adds",
         FRICTION_TORQUE: "true friction beside the compensation torque",
     },
+    key_numbers=(
+        key("stabilization_error"),
+        key("error_reduction"),
+        key("error_growth"),
+    ),
 )

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from campaign.estimate import Estimate
+from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.estimation.stabilization_error import quotient
-from campaign.experiments.shared.common import METHOD_LABELS
-from campaign.experiments.shared.conclusion_parts import (
-    conclusion,
-    determined,
-    held_at_once,
-    shown_by,
-)
 from campaign.physics.compensation.identified import stated_name
-from campaign.result import Cell, Column, Conclusion, Factor, Table
+from campaign.reason import Cause
+from campaign.result import Cell, Column, Table
 
 Row = Mapping[str, Cell]
 RATIO = "ratio"
 ERROR = "stabilization_error"
 OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
 """What of a row of errors is not the place it is of."""
+OF_SINGLES = Cause(
+    "ratio of single trials",
+    "a ratio of which a side is of one trial: how trials scatter is not in it",
+)
 PRELOAD_PATH = "bench.gear.preload.torque"
 """Said already by the average friction."""
 
@@ -37,9 +35,11 @@ def _pairs(rows: Sequence[Row]) -> Iterator[Row]:
         error, before = row["error"], None if other is None else other["error"]
         if not isinstance(error, Estimate) or not isinstance(before, Estimate):
             continue
-        if not determined(error) or not determined(before):
+        if not error.is_determined or not before.is_determined:
             continue
-        ratio = shown_by(quotient(RATIO, error, before))
+        ratio = quotient(RATIO, error, before)
+        if ratio.reason in OF_ONE_TRIAL:
+            ratio = Estimate.without_interval(RATIO, ratio.value, "", OF_SINGLES())
         yield {
             "compensation": stated,
             **_at(row),
@@ -73,23 +73,3 @@ def beside_table(rows: Sequence[Row], extra: Sequence[str]) -> Table:
         tuple(rows),
         note="Both have the same gain. A ratio below 1: what was identified leaves less.",
     )
-
-
-def beside_conclusions(rows: Sequence[Row]) -> Iterator[Conclusion]:
-    """Of each method, what its identified values change: of several places best and worst."""
-    for name in dict.fromkeys(str(row["compensation"]) for row in rows):
-        ratios = [r[RATIO] for r in rows if r["compensation"] == name]
-        known = [each for each in ratios if isinstance(each, Estimate) and each.has_interval]
-        if not known:
-            continue
-        known.sort(key=lambda each: each.value)
-        ends = [
-            Factor(held_at_once(each, len(known)), above="more", below="less")
-            for each in (known[0], known[-1])
-        ]
-        start = f"error with the {METHOD_LABELS.get(name, name)}, with identified values against "
-        if len(known) == 1:
-            yield conclusion(f"{start}the stated: ", ends[0])
-        else:
-            where = f"the stated, over {len(known)} places: at best "
-            yield conclusion(f"{start}{where}", ends[0], "; at worst ", ends[1])

@@ -20,6 +20,7 @@ from campaign.estimation.step_response import (
     step_characteristics,
 )
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,
@@ -28,10 +29,8 @@ from campaign.experiments.shared.common import (
     method_label,
     swept,
 )
-from campaign.experiments.shared.conclusion_parts import Settings
 from campaign.experiments.shared.detected_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
-from campaign.experiments.step_response.conclusions import step_conclusions
 from campaign.experiments.step_response.results import Step, step_figure, step_table
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -244,13 +243,11 @@ def _analyse(data: TestData) -> Result:
     tables = (
         step_table(steps, [path for path in paths if path not in ("linear", "compensation")]),
     )
-    options, settings = steps[0].options, Settings.of(data, StepResponseOptions)
     return Result(
         tables,
         (step_figure(steps),),
         tuple(findings),
         tuple(dict.fromkeys(notes)),
-        step_conclusions(findings, options.step, options.band, settings),
     )
 
 
@@ -301,4 +298,10 @@ EXPERIMENT = Experiment(
     perturbs_bench=True,
     requires={GYRO_RATE: "the response"},
     can_use={COMMAND: "command in the figure"},
+    key_numbers=(
+        key("settling_time"),
+        key("overshoot"),
+        key("rise_time"),
+        key("steady_state_error"),
+    ),
 )

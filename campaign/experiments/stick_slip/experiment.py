@@ -7,7 +7,7 @@ spring because sliding friction is smaller, and sticks again (Figure 2.12).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,7 +19,6 @@ from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
 from campaign.experiments.shared.common import COUNTED, failures_note
 from campaign.experiments.shared.friction_models import (
@@ -31,8 +30,7 @@ from campaign.experiments.shared.friction_models import (
     places,
     simulated,
 )
-from campaign.experiments.shared.model_clauses import Rows, amount_of, each_model
-from campaign.experiments.stick_slip.stick_slip_map import HISTORIES, Measured, counts, map_of
+from campaign.experiments.stick_slip.stick_slip_map import HISTORIES, Measured, map_of
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -42,7 +40,6 @@ from campaign.result import (
     Axis,
     Cell,
     Column,
-    Conclusion,
     Curve,
     Figure,
     Finding,
@@ -204,18 +201,11 @@ def _analyse(data: TestData) -> Result:
             for who in whose
         ),
     )
-    options = StickSlipOptions.model_validate(
-        found[0].trials[0].trial.options, context={"si": True}
-    )
     drawn = map_of(measured, StickSlipOptions)
     if drawn is not None:
-        return Result((table,), (drawn,), findings, notes, (counts(measured),))
-    settings = parts.Settings.of(data, StickSlipOptions)
-    conclusions = stick_slip_conclusions(
-        rows, found, settings, options.stiffness, options.pull_rate
-    )
+        return Result((table,), (drawn,), findings, notes)
     figures = tuple(filter(None, (_figure(measured),)))
-    return Result((table,), figures, findings, notes, conclusions)
+    return Result((table,), figures, findings, notes)
 
 
 def _count(slips: float) -> int | float | None:
@@ -303,38 +293,6 @@ def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
     times = f"slips {slips:g} times" if slips != 1 else "slips once"
     every = f", every {amount(period, 's')} after the first" if math.isfinite(period) else ""
     return sentence(f"{who}: it sticks, {times}{every}, and is then up to {top} fast")
-
-
-def stick_slip_conclusions(
-    rows: Rows,
-    places: Sequence[ConditionGroup],
-    settings: parts.Settings,
-    stiffness: float,
-    pull_rate: float,
-) -> tuple[Conclusion, ...]:
-    """Slips, their period and the largest torque of the spring, of each model.
-
-    The spring's stiffness is in N m/rad, the rate of its far end in rad/s.
-    """
-
-    def tell(own: list[Mapping[str, Cell]]) -> parts.Parts:
-        row, slips = own[0], own[0].get("slips")
-        # Of a recording that lost samples nobody knows how many slips there were.
-        counted = isinstance(slips, int | float) and math.isfinite(slips)
-        number = parts.setting(float(str(slips))) if counted else None
-        named = (
-            (number, " slips"),
-            ("the first after ", amount_of(row, "first_slip")),
-            ("then one every ", amount_of(row, "period")),
-            ("the spring's torque up to ", amount_of(row, "peak_torque")),
-        )
-        return parts.listed(
-            [(a, b) for a, b in named if a is not None and b is not None], last=", "
-        )
-
-    spring = ("Pulled at ", parts.setting(pull_rate, "rad/s"), " through a spring of ")
-    told = each_model(rows, places, settings, tell)
-    return (parts.conclusion(*spring, parts.setting(stiffness, "N m/rad"), ", ", told),)
 
 
 EXPERIMENT = Experiment(

@@ -9,11 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from campaign.estimate import Estimate
-from campaign.experiments.shared import conclusion_parts as parts
 from campaign.experiments.shared.friction_models import ConditionGroup, model_label
 from campaign.experiments.shared.swept_words import axis_of, name_of, words
 from campaign.options import Options
-from campaign.result import Conclusion, Curve, Figure, Panel
+from campaign.result import Curve, Figure, Panel
 
 Measured = Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]
 """What the pulls of each place show, by name."""
@@ -33,14 +32,14 @@ def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
     return "smooth" if early else "pull too short"
 
 
-def counts(measured: Measured) -> Conclusion:
+def _counts(measured: Measured) -> str:
     """In how many pulls each model sticks and slips."""
     kinds: dict[str, list[str]] = {}
     for place, found in measured:
         model = str(place.point.get("model", ""))
         kinds.setdefault(model and f" ({model_label(model)})", []).append(_kind(found, place))
     told = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
-    return parts.conclusion(f"Stick-slip in {', '.join(told)}")
+    return f"Stick-slip in {', '.join(told)}."
 
 
 def map_of(measured: Measured, options: type[Options]) -> Figure | None:
@@ -81,8 +80,8 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     return Figure(
         key="stick-slip",
         title="Where a pulled load sticks and slips",
-        caption="A mark for each pull: stick-slip where the load rests for about a fifth of a "
-        "period in two or more periods in a "
+        caption=f"{_counts(measured)} A mark for each pull: stick-slip where the load rests for "
+        "about a fifth of a period in two or more periods in a "
         f"row, up to the last; too short where it first slips after {SHORT:.0%} of the pull.",
         alt="Marks of stick-slip and of smooth sliding over two swept numbers.",
         panels=tuple(

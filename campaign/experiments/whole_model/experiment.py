@@ -34,7 +34,7 @@ from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.reason import Cause, Reason
-from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.result import Finding, Result
 from campaign.text import words
 from campaign.units import Frequency, Time
 
@@ -100,8 +100,7 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
         tables=(models_table(found), *(values_table(each) for each in found.fits)),
         figures=tuple(figures(found, regression, unseen)),
         findings=tuple(Finding.of(each.estimate, {}) for each in parameters),
-        notes=tuple(_notes(best)),
-        conclusions=tuple(_conclusions(best, found.as_good)),
+        notes=(*_alike(found.as_good), *_notes(best)),
         identified=IdentifiedRig(
             parameters,
             correlations=best.fit.correlation,
@@ -200,21 +199,10 @@ def _notes(best: Fit) -> Iterator[str]:
     )
 
 
-def _conclusions(best: Fit, as_good: Sequence[str]) -> Iterator[Conclusion]:
-    told = [best.fit.estimates[each.name] for each in best.model.numbers if each.is_coulomb]
-    parts: list[str | Amount] = [f"By the model ‘{best.model.name}’, Coulomb friction is "]
-    for index, each in enumerate(told):
-        way = each.name.rpartition("_")[2] if len(told) > 1 else ""
-        parts += [", and "] if index else []
-        parts += [Amount(each, each.unit), f" in the {way} direction" if way else ""]
-    yield Conclusion((*parts, "."))
+def _alike(as_good: Sequence[str]) -> Iterator[str]:
     if as_good:
         others = " and ".join(f"‘{name}’" for name in as_good)
-        yield Conclusion((f"The motion does not tell this model from {others}.",))
-    if best.validation is not None:
-        yield Conclusion(
-            ("This model leaves ", Amount(best.validation, "percent"), " of an unseen torque.")
-        )
+        yield f"The motion does not tell this model from {others}."
 
 
 EXPERIMENT = of_any_motion(

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from campaign.api.analysis import AnalysedTest
-from campaign.api.conclusion_sentences import is_decided, remarks, sentence, told_with_intervals
+from campaign.api.estimate_text import remarks, shows_interval
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import axis_terms
 from campaign.published.headline import LIMITS, NOBODY_FITTED, headline
 from campaign.published.scoreboard import Scoreboard
-from campaign.report.content.key_numbers import KeyNumbers, key_numbers
+from campaign.report.content.key_numbers import KeyNumber, shown_key_numbers
 from campaign.report.content.references import References
 from campaign.report.content.run_problems import wrong_with
 from campaign.report.content.truth import COUNTED, biases, held
-from campaign.report.content.written_units import units_of
-from campaign.result import Factor, Figure, Result, Table
+from campaign.report.content.written_units import TestUnits, units_of
+from campaign.result import Figure, Result, Table
 
 FROM = {
     "simulation": "simulated",
@@ -35,40 +35,38 @@ INTERVALS = (
 )
 
 
+ROOM, FEWEST = 18, 2
+"""Key numbers that it has room for, and how many it has of each test, however many there are."""
+
+
 @dataclass(frozen=True)
 class Answer:
-    """What one test comes to, in sentences; `figure` is the key of its most telling figure.
+    """What one test comes to.
 
     Attributes:
-        remarks: what the numbers of the sentences do not say: no interval, or not all of it.
-        first_remarks: those on the first sentence.
+        kind: of experiment, as people read it: `velocity map`.
+        where: conditions that all of its key numbers share.
+        numbers: its key numbers, the most important first.
+        figure: the key of its most telling figure.
+        remarks: what the numbers do not say: no interval, or not all of it.
         truth: how many intervals hold what is true of the bench that was simulated, and what is
             off alike in all of them; "" unknown.
         prediction: which numbers are not what its bench file states any more; "" untested.
         references: the same of each file of reference values.
-        problem: why there is nothing to say, or not all of it.
-        kind: of experiment, as people read it: `velocity map`.
+        problem: why there is no number, or not all of them.
     """
 
     test: str
     title: str
-    sentences: tuple[str, ...]
+    kind: str = ""
+    where: str = ""
+    numbers: tuple[KeyNumber, ...] = ()
     figure: str = ""
     remarks: tuple[str, ...] = ()
     truth: str = ""
     prediction: str = ""
-    problem: str = ""
-    kind: str = ""
-    first_remarks: tuple[str, ...] = ()
     references: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Short:
-    """Answers by the first sentence of each; `remarks` are what several remark, and of which."""
-
-    answers: tuple[Answer, ...]
-    remarks: tuple[str, ...] = ()
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,14 +75,13 @@ class FirstScreen:
 
     Attributes:
         answers: per test, in the protocol's order.
-        main: of many tests, those whose first sentence stands on top; empty where all answers do.
+        main: of many tests, those whose numbers stand on top; empty where all answers do.
         telling: test and key of the one figure that is shown there; None without any.
         wrong: sentences on what went wrong: failed, interrupted, damaged, not analysed.
         asked: what was executed, on which bench, in a sentence.
         compared: how many published values were reproduced; "" where none was compared.
-        intervals: what ± and brackets say; "" where no sentence has any.
+        intervals: what ± and brackets say; "" where no number has any.
         held: how many intervals of all tests hold the true values; "" unknown.
-        key_numbers: what the main tests, or all where there are few, say first.
     """
 
     answers: tuple[Answer, ...]
@@ -95,18 +92,26 @@ class FirstScreen:
     main: tuple[str, ...] = ()
     intervals: str = ""
     held: str = ""
-    key_numbers: tuple[KeyNumbers, ...] = ()
 
     @property
-    def in_short(self) -> Short:
-        """The main tests, or all where they are few, by the first sentence of each."""
-        return _in_short([each for each in self.answers if not self.main or each.test in self.main])
+    def shown(self) -> tuple[Answer, ...]:
+        """The main tests, or all where they are few, each with the first of its numbers."""
+        chosen = [each for each in self.answers if not self.main or each.test in self.main]
+        most = max(FEWEST, ROOM // max(1, sum(bool(each.numbers) for each in chosen)))
+        return tuple(replace(each, numbers=each.numbers[:most]) for each in chosen)
 
     @property
-    def in_words(self) -> tuple[Answer, ...]:
-        """Those of them that say no key number."""
-        told = {each.test for each in self.key_numbers}
-        return tuple(each for each in self.in_short.answers if each.test not in told)
+    def remarks(self) -> tuple[str, ...]:
+        """Those on the numbers that are shown, each once with the tests that it is of."""
+        shown = [each for each in self.shown if each.numbers]
+        titles: dict[str, list[str]] = {}
+        for each in shown:
+            for remark in each.remarks:
+                titles.setdefault(remark, []).append(each.title)
+        return tuple(
+            remark if len(own) == len(shown) else f"{'; '.join(own)}: {remark}"
+            for remark, own in titles.items()
+        )
 
 
 def opening_of(
@@ -118,97 +123,76 @@ def opening_of(
     damaged: Sequence[Damage] = (),
 ) -> FirstScreen:
     """The opening of a run's report; `damaged` is all damage that the report met."""
-    main = _main(tests)
-    shown = [test for test in tests if not main or test.name in main]
+    units = units_of(tests, run.header)
     return FirstScreen(
-        tuple(_answer(test, truths.get(test.name), references) for test in tests),
+        tuple(
+            _answer(test, truths.get(test.name), references, scoreboard, units[test.name])
+            for test in tests
+        ),
         leading_figure(tests),
         (*wrong_with(run, tests, damaged), *_without_stated(tests)),
         _asked(run, tests),
         _compared(scoreboard),
-        main,
+        _main(tests),
         INTERVALS if any(map(_tells, tests)) else "",
         held([row for table in truths.values() for row in table.rows if COUNTED in row]),
-        key_numbers(shown, units_of(tests, run.header), scoreboard, truths),
     )
 
 
 def _main(tests: Sequence[AnalysedTest]) -> tuple[str, ...]:
     """Of many tests one of each of the kinds that tell most, in the protocol's order.
 
-    A test tells as much as it says numbers with an interval: what a computation without noise comes
-    to is known to all digits, and of nothing but itself. Of a kind it is the first of those whose
-    first sentence tells most, as only that is shown.
+    A test tells as much as it has key numbers with an interval: what a computation without noise
+    comes to is known to all digits, and of nothing but itself.
     """
     if len(tests) <= MANY:
         return ()
     kinds: dict[str, list[AnalysedTest]] = {}
     for test in tests:
-        if test.result.conclusions and not test.problem:
+        if test.result.key_numbers and not test.problem:
             kinds.setdefault(test.kind, []).append(test)
-    most = sorted(kinds.values(), key=lambda own: max(map(_tells, own)), reverse=True)[:MANY]
-    chosen = [max(own, key=lambda test: _tells(test, 1)).name for own in most]
+    best = [max(own, key=_tells) for own in kinds.values()]
+    chosen = [test.name for test in sorted(best, key=_tells, reverse=True)[:MANY]]
     return tuple(test.name for test in tests if test.name in chosen)
 
 
-def _tells(test: AnalysedTest, sentences: int | None = None) -> int:
-    """How many numbers with an interval a test says; of its first `sentences`, or of all."""
-    return sum(map(told_with_intervals, test.result.conclusions[:sentences]))
+def _tells(test: AnalysedTest) -> int:
+    """How many of its key numbers have an interval."""
+    return sum(shows_interval(each.known) for each in test.result.key_numbers)
 
 
-def _in_short(chosen: Sequence[Answer]) -> Short:
-    titles: dict[str, list[str]] = {}
-    for each in chosen:
-        for remark in each.first_remarks:
-            titles.setdefault(remark, []).append(each.title)
-    shared = {remark: own for remark, own in titles.items() if len(own) > 1}
-    answers = (
-        replace(
-            each,
-            sentences=each.sentences[:1],
-            remarks=tuple(r for r in each.first_remarks if r not in shared),
-        )
-        for each in chosen
-    )
-    told = (
-        f"Of {'each of these' if len(own) == len(chosen) else '; '.join(own)}: {remark}"
-        for remark, own in shared.items()
-    )
-    return Short(tuple(answers), tuple(told))
-
-
-def _answer(test: AnalysedTest, truth: Table | None, references: References) -> Answer:
-    result = test.result
-    said = tuple(sentence(each) for each in result.conclusions)
-    figure = most_telling(result)
+def _answer(
+    test: AnalysedTest,
+    truth: Table | None,
+    references: References,
+    scoreboard: Scoreboard,
+    units: TestUnits,
+) -> Answer:
+    result, figure = test.result, most_telling(test.result)
     stated, files = references.stated.get(test.name), references.files.get(test.name, ())
+    where, numbers = shown_key_numbers(test, units, scoreboard.lines, truth)
     with axis_terms(test.sides):
-        every, first = (
-            tuple(remarks(each)) for each in (result.conclusions, result.conclusions[:1])
+        return Answer(
+            test.name,
+            test.title,
+            test.kind.replace("_", " "),
+            where,
+            numbers,
+            "" if figure is None else figure.key,
+            tuple(remarks(each.known for each in result.key_numbers)),
+            "" if truth is None else _held(truth),
+            "" if stated is None else stated.told,
+            tuple(each.told for each in files if each.told),
+            test.problem or ("" if numbers else _nothing(test)),
         )
-        true = "" if truth is None else _held(truth)
-    return Answer(
-        test.name,
-        test.title,
-        said,
-        "" if figure is None else figure.key,
-        every,
-        true,
-        "" if stated is None else stated.told,
-        test.problem or ("" if said else _nothing(test)),
-        test.kind.replace("_", " "),
-        first,
-        tuple(each.told for each in files if each.told),
-    )
 
 
 def _nothing(test: AnalysedTest) -> str:
-    """Why there is no sentence, though the analysis went through."""
+    """Why there is no key number, though the analysis went through."""
     if test.trials and len(test.failed) == len(test.trials):
         return f"none of its {len(test.trials)} executed trials completed"
-    if test.result.findings or test.result.tables:
-        return "its analysis says no sentence; tables and figures have what it found"
-    return "; ".join(note.rstrip(".") for note in test.result.notes[:1]) or "nothing was found"
+    notes = [note.rstrip(".") for note in test.result.notes[:1]]
+    return notes[0] if notes else "it has no key number; tables and figures have what it found"
 
 
 def _held(truth: Table) -> str:
@@ -253,24 +237,19 @@ def _without_stated(tests: Sequence[AnalysedTest]) -> Iterator[str]:
 def _telling(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
     """Test and key of the figure that tells most.
 
-    One that draws intervals goes before one that does not; then the one whose test says most: how
-    many ratios the data decide. Of equal ones the first of the protocol.
+    One that draws intervals goes before one that does not; then the one whose test has more key
+    numbers with an interval. Of equal ones the first of the protocol.
     """
     found = [(test, figure) for test in tests if (figure := most_telling(test.result)) is not None]
     if not found:
         return None
-    test, figure = max(found, key=lambda pair: (_has_intervals(pair[1]), _decided(pair[0].result)))
+    test, figure = max(found, key=lambda pair: (_has_intervals(pair[1]), _tells(pair[0])))
     return test.name, figure.key
 
 
 def _has_intervals(figure: Figure) -> bool:
     curves = (curve for panel in figure.panels for curve in panel.curves)
     return any(curve.low is not None or curve.high is not None for curve in curves)
-
-
-def _decided(result: Result) -> int:
-    parts = (part for conclusion in result.conclusions for part in conclusion.parts)
-    return sum(isinstance(part, Factor) and is_decided(part) for part in parts)
 
 
 # What was asked, and what others found ------------------------------------------------------------

@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 from campaign import __version__, result
-from campaign.api.conclusion_sentences import sentence
 from campaign.api.estimates import row_of
 from campaign.api.results import code_of
 from campaign.archive.reading.damage_words import in_words
@@ -191,16 +190,9 @@ def _test(section: Section) -> data.Test:
             trials=tuple(each.trial.number for each in test.trials),
             options=plain(test.options),
             conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
-            conclusions=tuple(map(_sentence, found.conclusions)),
+            key_numbers=tuple(map(_finding, found.key_numbers)),
             notes=found.notes,
-            findings=tuple(
-                data.Finding(
-                    number=number(each.known),
-                    conditions=plain(each.conditions),
-                    recomputed=each.recomputed,
-                )
-                for each in found.findings
-            ),
+            findings=tuple(map(_finding, found.findings)),
             comparisons=tuple(map(_comparison, section.comparisons)),
             figures=tuple(map(_figure, section.figures)),
             tables=tuple(map(_table, section.tables)),
@@ -210,20 +202,11 @@ def _test(section: Section) -> data.Test:
         )
 
 
-def _sentence(conclusion: result.Conclusion) -> data.Sentence:
-    said = (part for part in conclusion.parts if not isinstance(part, str))
-    return data.Sentence(text=sentence(conclusion), numbers=tuple(map(_said, said)))
-
-
-def _said(part: result.Amount | result.Factor) -> data.SaidNumber:
-    ratio = isinstance(part, result.Factor)
-    unit = part.estimate.unit
-    display = "" if isinstance(part, result.Factor) else part.display or unit
-    return data.SaidNumber(
-        number=number(part.estimate),
-        display=display,
-        factor=1.0 if ratio else _factor(unit, display),
-        ratio=ratio,
+def _finding(finding: result.Finding) -> data.Finding:
+    return data.Finding(
+        number=number(finding.known),
+        conditions=plain(finding.conditions),
+        recomputed=finding.recomputed,
     )
 
 

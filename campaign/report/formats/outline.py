@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from campaign.report.content import lines, tables
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
-from campaign.report.content.first_screen import Answer, FirstScreen
+from campaign.report.content.first_screen import Answer
 from campaign.report.content.lines import ShownLine
 from campaign.report.page.damage_notice import Notice
 from campaign.report.page.folder import FOUND, Comparison, Section, ShownFigure
@@ -90,40 +90,38 @@ def _opening(layout: Layout) -> Iterator[Piece]:
         yield Paragraph(opening.compared)
     if opening.held:
         yield Paragraph(f"{opening.held} of the simulated bench.")
-    if opening.key_numbers:
-        yield _key_numbers(opening)
-    for answer in opening.in_words:
-        yield Facts(((answer.title, " ".join((*answer.sentences, *_problem(answer)))),))
-    yield from map(Paragraph, filter(None, (*_remarks(opening), opening.intervals, opening.asked)))
+    if any(answer.numbers for answer in opening.shown):
+        yield key_numbers(opening.shown)
+    yield from (
+        Facts(((answer.title, _problem(answer)),)) for answer in opening.shown if answer.problem
+    )
+    yield from map(Paragraph, filter(None, (*opening.remarks, opening.intervals, opening.asked)))
     if layout.telling is not None:
         yield layout.telling
 
 
-def _remarks(opening: FirstScreen) -> Iterator[str]:
-    for answer in opening.in_short.answers:
-        yield from (f"{answer.title}: {remark}" for remark in answer.remarks)
-    yield from opening.in_short.remarks
+def _problem(answer: Answer) -> str:
+    return f"No result: {answer.problem}." if answer.problem else ""
 
 
-def _problem(answer: Answer) -> list[str]:
-    return [f"No result: {answer.problem}."] if answer.problem else []
-
-
-def _key_numbers(opening: FirstScreen) -> Grid:
+def key_numbers(answers: Sequence[Answer]) -> Grid:
+    """Those of some tests as a table; columns that say nothing are left out."""
     rows = tuple(
         (
-            group.title,
+            answer.title,
             each.quantity,
-            ", ".join(filter(None, (each.where, group.where))),
+            ", ".join(filter(None, (each.where, answer.where))),
             each.value,
             f"{each.published} ✓" if each.agrees else each.published,
             each.true,
         )
-        for group in opening.key_numbers
-        for each in group.numbers
+        for answer in answers
+        for each in answer.numbers
     )
     headers = ("Test", "Quantity", "Where", "Found", "Published", "True")
     kept = [n for n in range(len(headers)) if any(row[n] for row in rows)]
+    if len(answers) == 1:
+        kept.remove(0)
     return Grid(
         None,
         "key-numbers",
@@ -136,8 +134,8 @@ def _key_numbers(opening: FirstScreen) -> Grid:
 
 def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
     """What the page says of a test; `with_truth` where its truth is shown."""
-    yield from answer.sentences
-    yield from _problem(answer)
+    if answer.problem:
+        yield _problem(answer)
     if with_truth and answer.truth:
         yield f"{answer.truth}."
     yield from (f"{each}." for each in (answer.prediction, *answer.references) if each)
@@ -149,7 +147,10 @@ def _section(section: Section, answer: Answer, telling: ShownFigure | None) -> I
     if section.test.description:
         yield Paragraph(section.test.description)
     yield from (Paragraph(problem, role="warning") for problem in section.problems)
-    yield Paragraph(" ".join(_answer(answer, section.truth is not None)))
+    if answer.numbers:
+        yield key_numbers([answer])
+    if told := " ".join(_answer(answer, section.truth is not None)):
+        yield Paragraph(told)
     yield Heading(3, "Conditions")
     yield Facts(section.conditions)
     yield from map(_compared, section.comparisons)

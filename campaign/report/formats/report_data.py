@@ -64,25 +64,6 @@ class Finding(_Part):
     """Derived from other published numbers rather than from a recording."""
 
 
-class SaidNumber(_Part):
-    """A number within a sentence."""
-
-    number: Number
-    display: str
-    """The unit in which it is said; "" for a ratio."""
-    factor: float
-    """What SI is multiplied by to be in `display`."""
-    ratio: bool
-    """A ratio: where it is below 1, the sentence says its reciprocal."""
-
-
-class Sentence(_Part):
-    """A conclusion: its words, and the numbers in them in the order they are said."""
-
-    text: str
-    numbers: tuple[SaidNumber, ...]
-
-
 class Column(_Part):
     """A column of a table."""
 
@@ -220,7 +201,8 @@ class Test(_Part):
     options: dict[str, JsonValue]
     """Normalised (SI), before the sweep."""
     conditions: tuple[Said, ...]
-    conclusions: tuple[Sentence, ...]
+    key_numbers: tuple[Finding, ...]
+    """What was asked for, the most important first: `findings`, or medians of draws."""
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]
     comparisons: tuple[Comparison, ...]
@@ -411,7 +393,7 @@ class ReportData(_Part):
     format: int = FORMAT
     run: Run
     opening: FirstScreen
-    """As on top of the page; its numbers are in the tests' `conclusions`."""
+    """As on top of the page; its numbers are in the tests' `key_numbers`."""
     scoreboard: Scoreboard
     tests: tuple[Test, ...]
     incidents: Incidents

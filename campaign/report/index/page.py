@@ -127,7 +127,7 @@ def entry_of(run: RunSummary) -> Entry:
         benches=run.benches,
         status=_status(run),
         state=str(run.status or "").replace(" ", "-"),
-        verdict=tuple(filter(None, (told.sentence, told.headline, _trials(run)))),
+        verdict=tuple(filter(None, (told.numbers, told.headline, _trials(run)))),
         backend=run.backend,
         operator=run.operator,
         tags=run.tags,

@@ -1,4 +1,4 @@
-"""Sentence and picture of an existing report.
+"""Key numbers and picture of an existing report.
 
 The folder is read as anybody's: what is missing, too large or not as expected is as if it were not
 there, and nothing of it is believed to be more than text.
@@ -20,7 +20,9 @@ DATA = "report.json"
 LARGEST = 1 << 25
 """Bytes of a `report.json` beyond which it is left alone."""
 LONGEST = 400
-"""Letters of a sentence that are shown."""
+"""Letters of a text that are shown."""
+SHOWN = 3
+"""Key numbers that are shown."""
 NOT_TELLING = ("scoreboard", "draws", "incidents-")
 """Beginnings of names of figures that are no analysis' own."""
 
@@ -31,7 +33,7 @@ class ReportSummary:
 
     Attributes:
         page: `report.html`, as a path.
-        sentence: the first on the test of the opening's figure, else the first of the opening.
+        numbers: the first of the test of the opening's figure, else the first of the opening.
         headline: how published values came out.
         sketch: SVG of its most telling figure, small; made from the numbers of `report.json`.
         caption: what that figure is called.
@@ -39,7 +41,7 @@ class ReportSummary:
     """
 
     page: Path | None = None
-    sentence: str = ""
+    numbers: str = ""
     headline: str = ""
     sketch: str = ""
     caption: str = ""
@@ -54,7 +56,7 @@ def summary_of_report(folder: Path) -> ReportSummary:
     tree = _tree(folder / DATA)
     opening = _mapping(tree.get("opening"))
     answers = [_mapping(answer) for answer in _sequence(opening.get("answers"))]
-    # Sentence and picture are of one test where it has both.
+    # Numbers and picture are of one test where it has both.
     telling = _sequence(opening.get("telling"))
     test = next(map(_text, telling), "")
     answers.sort(key=lambda answer: not test or answer.get("test") != test)
@@ -63,7 +65,7 @@ def summary_of_report(folder: Path) -> ReportSummary:
     small = sketch(shown)
     return ReportSummary(
         page,
-        next(_sentences(answers), ""),
+        _first_numbers(answers),
         _text(opening.get("compared")),
         small,
         _text(shown.get("title")) if small else "",
@@ -81,11 +83,15 @@ def _tree(path: Path) -> Mapping[str, Any]:
         return {}
 
 
-def _sentences(answers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    for answer in answers:
-        for sentence in _sequence(answer.get("sentences")):
-            if text := _text(sentence):
-                yield text
+def _first_numbers(answers: Sequence[Mapping[str, Any]]) -> str:
+    """`Coulomb friction Tc, positive: 25.3 ± 0.1 N·m`, of the first test that has numbers."""
+    numbers = next(filter(None, (_sequence(each.get("numbers")) for each in answers)), ())
+    told = []
+    for number in map(_mapping, numbers[:SHOWN]):
+        name = ", ".join(filter(None, (_text(number.get(key)) for key in ("quantity", "where"))))
+        if value := _text(number.get("value")):
+            told.append(f"{name}: {value}")
+    return f"{'; '.join(told)}." if told else ""
 
 
 def _figures(

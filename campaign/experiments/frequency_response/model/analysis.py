@@ -41,7 +41,6 @@ from campaign.experiments.frequency_response.model.tables import (
 from campaign.experiments.frequency_response.model.validation import Validation, models, validated
 from campaign.experiments.frequency_response.model.validation_figures import (
     residual_figures,
-    validation_conclusions,
     validation_figures,
     validation_tables,
 )
@@ -52,7 +51,7 @@ from campaign.experiments.responses.tables import distortion_tables, sources_tab
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.physics.bench import Bench
-from campaign.result import Amount, Conclusion, Finding, Result
+from campaign.result import Finding, Result
 from campaign.text import words
 from campaign.units import Frequency, Time
 
@@ -148,11 +147,10 @@ def identified(data: TestData) -> Result:
             *residual_figures(found, fits),
         ),
         findings=tuple(_findings(found, parameters)),
-        notes=(*_notes(found, told, remarks), *_validation_notes(validation)),
-        conclusions=(
-            *_conclusions(best or found[0], told),
+        notes=(
             *_undetermined(parameters),
-            *validation_conclusions(validation),
+            *_notes(found, told, remarks),
+            *_validation_notes(validation),
         ),
         identified=IdentifiedRig(
             parameters,
@@ -299,37 +297,7 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
             )
 
 
-def _conclusions(best: FrequencyFit, told: Masses) -> Iterator[Conclusion]:
-    drive = told.drive if told.bent else told.axis
-    local = {name: admitted(each) for name, each in _local_of_axis(told, best).items()}
-    stands_out = [name for name, each in local.items() if each.origin is Origin.MEASURED]
-    if (drive is None or drive.misfit) and "resonance" in stands_out:
-        mode: list[str | Amount] = ["A mode stands out at ", Amount(local["resonance"], "Hz")]
-        if "antiresonance" in stands_out:
-            mode += [", with an antiresonance at ", Amount(local["antiresonance"], "Hz")]
-        yield Conclusion((*mode, "; no two inertias on a spring were found."))
-    whose = "At this excitation the response is that of a drive that" if told.bent else "The drive"
-    if drive is not None and drive.resonance.has_interval:
-        parts: list[str | Amount] = [f"{whose} resonates at ", Amount(drive.resonance, "Hz")]
-        if drive.antiresonance.has_interval:
-            parts += [", with an antiresonance at ", Amount(drive.antiresonance, "Hz")]
-        if drive.total_inertia.has_interval:
-            parts += ["; all of it has an inertia of ", Amount(drive.total_inertia, "kg m^2")]
-        yield Conclusion((*parts, "."))
-    elif drive is not None and drive.total_inertia.has_interval:
-        inertia = Amount(drive.total_inertia, "kg m^2")
-        yield Conclusion((f"{whose} moves as one inertia of ", inertia, "."))
-    if told.bent:
-        yield Conclusion(("What of that is friction's, a second amplitude would tell.",))
-    if best.margins is None:
-        return
-    margins = best.margins
-    if margins.phase_margin.has_interval:
-        margin = Amount(margins.phase_margin, "deg")
-        yield Conclusion(("The rate loop has a phase margin of ", margin, "."))
-
-
-def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
+def _undetermined(parameters: Sequence[Parameter]) -> Iterator[str]:
     """Where no number is determined: which, why, and what to measure."""
     if any(each.estimate.origin is Origin.MEASURED for each in parameters):
         return
@@ -338,8 +306,7 @@ def _undetermined(parameters: Sequence[Parameter]) -> Iterator[Conclusion]:
         why = str(each.estimate.reason), each.advice
         alike.setdefault(why, []).append(words(each.estimate.name))
     for (reason, advice), names in alike.items():
-        told = f"Not determined: {', '.join(names)}. Reason: {reason}. To measure: {advice}."
-        yield Conclusion((told,))
+        yield f"Not determined: {', '.join(names)}. Reason: {reason}. To measure: {advice}."
 
 
 MODEL = Model(

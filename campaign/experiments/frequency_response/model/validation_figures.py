@@ -14,13 +14,12 @@ from campaign.experiments.frequency_response.model.validation import (
     Model,
     Prediction,
     Validation,
-    size_difference,
 )
 from campaign.experiments.responses.figures import FREQUENCY, TORQUE, decibel, panels
 from campaign.experiments.responses.sources import fitted_part
 from campaign.experiments.responses.tables import NAME, SENSOR
 from campaign.reason import Cause
-from campaign.result import Amount, Axis, Column, Conclusion, Curve, Figure, Mark, Panel, Table
+from campaign.result import Axis, Column, Curve, Figure, Mark, Panel, Table
 
 FINE = 800
 """Frequencies at which a model is drawn."""
@@ -291,17 +290,3 @@ def weighted(model: Model) -> tuple[np.ndarray, np.ndarray]:
 def _fitted(model: Model) -> MeasuredResponse:
     slack = 1.0 + 1e-9
     return fitted_part(model.source, model.side, model.lowest / slack, model.highest * slack)
-
-
-def validation_conclusions(validation: Validation) -> Iterator[Conclusion]:
-    """Of each model a sentence: of the unseen response whose excitation is most like its own."""
-    for name in dict.fromkeys(each.model.name for each in validation.predictions):
-        some = [each for each in validation.predictions if each.model.name == name]
-        each = min(some, key=lambda one: size_difference(one.model.source, one.source))
-        told = f"Unseen, {each.source.name}: the response is predicted by the {name} "
-        parts: list[str | Amount] = [told + each.against.verdict]
-        if each.output is not None:
-            low, high = each.model.lowest, each.model.highest
-            parts += ["; the output that it makes of the unseen torque is off by "]
-            parts += [Amount(each.output, "percent"), f" from {low:.3g} to {high:.3g} Hz"]
-        yield Conclusion((*parts, "."))
