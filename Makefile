@@ -13,7 +13,7 @@ NPM_CI := npm ci --prefix tests/browser --ignore-scripts --no-audit --no-fund
 
 help:
 	@echo "make demo     run the quick-start protocol on the simulated bench and report it"
-	@echo "make test     run the test suite; with ROOM=archive that room and those that import it"
+	@echo "make test     run the tests; ROOM=archive: of that room and those that import it; SLOW=1: all"
 	@echo "make statistics  how often intervals hold, in thousands of draws (long; MINUTES=4 ends it)"
 	@echo "make soak     wear: hundreds of kills, thousands of damaged files, a million frames (long)"
 	@echo "make mutants  put small bugs into what keeps the bench safe: do the tests notice? (long)"
@@ -37,14 +37,12 @@ PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --max-worker-res
 WHOLE_FILES = --dist loadfile --no-loadscope-reorder
 HANGING = -o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true
 
-ifdef ROOM
+# Fast ones are what one runs before each commit; `.ci/run` has SLOW=1.
+FAST = $(if $(SLOW),,-m "not slow and not soak and not statistics")
+
 test: $(VENV)/installed-test
-	tests=$$($(BIN)/python tests/rooms.py $(ROOM)) && $(PYTEST) $(WHOLE_FILES) $(HANGING) \
-		-m "not slow and not soak and not statistics" $$tests $(PYTEST_OPTIONS)
-else
-test: $(VENV)/installed-test
-	$(PYTEST) $(WHOLE_FILES) $(HANGING) $(PYTEST_OPTIONS)
-endif
+	tests=$(if $(ROOM),$$($(BIN)/python tests/rooms.py $(ROOM))) && $(PYTEST) $(WHOLE_FILES) $(HANGING) \
+		$(FAST) $$tests $(PYTEST_OPTIONS)
 
 # MINUTES=... ends it then, with a sample that is another one for each commit.
 statistics: $(VENV)/installed-test

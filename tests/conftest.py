@@ -26,7 +26,7 @@ hypothesis.settings.register_profile("usual", deadline=None, derandomize=True)
 hypothesis.settings.register_profile("many", deadline=None, max_examples=5000)
 hypothesis.settings.load_profile("usual")
 
-SLOW = 5.0
+SLOW = 2.0
 """s of a core, alone, above which a test is to be marked `slow`."""
 LONG = ("slow", "statistics", "soak")
 ENDS = pytest.StashKey[float]()

@@ -68,6 +68,7 @@ def test_a_flag_says_so(info):
     assert (info["quick"].accepts, info["quick"].default) == ("true or false", False)
 
 
+@pytest.mark.slow
 def test_a_table_of_paths_is_listed_with_what_its_values_take():
     found = {info.name: info for info in describe(Bench)}
     shares = found["gear.preload.shares"]

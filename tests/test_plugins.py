@@ -71,6 +71,7 @@ def test_the_names_read_from_sources_are_those_that_the_modules_have(package: st
     assert not list(kinds.plug_ins)
 
 
+@pytest.mark.slow
 def test_names_import_no_kind_and_a_kind_imports_no_other(packages: Packages) -> None:
     packages.grease()
     code = """
@@ -270,6 +271,7 @@ def page(packages: Packages) -> Packages:
     return packages
 
 
+@pytest.mark.slow
 def test_the_page_s_own_test_passes(page: Packages) -> None:
     shutil.rmtree(page.folder / "grease-1.0.dist-info")
     code = """
@@ -281,6 +283,7 @@ sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "packages/tests/test_greas
     assert "3 passed" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_page_s_model_can_be_named_by_a_bench_and_compiles(page: Packages) -> None:
     code = """
 import json

@@ -101,6 +101,7 @@ def found(file: str) -> frozenset[tuple[str, str]]:
     return frozenset(uses(parsed(file)))
 
 
+@pytest.mark.slow
 def test_nothing_that_windows_lacks_is_used_without_saying_so() -> None:
     loose = {(file, *one) for file in OURS for one in found(file) if (file, one[0]) not in ALLOWED}
     assert not loose
@@ -137,6 +138,7 @@ def test_uses_are_found(text: str, expected: set[tuple[str, str]]) -> None:
     assert set(uses(ast.parse(text))) == expected
 
 
+@pytest.mark.slow
 def test_text_files_are_opened_with_their_encoding() -> None:
     """Without one it is the machine's: not UTF-8 on Windows."""
     loose = [
@@ -161,6 +163,7 @@ def _opens_text(call: ast.Call) -> bool:
     return name == "open" and any(text)
 
 
+@pytest.mark.slow
 def test_the_syntax_is_that_of_python_3_11() -> None:
     for file in FILES:
         ast.parse((ROOT / file).read_text(encoding="utf-8"), file, feature_version=(3, 11))

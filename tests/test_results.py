@@ -84,6 +84,7 @@ def everything(found: campaign.api.Results) -> str:
     return to_text(from_text(text, arrays.__getitem__), place)  # 5 is 5.0 where a number is meant
 
 
+@pytest.mark.slow
 def test_what_is_read_is_what_analysis_finds(run):
     read = campaign.open(run).results
     computed = campaign.open(alone(run)).results
@@ -135,6 +136,7 @@ def test_the_scoreboard_is_a_table(run):
     np.testing.assert_allclose(tried["deviation"][told], again[told], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bytes_wherever_and_whenever(run, tmp_path, monkeypatch):
     before = results_path(run).read_bytes()
     elsewhere = tmp_path / "elsewhere"
@@ -147,6 +149,7 @@ def test_the_same_run_gives_the_same_bytes_wherever_and_whenever(run, tmp_path, 
     assert results_path(elsewhere / run.name).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_report_of_a_run_writes_beside_the_run_wherever_the_page_goes(run, tmp_path):
     sealed = run.read_bytes()
     page = tmp_path / "page"
@@ -156,6 +159,7 @@ def test_a_report_of_a_run_writes_beside_the_run_wherever_the_page_goes(run, tmp
     assert run.read_bytes() == sealed
 
 
+@pytest.mark.slow
 def test_something_else_in_its_place_is_left_alone_and_said(run, capsys):
     path = results_path(run)
     path.write_text("mine")
@@ -168,6 +172,7 @@ def test_something_else_in_its_place_is_left_alone_and_said(run, capsys):
     assert f"; {path}" not in said  # among what was written
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_costs_the_results_and_not_the_page(
     run, tmp_path, monkeypatch, capsys
 ):
@@ -222,6 +227,7 @@ def test_a_damaged_file_is_not_used(run):
         _ = campaign.open(run, strict=True).results
 
 
+@pytest.mark.slow
 def test_results_measured_anew_are_told_from_others(run):
     report(run, measure_anew=True)
     with warnings.catch_warnings():
@@ -246,6 +252,7 @@ def test_a_damaged_trial_is_left_out_and_told_of(run):
         _ = campaign.open(run, strict=True).results
 
 
+@pytest.mark.slow
 def test_a_report_of_a_damaged_run_keeps_what_was_found_when_it_was_whole(run, tmp_path):
     before = results_path(run).read_bytes()
     with h5py.File(run) as file:
@@ -305,6 +312,7 @@ def test_key_numbers_are_findings_and_conditions_may_be_called_anything(run):
     assert results.published.empty
 
 
+@pytest.mark.slow
 def test_a_run_in_progress_has_results_of_what_there_is(tmp_path):
     from campaign.archive import RunWriter
     from campaign.backends.sim import SimBackend, SimOptions
@@ -326,6 +334,7 @@ def test_a_run_in_progress_has_results_of_what_there_is(tmp_path):
         _ = campaign.open(writer.folder).results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S))
 def test_the_examples_of_the_page_run(block, run, monkeypatch):
     for module in ("xarray", "h5netcdf"):

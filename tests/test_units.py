@@ -273,6 +273,7 @@ unit_texts = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=600, deadline=None)
 @given(
     st.sampled_from(QUANTITIES),

@@ -20,6 +20,7 @@ from campaign.experiments.post_processing.axis_units import (
 )
 from campaign.experiments.post_processing.draws import draws_of, merged
 from campaign.experiments.post_processing.key_numbers import KeyQuantity, key_numbers
+from campaign.experiments.post_processing.key_numbers import key as key
 from campaign.experiments.post_processing.recording_checks import (
     doubt,
     doubted,

@@ -36,8 +36,7 @@ from campaign.experiments.friction_map.runs import (
     settling_notes,
 )
 from campaign.experiments.friction_map.warnings import map_warnings
-from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, TrialData, key
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts

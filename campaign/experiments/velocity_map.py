@@ -24,8 +24,7 @@ from campaign.experiments.friction_map.runs import (
     settling_notes,
 )
 from campaign.experiments.friction_map.warnings import map_warnings
-from campaign.experiments.interface import Experiment, TestData
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, key
 from campaign.experiments.shared.common import failures_note, grouped
 from campaign.result import Result
 

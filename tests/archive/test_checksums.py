@@ -50,6 +50,7 @@ def test_digests_that_were_computed_by_hand():
     assert text_digest("°") == degree  # printf '°' | sha256sum
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 40_000), max_size=6))
 @settings(max_examples=15, deadline=None)
 def test_the_digest_does_not_depend_on_how_the_samples_come(lengths):

@@ -62,6 +62,7 @@ def check_whole(results: Path, kit, reported: list[int]) -> None:
         assert run.unchanged()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(6))
 def test_a_kill_at_any_moment_loses_no_finished_trial(tmp_path, kit, attempt):
     child = start(tmp_path, trials=399)
@@ -74,6 +75,7 @@ def test_a_kill_at_any_moment_loses_no_finished_trial(tmp_path, kit, attempt):
     assert (summary.status, summary.problem) == (RunStatus.INCOMPLETE, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attempt", range(4))
 def test_a_kill_while_sealing_leaves_the_folder_or_the_file(tmp_path, kit, attempt):
     child = start(tmp_path, trials=25)
@@ -92,6 +94,7 @@ def limit_file_size() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_grow_fails_the_seal_and_keeps_the_trials(tmp_path, kit):
     child = start(tmp_path, 25, preexec_fn=limit_file_size, stderr=subprocess.PIPE)
     said, errors = child.communicate()

@@ -313,6 +313,7 @@ def test_an_act_is_found_by_those_whom_it_concerns(sealed, act, effort):
 SEEDS = (0, 1, *(pytest.param(seed, marks=pytest.mark.soak) for seed in range(2, 20)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_whatever_is_delivered_is_what_was_recorded(sealed, seed):
     """However it was changed, a reader gets it as it was, or is refused."""

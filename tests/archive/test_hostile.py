@@ -367,6 +367,7 @@ def test_a_flipped_sample_is_named_by_trial_and_channel(sealed):
     assert not run.unchanged()
 
 
+@pytest.mark.slow
 def test_mutated_files_are_read_right_or_refused(sealed):
     original = read_all(sealed)
     content = sealed.read_bytes()

@@ -81,6 +81,7 @@ def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None
     writer.close()
 
 
+@pytest.mark.slow
 def test_a_program_that_dies_while_it_measures_has_lost_no_recording(tmp_path: Path, kit) -> None:
     script = str(Path(__file__).with_name("conftest.py"))
     ended = subprocess.run([sys.executable, "-c", CRASH, script, str(tmp_path)], check=False)

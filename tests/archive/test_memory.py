@@ -49,12 +49,14 @@ def most(folder: Path, kit, count: int) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_no_text_of_a_trial_stays_in_memory(tmp_path: Path, kit, monkeypatch) -> None:
     monkeypatch.setattr(os, "fsync", lambda descriptor: None)  # takes most of the time
     few, many = (most(tmp_path / str(count), kit, count) for count in (FEW, 3 * FEW))
     assert (many - few) / (2 * FEW) < LONG / 2
 
 
+@pytest.mark.slow
 def test_texts_written_in_pieces_are_what_the_folder_had(tmp_path: Path, kit, monkeypatch) -> None:
     monkeypatch.setattr(os, "fsync", lambda descriptor: None)
     writer = begun(tmp_path, kit, 5 * FEW)

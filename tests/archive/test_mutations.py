@@ -34,6 +34,7 @@ def mutations(folder: Path, count: int, seed: int) -> dict[str, int]:
     return {kind: int(n) for kind, n in (pair.split("=") for pair in done.stdout.split())}
 
 
+@pytest.mark.slow
 def test_a_damaged_archive_is_read_right_or_refused(archives):
     tally = mutations(archives, 60, 1)
     assert sum(tally.values()) == 60

@@ -192,6 +192,7 @@ def test_arrays_that_no_plot_can_show_are_kept(run):
     assert [list(each.y) for each in curves] == [[1.0, 2.0, 3.0], [0.0, 1.0]]
 
 
+@pytest.mark.slow
 def test_any_names_make_a_file(run):
     names = ("../up", "a/b", "", "ü b", "7", "published", "record", "run", "arrays", "title")
     result = Result((table(), table()), (map_figure(), map_figure()))

@@ -277,6 +277,7 @@ def test_what_has_ended_or_is_no_run_is_refused(tmp_path, kit):
         RunWriter.resume(tmp_path / "nothing.partial", **RESUMED)
 
 
+@pytest.mark.slow
 def test_one_process_at_a_time_writes_a_run(tmp_path, kit):
     writer, trials = begin(tmp_path, kit)
     program = "import sys; from pathlib import Path; from campaign.archive import RunWriter\n"
@@ -339,6 +340,7 @@ def kill_again_and_again(results, kit, kills, seed):
     return reported
 
 
+@pytest.mark.slow
 def test_a_kill_while_resuming_or_sealing_loses_nothing(tmp_path, kit):
     kill_again_and_again(tmp_path, kit, kills=4, seed=5)
 
@@ -499,6 +501,7 @@ def test_ten_hours_are_archived_in_flat_memory(tmp_path):
     assert max(figures.values()) < 500  # MB
 
 
+@pytest.mark.slow
 def test_twenty_minutes_take_no_more_memory_than_two(tmp_path):
     program = Path(__file__).parents[2] / "benchmarks" / "long_recording.py"
     command = [sys.executable, str(program), "--json", "--folder", str(tmp_path), "--hours"]

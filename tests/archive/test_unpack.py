@@ -16,6 +16,7 @@ NOISE = np.random.default_rng(1).normal(size=1000)
 COUNT = len(NOISE)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(width=64), min_size=1, max_size=300), st.booleans())
 @settings(max_examples=60, deadline=None)
 def test_what_was_packed_is_unpacked_to_the_bit(values, shuffled):
@@ -44,6 +45,7 @@ def test_a_chunk_of_less_than_it_says_is_refused(less):
     assert unpack(zlib.compress(NOISE.tobytes()[:-less]), COUNT, shuffled=False) is None
 
 
+@pytest.mark.slow
 def test_a_chunk_that_would_expand_to_a_gigabyte_takes_no_more_than_its_samples():
     packer = zlib.compressobj(9)
     bomb = b"".join(packer.compress(bytes(1 << 20)) for _ in range(256)) + packer.flush()

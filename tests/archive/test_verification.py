@@ -87,6 +87,7 @@ def described(tmp_path, kit):
     return writer.seal(RunStatus.COMPLETE, "", ended=kit.ENDED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["", "trial_00001/instrument/name", "trial_00003/data/time"])
 @pytest.mark.parametrize("dies", [False, True])
 def test_several_processes_find_what_one_does(described, monkeypatch, place, dies):
@@ -119,6 +120,7 @@ LARGE = "trial_00003/"
 """What the trial of two chunks has; all else is changed in a run without it, which is small."""
 
 
+@pytest.mark.slow
 def test_whatever_dataset_is_changed_it_is_named(good, kit):
     """With a checksum of its own that fits; it is not left to the hash of the file.
 
@@ -177,6 +179,7 @@ def flips(path: Path, count: int, seed: int) -> None:
     assert verify_run(path).sound
 
 
+@pytest.mark.slow
 def test_a_byte_that_is_not_as_it_was_is_always_found(tmp_path, kit):
     flips(kit.run(tmp_path, [50, None], **PROVENANCE), 120, 1)
 
@@ -240,6 +243,7 @@ def test_parts_that_do_not_agree_are_named(good, place, old, new, told):
     assert any(line.startswith(told) for line in found), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "told"),
     [
@@ -258,6 +262,7 @@ def test_a_record_that_does_not_agree_with_its_trial_is_named(good, change, told
     assert any(found.startswith(told) for found in places(good)), verify_run(good).problems
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "value", "told"),
     [

@@ -89,6 +89,7 @@ def test_the_preview_keeps_within_its_points_however_long_the_recording():
         assert len(preview.points()[0]) <= 100
 
 
+@pytest.mark.slow
 @given(
     values=st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=700),
     points=st.sampled_from([8, 20, 100]),

@@ -391,6 +391,7 @@ def test_nor_does_a_refusal(here: Here, text: str) -> None:
     assert here.attacked("refuses", text).ended(ExitCode.USAGE, FAULT).refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at", "do"),
     [
@@ -452,6 +453,7 @@ def test_the_limit_of_a_rate_is_judged_in_the_unit_that_it_has(here: Here) -> No
     assert done.run.trials[0].recording()[RATE] == pytest.approx([90 * DEG])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("do", "word"),
     [
@@ -522,6 +524,7 @@ NO_BLOCKS = (
 )
 
 
+@pytest.mark.slow
 def test_a_block_that_is_none_is_a_fault_of_its_trial(here: Here) -> None:
     done = here.attacked_in_turn("samples", NO_BLOCKS).ended(FAULT).sealed()
     *spoilt, good = done.run.trials
@@ -591,6 +594,7 @@ def test_what_it_does_to_the_process_moves_no_archive(here: Here, at: str, do: s
         assert done.archive.stat().st_mode & 0o777 == 0o644
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", ["open", "enter"])
 def test_one_that_takes_the_signals_is_a_fault_or_has_no_success(here: Here, at: str) -> None:
     do = "(signal.signal(signal.SIGINT, signal.SIG_IGN), good)[1]"
@@ -614,6 +618,7 @@ def attacked_apart(packages: Packages, at: str, do: str, backend: str = "hostile
     return process(packages, arguments(at, do, backend, "moves.toml"))
 
 
+@pytest.mark.slow
 def test_standard_output_holds_the_path_and_nothing_else(apart: Packages) -> None:
     (apart.folder.parent / "spam").touch()
     done = attacked_apart(apart, "all", SPAM).ended(DONE).sealed()
@@ -623,6 +628,7 @@ def test_standard_output_holds_the_path_and_nothing_else(apart: Packages) -> Non
     assert "SPAM" not in shown.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("at", "do", "code"),
     [
@@ -639,6 +645,7 @@ def test_a_process_of_its_own_ends_alike(apart: Packages, at: str, do: str, code
     assert process(apart, ("verify", str(done.archive))).code == DONE
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and libraries of POSIX")
 @pytest.mark.parametrize(
     "do",

@@ -310,6 +310,7 @@ def test_what_was_taken_is_read_again_when_the_run_was_killed(folder: Path) -> N
     assert not (folder / "trial-00003" / "attempt-2").exists()
 
 
+@pytest.mark.slow
 def test_a_matlab_file_does_as_well(folder: Path) -> None:
     savemat(folder / "trial-00003" / "returned" / "rec.mat", columns_of())
     (folder / "trial-00003" / "returned" / "done.txt").touch()
@@ -422,6 +423,7 @@ def test_the_manifest_beside_a_recording_says_whose_it_is(folder: Path) -> None:
     assert "trial-00004" in done.ending.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["csv", "mat"])
 def test_a_truncated_file_is_refused_and_named(folder: Path, ending: str) -> None:
     returned = folder / "trial-00003" / "returned"

@@ -156,6 +156,7 @@ def hold_to_it(faults: tuple[str, ...], trials: int) -> list[Ending]:
 NOISY = ("corrupt=1e-4", "drop=5e-5", "lost-blocks=0.01")
 
 
+@pytest.mark.slow
 def test_a_bad_line_damages_nothing_silently() -> None:
     endings = hold_to_it(NOISY, 6)
     assert sum(int(str(ending.telemetry["resend_requests"])) for ending in endings) > 0

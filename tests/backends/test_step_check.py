@@ -85,6 +85,7 @@ def test_together_each_is_checked_by_its_own() -> None:
     assert endings[0].telemetry != endings[2].telemetry
 
 
+@pytest.mark.slow
 def test_a_user_is_told(tmp_path: Path) -> None:
     write(tmp_path, SEA)
     done = campaign(tmp_path, "run", "protocol.toml", "--check-step")

@@ -11,6 +11,7 @@ import pytest
 from tests.browser.pages import PAGES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_no_request_leaves_and_the_policy_forbids_nothing_the_page_does(show, name):
     shown = show(name)
@@ -24,6 +25,7 @@ def test_no_request_leaves_and_the_policy_forbids_nothing_the_page_does(show, na
     assert shown.messages == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_the_page_states_a_policy_that_lets_nothing_in(show, name):
     policy = show(name).page.locator("meta[http-equiv=Content-Security-Policy]")
@@ -71,6 +73,7 @@ def test_a_script_that_came_in_would_not_run(show, name):
     assert page.evaluate("window.hacked") is None
 
 
+@pytest.mark.slow
 def test_hostile_text_is_only_text(show):
     shown = show("hostile")
     page = shown.page

@@ -64,6 +64,7 @@ ERRORS = "Position error by compensation method"
 RATES = "Rate of the load relative to the hull"
 
 
+@pytest.mark.slow
 def test_the_switch_is_reached_by_keyboard_and_turns_figures_and_turns_them_back(shown):
     page = shown.page
     figure = page.locator("figure", has_text=ERRORS).first
@@ -84,6 +85,7 @@ def test_the_switch_is_reached_by_keyboard_and_turns_figures_and_turns_them_back
     assert shown.requests == shown.violations == shown.messages == []
 
 
+@pytest.mark.slow
 def test_the_cursor_tells_the_data_to_float32(shown):
     page = shown.page
     switch(page).click()
@@ -108,6 +110,7 @@ def test_every_curve_of_a_panel_tells_a_value(shown):
     assert set(read(plots)) == {"Time (s)", *made_up.METHODS.values()}
 
 
+@pytest.mark.slow
 def test_dragging_zooms_and_a_key_or_a_double_click_shows_all_again(shown):
     page = shown.page
     switch(page).click()
@@ -128,6 +131,7 @@ def test_dragging_zooms_and_a_key_or_a_double_click_shows_all_again(shown):
         assert stretch(page, plots) == pytest.approx(whole, abs=0.01)
 
 
+@pytest.mark.slow
 def test_keys_zoom_at_the_cursor_and_move_the_stretch(shown):
     page = shown.page
     switch(page).click()
@@ -143,6 +147,7 @@ def test_keys_zoom_at_the_cursor_and_move_the_stretch(shown):
     assert stretch(page, plots) == pytest.approx([0.0, 8.0], abs=0.05)  # never beyond the data
 
 
+@pytest.mark.slow
 def test_a_stretch_that_the_figure_asks_for_is_where_it_begins_and_comes_back_to(shown):
     page = shown.page
     switch(page).click()
@@ -155,6 +160,7 @@ def test_a_stretch_that_the_figure_asks_for_is_where_it_begins_and_comes_back_to
     assert stretch(page, plots, 1) == asked
 
 
+@pytest.mark.slow
 def test_units_are_those_of_the_static_figure(shown):
     page = shown.page
     figure = page.locator("figure", has_text=RATES).first
@@ -172,6 +178,7 @@ def test_units_are_those_of_the_static_figure(shown):
     assert "Time (s)" in still
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_in_figures_that_zoom(show, axe, scheme):
     page = show("interactive", unfold=True, color_scheme=scheme).page
@@ -225,6 +232,7 @@ def test_colours_follow_the_page(shown):
     assert shown.messages == []
 
 
+@pytest.mark.slow
 def test_without_scripts_the_page_is_the_static_one(show):
     page = show("interactive", unfold=True, java_script_enabled=False).page
     static = show("usual", unfold=True, java_script_enabled=False).page
@@ -233,6 +241,7 @@ def test_without_scripts_the_page_is_the_static_one(show):
     assert page.screenshot(full_page=True) == static.screenshot(full_page=True)
 
 
+@pytest.mark.slow
 def test_hostile_names_are_only_names_in_figures_that_zoom(show):
     shown = show("hostile-interactive")
     page = shown.page

@@ -13,6 +13,7 @@ FEW = 25
 PER_FIGURE = 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["usual", "long"])
 def test_figures_are_a_few_strokes_away_with_few_stops_and_focus_is_seen(show, name):
     page = show(name).page
@@ -29,6 +30,7 @@ def test_figures_are_a_few_strokes_away_with_few_stops_and_focus_is_seen(show, n
     assert [stop.what for stop in found if not stop.shown] == []
 
 
+@pytest.mark.slow
 def test_the_first_stop_skips_to_the_results(show):
     page = show("usual").page
     page.keyboard.press("Tab")
@@ -62,6 +64,7 @@ NUMBERS = """() => [...document.querySelectorAll("#scoreboard table li")]
 """The scoreboard's published numbers that are seen; each begins with the sign of its status."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scripts", [True, False])
 def test_the_scoreboard_is_filtered_by_status_with_the_keyboard(show, scripts):
     """Each choice says its status, its sign and how many it leaves; the first leaves all."""
@@ -83,6 +86,7 @@ def test_the_scoreboard_is_filtered_by_status_with_the_keyboard(show, scripts):
     assert page.evaluate(NUMBERS) == everything
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["TSV", "Markdown", "LaTeX"])
 def test_a_table_is_copied_by_a_button(show, form):
     page = show("usual", unfold=True, permissions=["clipboard-read", "clipboard-write"]).page

@@ -16,6 +16,7 @@ SMALLEST_LABEL = 9.0
 LARGEST_SHIFT = 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "width", "height"),
     [("light", 1440, 500), ("dark", 360, 740)],
@@ -27,6 +28,7 @@ def test_axe_finds_nothing(show, axe, name, scheme, width, height):
     assert axe(page) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_the_page_is_no_wider_than_the_window(show, name):
     page = show(name, unfold=True).page
@@ -53,6 +55,7 @@ WIDER = """() => {
 }"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 1440])
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_moves_while_it_loads_and_is_scrolled(show, name, width):

@@ -66,16 +66,19 @@ def said_by_html_validate(node, package, all_pages, tmp_path_factory):
     return html_validate(node, package(HTML_VALIDATE), [*all_pages.values()], output)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_the_nu_checker_has_nothing_to_say(said_by_nu, all_pages, name):
     assert said_by_nu[all_pages[name]] == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_html_validate_has_nothing_to_say(said_by_html_validate, all_pages, name):
     assert said_by_html_validate[all_pages[name]] == {}
 
 
+@pytest.mark.slow
 def test_both_checkers_would_say_something(program, node, package, tmp_path):
     bad, output = tmp_path / "bad.html", tmp_path / "found.json"
     bad.write_text("<!doctype html><title>x</title><p><div></p><img src=x><a href='#no'>y</a>")
@@ -83,6 +86,7 @@ def test_both_checkers_would_say_something(program, node, package, tmp_path):
     assert html_validate(node, package(HTML_VALIDATE), [bad], output)[bad]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_anchors_lead_somewhere_and_ids_are_unique(show, name):
     found = show(name).page.evaluate(

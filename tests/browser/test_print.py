@@ -67,6 +67,7 @@ def squeezed(text):
     return re.sub(r"\s+", "", text).casefold()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["usual", "damaged", "long"])
 def test_what_is_folded_on_the_screen_is_on_paper(show, printed, name):
     paper = "".join(sheet.text for sheet in printed(name))

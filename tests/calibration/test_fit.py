@@ -32,6 +32,7 @@ def run(path: Path, workers: int = 1, leave_out: bool = False) -> CalibrationOut
     )
 
 
+@pytest.mark.slow
 def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
     outcome = run(write(tmp_path), leave_out=True)
     inertia, viscous = outcome.values
@@ -57,6 +58,7 @@ def test_recovers_the_truth_from_a_closed_form(tmp_path: Path) -> None:
     assert result["leave_one_out"]["worst_deviation_percent"] < 1
 
 
+@pytest.mark.slow
 def test_disagreeing_cells_widen_the_intervals_and_spoil_predictions(tmp_path: Path) -> None:
     scale = (1.1, 0.9, 1.1, 0.9)
     outcome = run(write(tmp_path, ONE_START, published=table(scale)), leave_out=True)
@@ -68,12 +70,14 @@ def test_disagreeing_cells_widen_the_intervals_and_spoil_predictions(tmp_path: P
     assert left["fitted_worst_deviation_percent"] == fit["worst_deviation_percent"]
 
 
+@pytest.mark.slow
 def test_neither_workers_nor_repetition_change_a_digit(tmp_path: Path) -> None:
     path = write(tmp_path, PROTOCOL.replace("max_evaluations = 30", "max_evaluations = 3"))
     texts = {result_text(run(path, workers), "b.toml") for workers in (1, 2, 1)}
     assert len(texts) == 1
 
 
+@pytest.mark.slow
 def test_names_a_parameter_that_no_cell_depends_on(tmp_path: Path) -> None:
     idle = """
 [[calibration.parameter]]
@@ -93,6 +97,7 @@ upper = 1.0
     assert "interval_95_wide" not in by_name["inertia"]
 
 
+@pytest.mark.slow
 def test_names_a_parameter_at_its_bound(tmp_path: Path) -> None:
     narrow = ONE_START.replace('lower = "20 kg m^2"', 'lower = "45 kg m^2"')
     outcome = run(write(tmp_path, narrow))

@@ -96,6 +96,7 @@ def fitted(path: Path) -> tuple[float, ...]:
     ).values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["dahl", "gms"])
 def test_bristles_that_never_slip_are_found_from_a_closed_form(tmp_path: Path, model: str) -> None:
     told = {name: unit for name, (_, unit) in quantities(model).items()}
@@ -113,6 +114,7 @@ def test_bristles_that_never_slip_are_found_from_a_closed_form(tmp_path: Path, m
     assert fitted(path) == pytest.approx((INERTIA, STIFFNESS), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_friction_that_slides_is_found_from_simulated_cells(tmp_path: Path) -> None:
     """Parameters of gms by their effect alone."""
     friction = """\

@@ -55,6 +55,7 @@ def test_principal_steps_make_up_the_covariance() -> None:
     np.testing.assert_allclose(steps.T @ steps, covariance, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_covariance_and_propagation_are_those_of_least_squares(tmp_path: Path) -> None:
     """C = s^2 (J'J)^-1 with weights of 1 %; a cell's relative variance is g C g'."""
     found = outcome(tmp_path)
@@ -73,6 +74,7 @@ def test_covariance_and_propagation_are_those_of_least_squares(tmp_path: Path) -
         assert found.propagation.uncertainty[path] == pytest.approx(size * value, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_result_is_read_where_it_is_needed(tmp_path: Path) -> None:
     found = outcome(tmp_path)
     bench = '[known]\nfingerprint = { bench = "0123456789abcdef" }'
@@ -99,6 +101,7 @@ def test_without_a_fit_the_bench_stays_as_it_is(tmp_path: Path) -> None:
     assert result["parameter"][0]["value"] == result["parameter"][0]["before"] == "36 kg m^2"
 
 
+@pytest.mark.slow
 def test_an_unknown_that_is_not_determined_leaves_no_covariance(tmp_path: Path) -> None:
     idle = """
 [[calibration.parameter]]

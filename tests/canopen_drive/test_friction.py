@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from campaign.physics.bench import Bench
 from campaign.recording import Outcome
 from tests.canopen_drive.rig import BENCH, backend, execute
@@ -50,6 +52,7 @@ def executed(kind: str, options: dict[str, Any], drives: Make) -> tuple[list[Don
     return done, peaks
 
 
+@pytest.mark.slow
 def test_a_velocity_map_finds_coulomb_and_viscous_friction(drives: Make) -> None:
     done, _ = executed("velocity_map", MAP, drives)
     result = analyse("velocity_map", done)
@@ -60,6 +63,7 @@ def test_a_velocity_map_finds_coulomb_and_viscous_friction(drives: Make) -> None
             assert found.low < true < found.high, (quantity, direction, found)
 
 
+@pytest.mark.slow
 def test_ramps_find_the_breakaway_torque_of_each(drives: Make) -> None:
     done, peaks = executed("breakaway", RAMPS, drives)
     result = analyse("breakaway", done)

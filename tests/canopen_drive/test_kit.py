@@ -46,10 +46,12 @@ def check(name: str, speed: float) -> None:
         drive.wait(drive.at_rest_and_off)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CHECKS if name != IN_TIME])
 def test_canopen_passes(name: str, fast: float) -> None:
     check(name, fast)
 
 
+@pytest.mark.slow
 def test_canopen_hands_samples_over_in_time() -> None:
     check(IN_TIME, 1.0)

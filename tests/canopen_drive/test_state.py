@@ -81,6 +81,7 @@ def nearest(drive: SimulatedDrive, since: int) -> int:
     return max((NEARNESS[e[1]] for e in drive.log[since:] if e[0] == "state"), default=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", range(8))
 def test_a_moving_drive_comes_to_rest_with_each_quick_stop_option(option: int) -> None:
     name = channel()
@@ -132,6 +133,7 @@ def test_a_state_that_passes_between_two_readings(what: str, before: str, option
         bus.close()
 
 
+@pytest.mark.slow
 def test_it_is_not_at_rest_while_it_coasts() -> None:
     """605Ah of 0: off at once, and still moving."""
     name = channel()

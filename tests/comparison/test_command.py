@@ -24,6 +24,7 @@ def typed(results: Path, *names: str, **more: object) -> tuple[Path, ExitCode]:
     return compare_archives(names, results, output, (), open_it=False)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_declared_differences_come_first_and_the_code_is_0(
     results: Path, tmp_path: Path, capsys, monkeypatch
 ):

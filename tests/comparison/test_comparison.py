@@ -32,6 +32,7 @@ def compare(results: Path) -> Compare:
     return made
 
 
+@pytest.mark.slow
 def test_the_change_that_was_made_is_found_and_no_other(compare: Compare):
     (against,) = compare("before", "after").against
     found = {

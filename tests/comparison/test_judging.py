@@ -72,6 +72,7 @@ def step_up(p_values: list[float], rate: float) -> list[bool]:
     return [i in order[:largest] for i in range(len(p_values))]
 
 
+@pytest.mark.slow
 def test_what_is_declared_is_what_the_step_up_procedure_rejects(platform: Bench):
     draw = np.random.default_rng(3)
     for _ in range(8):
@@ -163,6 +164,7 @@ def shares(platform: Bench, count: int) -> tuple[float, float]:
     return float(np.mean(false)), float(np.mean(power))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "count",
     [pytest.param(40, id="sample"), pytest.param(1000, id="all", marks=pytest.mark.statistics)],

@@ -56,6 +56,7 @@ def seen(html: str) -> Seen:
     return found
 
 
+@pytest.mark.slow
 def test_anchors_are_unique_and_resolve_and_nothing_is_asked_of_a_network(page):
     found = seen(page[0])
     assert len(found.ids) == len(set(found.ids))
@@ -123,6 +124,7 @@ def pair(results: Path) -> Comparison:
     return compare_runs(runs, experiments())
 
 
+@pytest.mark.slow
 def test_the_same_archives_give_the_same_bytes_and_only_a_comparison_is_replaced(
     results: Path, tmp_path: Path
 ):

@@ -65,6 +65,7 @@ def test_of_comparisons_without_a_change_one_in_twenty_declares_anything(
     assert stats.binomtest(alarms, count // 2, RATE, alternative="greater").pvalue > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "seed"),
     [
@@ -93,6 +94,7 @@ def test_ten_percent_more_coulomb_friction_is_found(tmp_path: Path, count: int, 
     assert stats.binomtest(sum(held), len(held), 0.95, alternative="less").pvalue > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "seed"),
     [

@@ -50,6 +50,7 @@ def ended(
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize(("bench", "name"), SHIPPED)
 def test_shipped_compensations_have_the_bits_of_the_engine(
@@ -60,6 +61,7 @@ def test_shipped_compensations_have_the_bits_of_the_engine(
     assert said == "0 of 2000 samples differ\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", simulable("platform").compensation)
 def test_in_single_precision_it_is_near_and_nothing_is_a_double(tmp_path: Path, name: str) -> None:
     campaign(tmp_path, "export-compensation", "platform", name, "--to", "c-single")
@@ -74,6 +76,7 @@ def test_in_single_precision_it_is_near_and_nothing_is_a_double(tmp_path: Path, 
     assert said.stdout == "0 of 2000 samples differ\n"
 
 
+@pytest.mark.slow
 def test_a_step_function_of_a_plug_in_has_the_bits_of_the_engine(tmp_path: Path) -> None:
     made = of_a_plug_in()
     for inputs in (trial_inputs(made), hurting(made)):
@@ -117,6 +120,7 @@ int main(void)
     assert abs(most) == limit
 
 
+@pytest.mark.slow
 def test_the_program_of_the_command_ends_with_0_and_notices_a_wrong_number(tmp_path: Path) -> None:
     done = campaign(tmp_path, "export-compensation", "platform", "lugre", "--output", "code")
     assert "Loop, sliding, rate command: 5.85 Hz crossover, 69 deg, 30.9 dB" in done.out

@@ -69,6 +69,7 @@ def case_of(name: str, made: SampledCompensation, inputs: np.ndarray) -> Case:
     return name, made.identifier, m_code(made, ["a test"]), script(made, inputs)
 
 
+@pytest.mark.slow
 def test_shipped_compensations_are_within_the_bound(tmp_path: Path) -> None:
     shipped = [
         (f"{bench}-{name}", SampledCompensation.of(simulable(bench), name))
@@ -117,6 +118,7 @@ HURTS = (
 )
 
 
+@pytest.mark.slow
 def test_the_script_of_the_command_notices_a_wrong_number(tmp_path: Path) -> None:
     campaign(tmp_path, "export-compensation", "platform", "lugre", "--to", "matlab")
     text, test = (

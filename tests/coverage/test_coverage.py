@@ -113,6 +113,7 @@ def test_nothing_of_the_truth_is_recorded() -> None:
 # --- the truths --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_loop_of_platform_is_known() -> None:
     """As whole sweeps find it that have a point every 0.1 or 0.2 Hz: 7.158 Hz and 70.74 degrees (at
     34 deg/s); 30.99 dB by one to 300 Hz."""
@@ -132,6 +133,7 @@ def test_a_ramp_breaks_away_at_the_sum_of_all_interfaces() -> None:
     assert 0.9 * static < friction < (1.0 + amplitude) * (1.0 + 4 * 0.004) * static
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_wrong_exponent_is_the_closest_curve_of_its_kind() -> None:
     """Another optimiser, with a start of its own, finds the same curve; it is not the bench's."""
     from scipy.optimize import curve_fit

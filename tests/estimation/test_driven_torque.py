@@ -95,6 +95,7 @@ def test_a_torque_loses_most_of_its_noise_and_nothing_else() -> None:
         assert np.std(torque - driven(number)[0]) < 0.15 * NOISE
 
 
+@pytest.mark.slow
 def test_what_a_torque_is_off_by_is_told_by_standard_normal_factors() -> None:
     factors = []
     for seed in range(30):
@@ -114,6 +115,7 @@ def test_a_clean_torque_is_taken_as_it_was_measured() -> None:
         assert doubt.shape == (COUNT, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, pytest.param(40, marks=pytest.mark.statistics)])
 def test_a_torque_with_little_noise_is_regressed_where_the_rate_has_less(count: int) -> None:
     held = []
@@ -157,6 +159,7 @@ def test_short_trials_are_regressed_on_fewer_commands_or_refused() -> None:
         driven_torques([Driven(torque[:100], Command(1))], STEP, 0.5)
 
 
+@pytest.mark.slow
 def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque() -> None:
     records = [Record(STEP, drive.torque, rate=rate) for drive, rate in measured(0, 0.3)]
     assert identify_presliding_dynamics(records).plant.inertia > 1.05 * INERTIA
@@ -187,6 +190,7 @@ def test_intervals_hold_with_what_is_left_to_doubt_of_the_torque() -> None:
     assert max(told[False].mean(axis=0)) < 0.88
 
 
+@pytest.mark.slow
 def test_deviations_by_scores_know_what_is_left_to_doubt_of_the_torque() -> None:
     """Of white noise they are those of independent residuals and of what is known beforehand."""
     spread = identified(3, doubt=True).spread

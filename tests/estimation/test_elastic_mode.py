@@ -70,6 +70,7 @@ def held(draws: int, seed: int) -> dict[str, list[bool]]:
     return inside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("draws", "seed"), [(40, 1201), pytest.param(4000, 1202, marks=pytest.mark.statistics)]
 )

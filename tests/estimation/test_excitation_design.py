@@ -60,6 +60,7 @@ def test_its_crest_factor_is_lowered(seed: int) -> None:
 # Chirps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["linear", "logarithmic"])
 def test_a_chirp_has_the_frequency_that_it_says(law: Law) -> None:
     found = chirp(0.5, 20.0, 30.0, law)

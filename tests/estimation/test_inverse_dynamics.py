@@ -309,6 +309,7 @@ def test_blocks_left_out_are_those_of_fits_without_them() -> None:
 # Structure, delay, period -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.statistics)])
 def test_terms_are_chosen_that_are_there_and_no_others(count: int) -> None:
     motion = smooth_motion(40.0)
@@ -363,6 +364,7 @@ def test_a_delay_that_nothing_tells_is_not_determined() -> None:
     assert np.isnan(found.value) or found.half_width > 0.005
 
 
+@pytest.mark.slow
 def test_a_period_over_position_is_found() -> None:
     motion = smooth_motion(40.0)
     travel = np.ptp(motion.position)
@@ -435,6 +437,7 @@ def test_instruments_that_say_nothing_are_weak() -> None:
     assert found.strength[0] < 10.0
 
 
+@pytest.mark.slow
 def test_an_improvement_that_is_none_has_an_interval_around_zero() -> None:
     draw = np.random.default_rng(8)
     held = []

@@ -201,6 +201,7 @@ def test_the_limit_follows_the_loss() -> None:
     assert found.limit[0] == pytest.approx((-g + np.sqrt(g * g + s * rise)) / s, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [True, False])
 def test_intervals_near_a_bound_hold_whichever_side_the_data_choose(stated: bool) -> None:
     """Slope and offset of 12 points; the slope's truth is 0 to 2 standard errors from its bound.

@@ -104,6 +104,7 @@ def held_of(case: str, count: int, seed: int) -> dict[str, list[bool]]:
     return held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_sample_of_intervals_holds(case: str) -> None:
     assert rejected(held_of(case, 30, 1001)) == {}
@@ -161,6 +162,7 @@ def held_with_ripple(count: int, seed: int, amplitudes: tuple[float, ...]) -> di
     return held
 
 
+@pytest.mark.slow
 def test_a_sample_holds_with_ripple() -> None:
     assert rejected(held_with_ripple(15, 31, (0.005, 0.02))) == {}
 
@@ -189,6 +191,7 @@ def held_nominal(count: int, seed: int, together: float) -> dict[str, list[bool]
     return held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("together", [0.0, 0.9])
 def test_a_sample_of_nominal_values_holds(together: float) -> None:
     assert rejected(held_nominal(30, 77, together)) == {}
@@ -254,6 +257,7 @@ def test_only_repeats_tell_a_lack_of_fit() -> None:
     assert told[1] < 1e-4
 
 
+@pytest.mark.slow
 def test_lacks_of_fit_are_as_frequent_as_their_p_values() -> None:
     """100 maps of two repeats: p-values below 0.1 are binomial with that chance."""
     random = np.random.default_rng(11)
@@ -319,6 +323,7 @@ def coulomb_at_zero(coulomb: float, count: int, seed: int) -> dict[str, list[boo
     return held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.statistics)])
 def test_a_coulomb_torque_that_the_map_does_not_tell_has_no_limit(count: int) -> None:
     """25.3 N m or 0 with forty times the viscous friction: the curves are the same there."""
@@ -383,6 +388,7 @@ def hides_nothing(told: dict[str, Random16]) -> None:
     assert rejected(held, "less", 0.90) == {}
 
 
+@pytest.mark.slow
 def test_a_sample_of_random_maps_hides_nothing() -> None:
     hides_nothing(random_maps(40, 700))
 

@@ -324,6 +324,7 @@ def test_a_bound_is_a_bound_and_the_limit_is_one_sided(logarithmic: bool) -> Non
 # Intervals over repetitions, seeds fixed before looking
 
 
+@pytest.mark.slow
 def test_intervals_of_a_decay_hold() -> None:
     """A mildly nonlinear model: ln a and b of a exp(-b x), errors a tenth of a, 20 points."""
     x = np.linspace(0.0, 3.0, 20)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from campaign.estimation.angle_dependence import over_a_turn
 from tests.estimation.coverage import rejected
@@ -24,6 +25,7 @@ def strokes(random: np.random.Generator) -> list[tuple[np.ndarray, ...]]:
     return found
 
 
+@pytest.mark.slow
 def test_its_doubt_holds_what_is_wrongly_taken_off_short_strokes() -> None:
     """By stretches as draws without a correction for the few that decide 87 % held, not 95 %."""
     held = []

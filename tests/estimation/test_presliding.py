@@ -108,6 +108,7 @@ def test_errors_of_two_interfaces_come_from_the_true_slopes() -> None:
         np.testing.assert_allclose(found.jacobian[:, column], expected, atol=1e-3 * scale)
 
 
+@pytest.mark.slow
 def test_no_second_interface_where_there_is_none() -> None:
     random = np.random.default_rng(9)
     for noise in (0.001, 0.01):

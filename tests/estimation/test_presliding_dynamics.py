@@ -104,6 +104,7 @@ def true_values(truth: Truth) -> dict[str, float]:
 # The simulation ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "amplitude", "highest"),
     [
@@ -219,6 +220,7 @@ def test_lost_samples_cost_only_themselves() -> None:
 # Intervals that hold -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("draws", [10, pytest.param(32, marks=pytest.mark.statistics)])
 def test_intervals_hold_the_truth_as_often_as_they_say(draws: int, correlation: float) -> None:
@@ -233,6 +235,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(draws: int, correlation: 
     assert binomtest(min(hits.values()), draws, 0.95, "less").pvalue > 0.0015, hits
 
 
+@pytest.mark.slow
 def test_records_that_differ_widen_the_intervals() -> None:
     alike = records(SLOW, (1.0, 1.5, 2.0), 0.01)
     other = Truth(2.0, 0.0, (replace(SLOW.interfaces[0], s0=2060.0),))
@@ -254,6 +257,7 @@ def _estimate(found: PreslidingDynamics, name: str) -> Estimate:
     return found.estimates[name]
 
 
+@pytest.mark.slow
 def test_an_elastic_part_that_nobody_tells_is_a_misfit_and_one_that_is_told_is_not() -> None:
     truth = replace(SLOW, appendage=(0.2, 7.0, 0.02))
     every = records(truth, (1.0, 2.0), 0.01)
@@ -315,6 +319,7 @@ def _slow_motion(torque: Torque, count: int, noise: float) -> Record:
     return Record(0.02, torque(time), rate=rate + rough)
 
 
+@pytest.mark.slow
 def test_slow_reversals_say_nothing_of_inertia_and_damping() -> None:
     def slow(time: Array) -> Array:
         return np.asarray(3.0 * np.sin(2.0 * np.pi * 0.05 * time))

@@ -209,11 +209,13 @@ def of_readings(draws: int, seed: int) -> dict[str, list[bool]]:
     return held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
 def test_stiffness(interfaces: tuple[Interface, ...]) -> None:
     assert not rejected(of_stiffness(5, 1, interfaces))
 
 
+@pytest.mark.slow
 def test_no_number_leaves_out_an_interface_that_noise_hides() -> None:
     """As they were, 0 of 18 stiffnesses at rest below the noise held, with intervals of ±27 %."""
     assert not rejected(of_hidden(6, 4), "less")

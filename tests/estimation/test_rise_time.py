@@ -62,6 +62,7 @@ def test_intervals_hold_as_often_as_they_say(memory: float, sizes: tuple[float, 
     assert not rejected(held, "less")
 
 
+@pytest.mark.slow
 def test_they_are_no_wider_than_the_scatter_asks_for() -> None:
     for loop, response in LOOPS.items():
         found = [rise(response + noise(seed, 0.02)) for seed in range(SEEDS)]

@@ -150,6 +150,7 @@ def few(draws: int) -> pytest.MarkDecorator:
     return pytest.mark.parametrize(("draws", "seed"), [(draws, 31_000), *marked])
 
 
+@pytest.mark.slow
 @few(8)
 def test_close_points(draws: int, seed: int) -> None:
     held = pooled(CLOSE, draws, seed)
@@ -160,6 +161,7 @@ def test_close_points(draws: int, seed: int) -> None:
     assert rejected(narrow, "greater", TOO_WIDE) == {}
 
 
+@pytest.mark.slow
 @few(8)
 def test_far_points(draws: int, seed: int) -> None:
     held = pooled(FAR, draws, seed + 100)
@@ -167,6 +169,7 @@ def test_far_points(draws: int, seed: int) -> None:
     assert too_seldom(of_all(held)) == {}
 
 
+@pytest.mark.slow
 @few(16)
 def test_sweeps_that_end_below_the_crossing(draws: int, seed: int) -> None:
     held = pooled(SHORT, draws, seed + 200)
@@ -175,6 +178,7 @@ def test_sweeps_that_end_below_the_crossing(draws: int, seed: int) -> None:
     assert too_seldom(of_all(held)) == {}
 
 
+@pytest.mark.slow
 @few(8)
 def test_a_second_stage_makes_the_interval_narrow_and_keeps_it_honest(
     draws: int, seed: int

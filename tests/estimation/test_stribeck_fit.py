@@ -117,6 +117,7 @@ def test_a_map_without_slow_points_doubts_its_parameters() -> None:
 MANY = pytest.mark.statistics
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("slowest", "count"),
     [
@@ -246,6 +247,7 @@ def test_parameters_of_a_model_that_the_points_contradict_say_so() -> None:
     assert both["viscous_friction"].origin is Origin.CONTRADICTED
 
 
+@pytest.mark.slow
 def test_a_model_that_is_true_is_contradicted_once_in_five() -> None:
     count = sum(bool(bent(2.0, seed).contradiction("2")) for seed in range(200))
     low, high = 23, 60  # binomial, 200 of 0.2, 99.9 %
@@ -284,6 +286,7 @@ def lines(count: int) -> list[DirectionFit]:
     return [fit_direction(speed, line * each, np.full(20, 1e-3)) for each in scatter]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [60, pytest.param(600, marks=MANY)])
 def test_a_line_shows_no_stribeck_effect_and_its_intervals_hold(count: int) -> None:
     """Ts and Tc of the curve are apart by their interval in 6 of 100. Of the fit with delta = 2,

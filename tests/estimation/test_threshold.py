@@ -131,6 +131,7 @@ def drawn(curve, random, repeats, deviation, ratio) -> Estimate:
     return passing("threshold", TRIED, found, Threshold(limit, ratio))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "count",
     [pytest.param(80, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],

@@ -82,6 +82,7 @@ def test_units_and_origins_change_nothing():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "rho", "count"),
     [(5, 0.0, 40), (5, 0.5, 40), (10, 0.0, 40), (10, 0.5, 40), (30, 0.5, 40)]

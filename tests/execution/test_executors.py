@@ -93,6 +93,7 @@ def assert_same(archive: Path, expected: RunReader) -> None:
     assert not found.damaged
 
 
+@pytest.mark.slow
 def test_processes_archive_what_threads_archive(
     plan: Plan, by_threads: RunReader, tmp_path: Path
 ) -> None:
@@ -116,6 +117,7 @@ def test_processes_archive_what_threads_archive(
         assert spent[work].processor > 0.01
 
 
+@pytest.mark.slow
 def test_a_stop_ends_the_trials_of_processes_and_the_run_goes_on(
     plan: Plan, by_threads: RunReader, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,6 +164,7 @@ def kill_workers() -> bool:
     return bool(children)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_trials_of_workers_that_are_killed_are_repeated(
     plan: Plan, by_threads: RunReader, tmp_path: Path
@@ -187,6 +190,7 @@ def test_workers_that_always_die_end_the_run(plan: Plan, tmp_path: Path) -> None
     assert "the memory may be too small" in outcome.reason
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 @pytest.mark.parametrize("all_forgotten", [False, True])
 def test_a_batch_that_a_broken_pool_forgets_is_repeated(
@@ -260,6 +264,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_processes_end_with_a_run_that_is_killed_and_it_goes_on(
     plan: Plan, by_threads: RunReader, tmp_path: Path

@@ -241,6 +241,7 @@ def test_who_owes_none_may_take_its_time(before: str) -> None:
     assert Watched(does, SILENCE=0.2, TURN=0.1).end() == (0, "", "")
 
 
+@pytest.mark.slow
 @on_posix
 def test_the_sleep_of_both_is_no_silence() -> None:
     """A signal stops them together, as a laptop that is closed does."""

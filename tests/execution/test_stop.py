@@ -259,6 +259,7 @@ def test_the_guardian_knows_that_a_bench_is_connected_and_what_is_kept(guardian:
     assert not guardian.heard().moves
 
 
+@pytest.mark.slow
 @on_posix
 def test_what_guardian_and_program_have_both_heard_is_one(
     guardian: FakeGuardian, left: threading.Event
@@ -397,6 +398,7 @@ def test_a_program_that_hangs_already_is_heard_to_be_stopped_as_well(tmp_path: P
     assert said == "\nstopped at once; nothing was begun\n"
 
 
+@pytest.mark.slow
 @on_posix
 def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
     does = "asked(); stop.make_safe = lambda: made_safe(seconds=2.0); kept('kept')"

@@ -89,6 +89,7 @@ def test_undefined_samples_and_no_samples_draw_nothing_and_break_nothing() -> No
     assert not has_curve("".join(lines_of(trace)))
 
 
+@pytest.mark.slow
 def test_a_terminal_that_takes_nothing_holds_up_neither_samples_nor_progress() -> None:
     taken, terminal = os.pipe()
     display = WatchDisplay(terminal, lambda: os.terminal_size((200, 60)))

@@ -248,6 +248,7 @@ def test_every_experiment_declares_channels_of_the_vocabulary(kind: str) -> None
         assert (kind, name) in LOSSES
 
 
+@pytest.mark.slow
 @named
 def test_the_analysis_reads_nothing_that_is_not_declared(case: Case) -> None:
     whole = analysed(case)

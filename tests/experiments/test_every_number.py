@@ -58,6 +58,7 @@ SWEPT = {"bench.axis.inertia": 35.0, "noisy": True, "day": 3}
 """Of a matrix: numbers that were set stand in tables, too."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_number_has_an_interval_or_says_why_not(case: Case) -> None:
     swept = [

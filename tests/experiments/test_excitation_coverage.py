@@ -29,6 +29,7 @@ def test_series_tell_inertia_and_friction_of_three_rigs() -> None:
     assert rejected(held, "less") == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", THREE)
 def test_levels_of_distortion_differ_by_no_more_than_they_say(name: str) -> None:
     found: list[Estimate] = []

@@ -141,6 +141,7 @@ def told(found: Result) -> dict:  # type: ignore[type-arg]
     return {each.estimate.name: each for each in found.identified.parameters}
 
 
+@pytest.mark.slow
 def test_multisines_of_a_torque(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(7), "torque", 8.0), driven())
     parameters = told(found)
@@ -212,6 +213,7 @@ def test_friction_is_a_systematic_part_where_two_amplitudes_tell_it(tmp_path: Pa
     assert distortion[1]["odd"].value > 1.3 * distortion[0]["odd"].value
 
 
+@pytest.mark.slow
 def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
     made = trials(tmp_path, multisines(7), "torque", 8.0, appendage=False)
     found = identified(tmp_path, made, driven(side=1))
@@ -224,6 +226,7 @@ def test_a_sensor_behind_the_spring_is_recognised(tmp_path: Path) -> None:
     assert any("behind the spring" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_periods_before_the_window_settle(tmp_path: Path) -> None:
     """They are none of those that tell noise from distortion."""
     made = trials(tmp_path, multisines(7), "torque", 3 * PERIOD)
@@ -383,6 +386,7 @@ def true_phase_margin() -> float:
     return float(np.min(np.pi + np.unwrap(np.angle(loop))[crossed]))
 
 
+@pytest.mark.slow
 def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:
     found = identified(tmp_path, trials(tmp_path, multisines(7, 0.5), "rate", 8.0), looped())
     parameters = told(found)
@@ -391,6 +395,7 @@ def test_a_loop_is_told_by_its_command(tmp_path: Path) -> None:
     assert phase_margin(found).value == pytest.approx(true_phase_margin(), abs=0.05)
 
 
+@pytest.mark.slow
 def test_margins_of_a_loop_follow_from_noise_as_well(tmp_path: Path) -> None:
     made = trials(tmp_path, [noise(100.0, 10.0)], "rate", 100.0)
     found = identified(tmp_path, made, looped(), resolution="0.25 Hz")
@@ -412,6 +417,7 @@ def test_ramps_and_steps_give_no_response(tmp_path: Path, mode: str) -> None:
         identified(tmp_path, made, looped() if mode == "rate" else driven())
 
 
+@pytest.mark.slow
 def test_recorded_elsewhere_it_must_be_said_what_is_excited(tmp_path: Path) -> None:
     made = trials(tmp_path, [noise(100.0, 20.0)], "recorded", 100.0)
     with pytest.raises(ValueError, match="does not say what was excited"):
@@ -431,6 +437,7 @@ def test_recorded_elsewhere_it_must_be_said_what_is_excited(tmp_path: Path) -> N
     assert "coherence" in [figure.key for figure in found.figures]
 
 
+@pytest.mark.slow
 def test_angles_do_where_no_rate_is_recorded(tmp_path: Path) -> None:
     made = trials(tmp_path, multisines(7), "torque", 8.0)
     found = identified(tmp_path, made, driven(), without=(GYRO_RATE,))
@@ -438,6 +445,7 @@ def test_angles_do_where_no_rate_is_recorded(tmp_path: Path) -> None:
     assert told(found)["motor_inertia"].estimate.value == pytest.approx(DRIVE.motor, rel=0.02)
 
 
+@pytest.mark.slow
 def test_single_sines(tmp_path: Path) -> None:
     frequencies = np.round(np.geomspace(2.0, 40.0, 40), 2)
     commands = [Sine(amplitude=5.0, frequency=float(each)) for each in frequencies]

@@ -89,6 +89,7 @@ def held(seeds: range, told: bool) -> dict[str, list[bool]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [True, False])
 def test_the_benchs_own_friction_lies_in_the_intervals(told: bool) -> None:
     """All parameters of two maps; with ripple at one place Ts missed in 18 of 18, vs in 4.
@@ -217,6 +218,7 @@ def test_the_gate_judges_a_number_with_its_systematic_parts(
         assert found["stribeck_velocity"].origin is Origin.MEASURED
 
 
+@pytest.mark.slow
 def test_several_start_angles_are_averaged_and_make_one_map() -> None:
     """Half a period apart a ripple has the other sign; the map has as many speeds as before."""
     half = 0.5 * 360.0 / 67.0

@@ -139,6 +139,7 @@ def test_drift_that_goes_with_speed_is_told(tmp_path: Path):
     assert "changes with time" in notes(recorded(tmp_path, rate, friction(rate)))
 
 
+@pytest.mark.slow
 def test_all_stretches_of_a_long_recording_are_in_its_friction(tmp_path: Path):
     """Friction doubles half way: the mean of 500 strokes is that of all of them."""
     rate = strokes([0.3, -0.3] * 250, cruise=0.5, rest=0.1)

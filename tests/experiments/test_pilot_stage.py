@@ -128,6 +128,7 @@ def soft() -> Piloted:
 # --- what follows ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_follows_keeps_to_the_protocol(soft: Piloted) -> None:
     options, chosen = soft.options, speeds(soft.following)
     assert speeds(soft.pilot) == list(pilot_speeds(options))
@@ -209,6 +210,7 @@ def shifted(recording: Recording, bias: float) -> Recording:
     return replace(recording, channels={**recording.channels, "gyro_rate": moved})
 
 
+@pytest.mark.slow
 def test_a_long_ripple_makes_windows_longer() -> None:
     """60 periods per revolution are 6 deg, and the usual window 5 deg."""
     case = rippled(make_case(8), 60)
@@ -238,6 +240,7 @@ def test_a_pilot_that_failed_leaves_the_plain_map(soft: Piloted) -> None:
     assert "shows too little of friction: it has no steady point" in requests[0].note
 
 
+@pytest.mark.slow
 def test_a_pilot_without_a_stribeck_effect_leaves_the_plain_map() -> None:
     case = without_effect(make_case(4))
     flat = run(case, pilot=True, points=FEWEST, warm_up_cycles=0)
@@ -256,6 +259,7 @@ def without_effect(case: Case) -> Case:
     return Case(case.number, truth, case.stated, Scale(1.0, 1.0, 1.0, 1.0))
 
 
+@pytest.mark.slow
 def test_a_pilot_without_friction_leaves_the_plain_map() -> None:
     case = make_case(4)
     free = replace(case, truth=case.truth.with_friction({}))
@@ -336,6 +340,7 @@ def test_nothing_follows_a_plain_map() -> None:
     assert STAGE.most(PilotedMapOptions(), make_case(4).stated).trials == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_a_pilot_breaks_no_limit_of_a_narrow_rig(seed: int) -> None:
     bench = limited(seed).with_friction({})

@@ -53,6 +53,7 @@ def test_only_small_motions_are_taken() -> None:
     assert "reversal" in why or "come back" in why or "slides" in why
 
 
+@pytest.mark.slow
 def test_of_one_interface_stiffness_and_damping_go_to_the_bench() -> None:
     found = {each.estimate.name: each for each in identified(both=False).identified.parameters}
     for name, key, value in (
@@ -68,6 +69,7 @@ def test_of_one_interface_stiffness_and_damping_go_to_the_bench() -> None:
     assert found["damping_ratio"].estimate.value == pytest.approx(ratio, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_viscous_friction_is_taken_off_as_it_is_told() -> None:
     found = {
         e.estimate.name: e.estimate
@@ -76,6 +78,7 @@ def test_viscous_friction_is_taken_off_as_it_is_told() -> None:
     assert found["bristle_damping"].value == pytest.approx(found["damping_at_rest"].value - 54.0)
 
 
+@pytest.mark.slow
 def test_of_several_interfaces_only_their_sum_is_known_and_goes_nowhere() -> None:
     found = identified(both=True)
     told = {each.estimate.name: each for each in found.identified.parameters}
@@ -85,6 +88,7 @@ def test_of_several_interfaces_only_their_sum_is_known_and_goes_nowhere() -> Non
     assert any("2 interfaces" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_unseen_trials_are_predicted_and_not_fitted() -> None:
     found = identified(False, validation=shaken(False, 7))
     assert found.identified.parameters == identified(False).identified.parameters

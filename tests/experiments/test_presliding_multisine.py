@@ -113,6 +113,7 @@ def test_stiffness_damping_and_inertia_are_found_as_the_sums_that_they_are() -> 
     assert all(finding.known.has_interval for finding in told.values())
 
 
+@pytest.mark.slow
 def test_an_interface_that_slips_is_no_number() -> None:
     result = found("3 N m", "9 N m")
     told: list[Estimate] = [finding.known for finding in result.findings]

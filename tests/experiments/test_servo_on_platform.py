@@ -61,6 +61,7 @@ def platform() -> Bench:
     return load_bench("platform")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("draws", "seed"), [(2, 50_000), pytest.param(60, 60_000, marks=pytest.mark.statistics)]
 )

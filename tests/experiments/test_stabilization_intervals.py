@@ -165,6 +165,7 @@ draws = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @draws
 def test_repeated_trials_hold_the_error_of_the_bench(count: int) -> None:
     """Mean and ratio of 3 and of 5 trials; the truth is the mean of all that were made.
@@ -189,6 +190,7 @@ def test_repeated_trials_hold_the_error_of_the_bench(count: int) -> None:
     assert rejected(held, "less") == {}
 
 
+@pytest.mark.slow
 @draws
 def test_half_cycles_hold_the_error_of_their_own_trial(count: int) -> None:
     """The truth is what thirty cycles of the same trial come to."""

@@ -54,6 +54,7 @@ def digest(curve: Any) -> bytes:
     ).tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_codes_in_place_of_texts_change_no_number(
     case: Case, monkeypatch: pytest.MonkeyPatch

@@ -124,6 +124,7 @@ def holds(points: list[Point], first: Done) -> list[bool]:
     return [low is not None and high is not None and low <= 1.0 <= high for low, high in found]
 
 
+@pytest.mark.slow
 def test_points_that_stick_and_slip_do_not_bend_the_curve() -> None:
     """A rate loop that is too soft: up to about vs (4 mm/s) the carriage sticks and slips."""
     rig = soft("4 A s/m")
@@ -139,6 +140,7 @@ def test_points_that_stick_and_slip_do_not_bend_the_curve() -> None:
     assert holds(kept, first) == [True, True]
 
 
+@pytest.mark.slow
 def test_a_stiffer_rate_loop_slides_steadily() -> None:
     """What the note advises."""
     rig = soft("12 A s/m")

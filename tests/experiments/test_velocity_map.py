@@ -29,6 +29,7 @@ def full_map() -> Result:
     return analyse("velocity_map", execute(trials("velocity_map", bench(), {})))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", ["positive", "negative", "nominal"])
 @pytest.mark.parametrize("exponent", ["free", "2"])
 def test_the_fit_returns_the_benchs_combined_friction(

@@ -262,6 +262,7 @@ class Boots:
         return cls.boot
 
 
+@pytest.mark.slow
 @settings(
     max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -108,6 +108,7 @@ def run(program: Path, seed: int, count: int, files: list[str]) -> None:
     assert done.returncode == 0, done.stderr[-5000:]
 
 
+@pytest.mark.slow
 def test_arbitrary_input_harms_nothing(tmp_path: Path) -> None:
     """With whatever compiler there is, sanitizers and all."""
     flags = (*SANITIZE, "-O1")

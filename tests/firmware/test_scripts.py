@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -116,6 +117,7 @@ class Script:
 REMEMBERED_LATER = [("memory", False), ("send", wire.Safe(), "next"), ("memory", True), ("reset",)]
 
 
+@pytest.mark.slow
 @SCRIPTS
 @given(past=PAST, running=st.booleans(), steps=st.lists(STEP, max_size=25))
 @example(past="", running=False, steps=REMEMBERED_LATER)

@@ -92,6 +92,7 @@ def holds(one: Estimate, truth: float) -> bool:
     return low is not None and high is not None and low <= truth <= high
 
 
+@pytest.mark.slow
 def test_gravity_is_no_friction(results: Path) -> None:
     section = identified(results, "friction_map", 'friction_map.slowest="0.1 deg/s"')
     found = told(section)

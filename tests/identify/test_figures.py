@@ -53,6 +53,7 @@ def test_rows_that_stand_still_are_in_no_curve_of_friction(regression: InverseDy
     assert (np.sign(model.y[known]) == np.sign(model.x[known])).all()
 
 
+@pytest.mark.slow
 def test_the_plain_regression_is_drawn_beside_the_friction_models(
     regression: InverseDynamics, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,7 @@ def table(found: Result, key: str) -> Table:
     return next(each for each in found.tables if each.key == key)
 
 
+@pytest.mark.slow
 def test_an_unseen_run_is_predicted_line_by_line_and_over_time(tmp_path: Path) -> None:
     own, unseen = run_of(tmp_path / "a", driven()), run_of(tmp_path / "b", driven(), 100)
     found = held(own, unseen)
@@ -81,6 +82,7 @@ def test_an_unseen_run_is_predicted_line_by_line_and_over_time(tmp_path: Path) -
     assert "residuals-1-load" in keys
 
 
+@pytest.mark.slow
 def test_a_drive_that_has_changed_is_not_predicted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -95,6 +97,7 @@ def test_a_drive_that_has_changed_is_not_predicted(
     assert unseen[0].low > fitted[0].high
 
 
+@pytest.mark.slow
 def test_the_same_samples_are_refused_whatever_run_they_are_in(tmp_path: Path) -> None:
     own = chosen(tmp_path / "a", driven())
     again = chosen(tmp_path / "b", driven(), count=8)  # of which one is new
@@ -103,6 +106,7 @@ def test_the_same_samples_are_refused_whatever_run_they_are_in(tmp_path: Path) -
         identify(own, experiments_by_model(), models=("frequency_response",), validation=again)
 
 
+@pytest.mark.slow
 def test_the_same_phases_are_told(tmp_path: Path) -> None:
     """Other noise, but the same torque: friction would add the same to both."""
     again = driven()
@@ -113,6 +117,7 @@ def test_the_same_phases_are_told(tmp_path: Path) -> None:
     assert not any("phases and all" in note for note in other.notes)
 
 
+@pytest.mark.slow
 def test_correlations_and_condition_are_told(tmp_path: Path) -> None:
     found = held(run_of(tmp_path / "a", driven()), ())
     assert found.identified.correlations["stiffness", "load_inertia"] > 0.5
@@ -123,6 +128,7 @@ def test_correlations_and_condition_are_told(tmp_path: Path) -> None:
     assert len(pairs) == len(found.identified.correlations)
 
 
+@pytest.mark.slow
 def test_levels_of_a_static_nonlinearity_have_their_closed_form_in_decibels(tmp_path: Path) -> None:
     """y = u + b u² + a u³ in the band and line by line; the excitation stands beside them."""
     grid = odd_grid(0.5, 100.0, 4.0, 1)

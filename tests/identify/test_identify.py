@@ -50,6 +50,7 @@ def found(results: Path, run: str) -> Identification:
     )
 
 
+@pytest.mark.slow
 def test_parameters_hold_the_rig(found: Identification, rig: Rig) -> None:
     told = {each.estimate.name: each.estimate for each in found.parameters}
     for name in ("inertia", "coulomb_positive", "coulomb_negative"):
@@ -59,6 +60,7 @@ def test_parameters_hold_the_rig(found: Identification, rig: Rig) -> None:
     assert told["coulomb_positive"].unit == "N"
 
 
+@pytest.mark.slow
 def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
     found: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -99,6 +101,7 @@ def test_what_to_measure_next_is_told_of_the_widest_interval(found: Identificati
     assert next_measurement(nothing) == ""
 
 
+@pytest.mark.slow
 def test_what_changed_is_declared_and_what_did_not_is_not(
     found: Identification, results: Path, run: str, rig: Rig
 ) -> None:
@@ -138,6 +141,7 @@ def test_what_is_of_the_rig_cancels_between_its_runs(
     assert [part.source for part in change.found.difference.systematic] == ["low-pass"]
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_its_data_and_a_bench(
     results: Path, run: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], rig: Rig
 ) -> None:
@@ -170,6 +174,7 @@ def test_the_command_writes_a_page_its_data_and_a_bench(
     assert str(tmp_path) not in text + html
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(results: Path, run: str, tmp_path: Path) -> None:
     pages = [
         identify_run(f"{run}:monday", results, models=PLAIN, page=tmp_path / name)[0]
@@ -242,6 +247,7 @@ def test_a_run_is_not_held_against_itself(
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["validation", "compared"])
 def test_a_recording_that_was_imported_twice_is_not_held_against_itself(
     results: Path, run: str, tmp_path: Path, option: str
@@ -288,6 +294,7 @@ def test_an_earlier_bench_is_replaced(results: Path, run: str, tmp_path: Path) -
     assert "made up" in bench.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_bench_is_written_before_anything_is_printed(
     results: Path, run: str, found: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -332,12 +339,14 @@ def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -
     assert row["systematic"] == f"band {band}, instruments {held}"
 
 
+@pytest.mark.slow
 def test_the_first_table_of_the_page_is_the_first(results: Path, run: str, tmp_path: Path) -> None:
     page, _ = identify_run(f"{run}:monday", results, models=PLAIN, page=tmp_path / "page")
     html = page.read_text(encoding="utf-8").split("</style>")[1]
     assert re.findall(r"Table (\d+)", re.sub(r"<[^>]+>", "", html))[0] == "1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "warned"), [(0.33, False), (0.74, True), (float("nan"), True)])
 def test_a_validation_that_the_model_does_not_predict_is_a_warning(
     found: Identification,

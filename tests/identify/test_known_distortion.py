@@ -203,6 +203,7 @@ def tables(results: Path) -> dict[str, dict[str, Table]]:
     return told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", BENCHES)
 def test_levels_of_even_and_odd_distortion_are_the_known_ones(
     truths: dict[str, Array], tables: dict[str, dict[str, Table]], bench: str

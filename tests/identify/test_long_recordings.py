@@ -137,6 +137,7 @@ def test_every_model_and_every_fit_of_it_is_told_as_it_begins() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_methods_are_counted(results: Path) -> None:
     run = next(results.glob("*-rig-mapping.nxs")).stem
     said: list[str] = []

@@ -88,6 +88,7 @@ def section(results: Path, test: str) -> Section:
     return own
 
 
+@pytest.mark.slow
 def test_an_imported_small_motion_tells_stiffness_damping_and_inertia(results: Path) -> None:
     own = section(results, "small")
     assert own.result is not None, own.problem

@@ -122,6 +122,7 @@ def test_half_a_second_is_enough_where_it_is_all_there_is(tmp_path: Path) -> Non
     assert holds(found["viscous_positive"], 40.0)
 
 
+@pytest.mark.slow
 def test_a_joints_torque_stands_in_for_the_drives(tmp_path: Path) -> None:
     columns = joint(7)
     columns["joint_torque"] = columns.pop("drive_torque")
@@ -130,6 +131,7 @@ def test_a_joints_torque_stands_in_for_the_drives(tmp_path: Path) -> None:
     assert "The force is joint_torque" in notes(section)
 
 
+@pytest.mark.slow
 def test_ripple_shows_beside_gravity_and_friction_that_warms(tmp_path: Path) -> None:
     time = np.arange(round(80 * RATE)) / RATE
     angle = 0.9 * np.sin(0.82 * time) + 0.5 * np.sin(1.95 * time + 1) + 0.1 * np.sin(6.9 * time)

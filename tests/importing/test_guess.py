@@ -37,6 +37,7 @@ def guesses(tmp_path_factory):
     return cache(lambda number: guess([made(folder, wild_files()[number])])), folder
 
 
+@pytest.mark.slow
 def test_there_are_forty_of_them():
     assert len(FILES) == len({wild.name for wild in wild_files()}) == len(wild_files())
 

@@ -21,6 +21,7 @@ from tests.importing.test_mapping import planned, served
 from tests.importing.wild import DEG, text, together
 
 
+@pytest.mark.slow
 def test_two_joints_every_15_ms_with_odd_names(tmp_path: Path):
     """Degrees, whole milliseconds, milliamperes; no torque but what the current makes."""
     one, two = (rig.trapezoids(seed, rate=1 / 0.015, length=60.0) for seed in (70, 71))
@@ -79,6 +80,7 @@ def test_signals_beside_their_times_in_a_matrix_are_no_axes(tmp_path: Path):
     assert [test["name"] for test in told["test"]] == ["recorded"]
 
 
+@pytest.mark.slow
 def test_a_tribometer_with_normal_load_and_sliding_distance(tmp_path: Path):
     """Distance only grows, and friction only opposes: its own force sensor has no direction."""
     chance = np.random.default_rng(5)
@@ -147,6 +149,7 @@ def test_files_of_one_signal_each_are_one_recording(tmp_path: Path):
     np.testing.assert_allclose(recording["drive_torque"], m.tau, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_files_of_other_tests_are_recordings_of_their_own(tmp_path: Path):
     """The same columns; a channel twice; nothing known; several signals; rows that do not match."""
     m = rig.trapezoids(3)
@@ -297,6 +300,7 @@ def test_what_follows_has_the_unit_of_what_it_follows(tmp_path: Path):
     assert any("1.7 times current" in doubt for doubt in torque.doubts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "rate", "roles"),
     [

@@ -41,6 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("listed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LISTS)
 def test_roles_of_columns_as_people_call_them(folder: Path, name: str):
     columns = guessed(name, folder)
@@ -139,6 +140,7 @@ def test_words_that_only_look_like_targets_are_none(name: str):
     assert named(name).role not in ("command", "reference", "motor_current", "relative_angle")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LISTS)
 def test_mutilated_files_lose_little_and_no_unit_is_wrong(tmp_path: Path, name: str):
     """An index, units in a row of their own, separators at the end, marks, quotes, holes."""

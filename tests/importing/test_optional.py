@@ -136,6 +136,7 @@ def test_words_among_numbers_are_told_by_their_cell(tmp_path, workbook):
         whole(table)
 
 
+@pytest.mark.slow
 def test_workbooks_that_are_none(tmp_path):
     pytest.importorskip("openpyxl", reason="openpyxl is not installed")
     path = tmp_path / "a.xlsx"

@@ -30,6 +30,7 @@ def test_only_regular_files_are_opened(tmp_path: Path):
             opening(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_a_pipe_is_no_recording_and_is_not_waited_for(tmp_path: Path):
     text = COLUMNS + TEST + ENTRY.replace("a.csv", "pipe")

@@ -109,6 +109,7 @@ def compared(was: pd.DataFrame, now: pd.DataFrame, names: list[str], share: floa
     assert held >= 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jitter", "repair"), [(0.1, ""), (0.4, "resample")])
 def test_recordings_of_planned_trials(tmp_path: Path, run: Any, jitter: float, repair: str):
     parts = [columns_toml(COLUMNS, repair=repair)]

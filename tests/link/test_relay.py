@@ -124,6 +124,7 @@ def test_when_the_parent_goes_it_sends_its_sessions_safe_until_confirmed_and_the
     assert connection._relay.wait(10.0) == 0
 
 
+@pytest.mark.slow
 def test_an_orphan_that_nobody_confirms_says_so_after_its_last_words(line) -> None:
     connection, there = line
     heard = Heard(there)

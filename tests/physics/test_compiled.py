@@ -90,6 +90,7 @@ def torque(packages: Packages) -> tuple[float, int]:
     return value, hits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", HELPERS)
 def test_machine_code_of_a_plug_in_follows_every_helper(tmp_path: Path, place: str) -> None:
     """It went on giving 3 N m after the helper said 2.0, in every process to come."""
@@ -109,6 +110,7 @@ def test_machine_code_of_a_plug_in_follows_every_helper(tmp_path: Path, place: s
     assert torque(packages) == (6.0, 1)
 
 
+@pytest.mark.slow
 def test_another_library_starts_afresh(tmp_path: Path) -> None:
     packages = Packages(tmp_path / "packages")
     packages.grease()
@@ -117,6 +119,7 @@ def test_another_library_starts_afresh(tmp_path: Path) -> None:
     assert torque(packages) == (3.0, 0)
 
 
+@pytest.mark.slow
 def test_a_source_that_was_edited_while_the_process_ran_is_not_kept(tmp_path: Path) -> None:
     """Its machine code would be that of before the edit, under the hash of after it.
 
@@ -139,6 +142,7 @@ os.utime(film, (_IMPORTED_AT - 0.01, _IMPORTED_AT - 0.01))
     assert torque(packages) == (6.0, 0)
 
 
+@pytest.mark.slow
 def test_what_compiled_code_alone_calls_refuses_python() -> None:
     """It has no code for Python: a call would end the process."""
 
@@ -237,6 +241,7 @@ def test_a_cache_that_others_can_write_is_not_used_and_it_is_said_once(
     assert said.count("can be written by other users; remove that folder") == 1
 
 
+@pytest.mark.slow
 @posix
 def test_planted_machine_code_is_not_loaded(tmp_path: Path) -> None:
     packages = Packages(tmp_path / "packages")

@@ -78,6 +78,7 @@ def dry_step(
     return Step(*done, float(met[rows.MEETS_RATE_END, 0]), *more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_it_stops_where_coulomb_friction_stops_it(way: float) -> None:
     part = 0.3
@@ -188,6 +189,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_the_engine_is_of_second_order_in_the_step(name: str) -> None:
     case, rate = CASES[name]
@@ -200,6 +202,7 @@ def test_the_engine_is_of_second_order_in_the_step(name: str) -> None:
         assert coarse[output] > 25 * fine[output], output
 
 
+@pytest.mark.slow
 def test_behind_a_sampled_controller_it_is_of_second_order_too() -> None:
     """A command held over each millisecond: it sticks now and then."""
     base = Sine(amplitude=1.0, frequency=1.0)
@@ -223,6 +226,7 @@ def test_behind_a_sampled_controller_it_is_of_second_order_too() -> None:
         assert coarse > 10 * fine
 
 
+@pytest.mark.slow
 def test_what_is_held_is_recorded_without_lag() -> None:
     """The friction torque of a load that sticks to an accelerating hull.
 
@@ -249,6 +253,7 @@ def test_a_stuck_load_does_not_creep_while_its_compensation_does() -> None:
     assert np.max(np.abs(moved[inside])) < 1e-15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [PLAIN, drawn(9)], ids=lambda case: case.name)
 def test_it_stops_and_breaks_away_when_the_reference_does(case: Case) -> None:
     """No chatter: the same directions in the same order, each within a step of 1 ms."""

@@ -187,6 +187,7 @@ LARGEST_ERROR = {"exp": 0.88, "expm1": 1.31, "log": 0.57, "sin": 1.5, "cos": 1.5
 """Units in the last place, as the module says."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFERENCES)
 def test_errors_are_as_stated(name: str) -> None:
     x = np.concatenate([*ARGUMENTS[name], WORST_FOUND[name]])
@@ -346,6 +347,7 @@ VECTOR_FMA = re.compile(r"call <\d+ x double> @llvm\.fma\.v\d+f64")
 DOUBLES = numba.types.CPointer(numba.types.float64)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not has_fma(), reason="this processor has no fused multiply-add")
 @pytest.mark.parametrize("name", REFERENCES)
 def test_loops_are_compiled_to_vectors(name: str) -> None:

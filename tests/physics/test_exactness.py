@@ -45,6 +45,7 @@ CASES: dict[str, tuple[str, Callable[[Tree], None] | None, float, float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_stabilization_error_is_that_of_scipy(case: str) -> None:
     compensation, edit, step, bound = CASES[case]

@@ -136,6 +136,7 @@ def test_of_several_limits_the_first_in_time_is_named() -> None:
 COUNTS = st.integers(-40, 40)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     st.lists(COUNTS, min_size=1, max_size=80),

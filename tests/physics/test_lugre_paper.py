@@ -108,6 +108,7 @@ def test_stick_slip() -> None:
     assert velocity.max() == pytest.approx(0.3698, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_steady_sliding_is_the_stribeck_curve() -> None:
     """dz/dt = 0: T = s(v) sgn(v), whatever sigma1 and however long the step."""
     for step in (1e-3, 0.1):

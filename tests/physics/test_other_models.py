@@ -142,6 +142,7 @@ def virgin(way: float) -> float:
     return float(sum(min(2000.0 * way, 30.0 * i / 55) for i in range(1, 11)))
 
 
+@pytest.mark.slow
 def test_ten_elements_have_a_memory_of_where_they_turned() -> None:
     """Masing's rule: going back is twice the first loading at half the way, from where it turned;
     and a small loop inside closes."""
@@ -187,6 +188,7 @@ def test_a_bench_with_ten_elements_is_the_same_alone_and_in_company() -> None:
     assert friction.min() < -10.0
 
 
+@pytest.mark.slow
 def test_karnopp_holds_up_to_its_static_torque_and_slides_then() -> None:
     rate = 60.0
     ramp = Polyline(times=(0.0, 1.0), values=(0.0, rate))
@@ -215,6 +217,7 @@ KARNOPP_SET = replace(
 )
 
 
+@pytest.mark.slow
 def test_a_set_at_rest_breaks_away_inside_a_step_and_falls_to_its_sliding_torque() -> None:
     """Pulled at V through a spring: it holds until k V t = Ts, and then, with tau from there on,
 
@@ -258,12 +261,14 @@ def _sizes(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     return float(len(parameters)), float(len(state))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parameters", "states"), [(1, 0), (12, 10)])
 def test_a_step_function_sees_its_own_numbers_and_no_others(parameters: int, states: int) -> None:
     line = single_step(_sizes, np.zeros(parameters), np.zeros(states), Motion.at(0.1, 0.1, 1e-3))
     assert line == (parameters, states)
 
 
+@pytest.mark.slow
 def test_nothing_is_applied_where_there_is_no_compliance() -> None:
     def applied(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
         return motion.applied, 0.0

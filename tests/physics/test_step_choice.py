@@ -321,6 +321,7 @@ def test_a_compensation_that_jumps_with_dry_friction_leaves_what_is_right(
     assert off(found.step) < TOLERANCE < off(0.5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("compensation", "step"), [("static", 0.03125e-3), ("observer", 0.125e-3)])
 def test_what_compensates_a_dry_bench_meets_its_jumps_in_shorter_steps(
     compensation: str, step: float, monkeypatch: pytest.MonkeyPatch

@@ -54,6 +54,7 @@ def _operations(x: Any) -> Any:
     return where(x != x, -1.0, where(x <= -3.0, -larger, larger - 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [2, 4, LANES])
 @pytest.mark.parametrize("name", ["exp", "expm1", "log", "sin", "cos", "tanh", "nearest"])
 def test_elementary_functions(name: str, lanes: int) -> None:
@@ -138,6 +139,7 @@ def _selecting(parameters: Any, state: Any, motion: Motion) -> tuple[float, floa
     return state[0] * motion.rate_mean, parameters[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("step", "lanes", "members"),
     [  # what goes by single numbers anyway needs no vector of every kind

@@ -48,6 +48,7 @@ benches = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(protocols, benches, st.lists(st.text(max_size=30), max_size=2))
 def test_any_text(protocol: str, bench: str, overrides: list[str]) -> None:

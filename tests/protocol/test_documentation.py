@@ -24,6 +24,7 @@ def blocks(kind: str) -> list[str]:
     return re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("block", "trials"), list(zip(blocks("toml"), [4, 72, 2, 15], strict=True))
 )

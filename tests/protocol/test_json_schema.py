@@ -171,6 +171,7 @@ def test_a_mistake_in_a_mapping_is_found_where_it_is(
     assert place in places(mappings, tree)
 
 
+@pytest.mark.slow
 def test_the_command_prints_each(tmp_path: Path) -> None:
     known = {
         "protocol": "matrix",

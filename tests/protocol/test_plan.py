@@ -182,6 +182,7 @@ def test_every_broken_limit_is_named_with_value_and_bound(desk) -> None:
 # The shipped protocols.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_protocols_can_be_executed_within_the_limits(path) -> None:
     plan = make_plan(load_protocol(path, experiments(), shipped=SHIPPED))
@@ -318,6 +319,7 @@ def test_a_gain_in_amperes_per_degree_taken_for_radians_is_refused(desk) -> None
     assert "campaign check" in message
 
 
+@pytest.mark.slow
 def test_an_experiment_that_seeks_instability_may_have_it(desk) -> None:
     text = STABILIZATION.replace('kind = "stabilization"', 'kind = "sensitivity"')
     plan = shipped_plan(desk, text, WRONG)

@@ -37,6 +37,7 @@ def columns() -> Iterator[Column]:
                     yield Column(*texts[:4])
 
 
+@pytest.mark.slow
 def test_the_names_of_all_tables_follow_one_rule() -> None:
     found = list(columns())
     assert len(found) > 400

@@ -64,6 +64,7 @@ def test_ticks_are_worked_out_once_for_each_measuring_and_drawing(
     assert len(worked_out) == 4  # of two axes, which are measured and drawn
 
 
+@pytest.mark.slow
 def test_axes_are_asked_again_when_they_may_move() -> None:
     with canvas(4.0, 3.0) as sheet:
         ax = sheet.subplots()

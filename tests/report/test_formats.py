@@ -106,16 +106,19 @@ def test_an_unknown_format_is_told_with_the_nearest() -> None:
         chosen_formats(("markdwon",))
 
 
+@pytest.mark.slow
 def test_without_formats_there_is_only_the_page(report: Report) -> None:
     written = {path.name for path in report.path.parent.iterdir()}
     assert written == {".campaign-report", "report.html", "report.json", "figures", "tables"}
     assert {path.suffix for path in (report.path.parent / "figures").iterdir()} == {".svg", ".csv"}
 
 
+@pytest.mark.slow
 def test_other_formats_do_not_change_the_page(folder: Path, report: Report) -> None:
     assert (folder / "report.html").read_bytes() == report.path.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(made_up: ModuleType, folder: Path, tmp_path) -> None:
     script = (
         "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); import made_up\n"

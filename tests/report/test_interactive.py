@@ -52,6 +52,7 @@ def zoomed(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> str
     return report.path.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_quotes_of_the_data_stand_as_they_are_and_nothing_leaves_their_element(
     zoomed: str,
 ) -> None:

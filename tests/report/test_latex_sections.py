@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 from campaign.report.build import build_report
 from campaign.report.formats import chosen_formats
 
 
+@pytest.mark.slow
 def test_figures_and_tables_do_not_leave_their_section(made_up: ModuleType, tmp_path: Path) -> None:
     """LaTeX floats wait for a place, if need be behind later sections; a barrier holds them."""
     build_report(

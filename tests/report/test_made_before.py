@@ -63,6 +63,7 @@ def names(folder: Path) -> set[str]:
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 def test_formats_and_trials_pages_are_made_anew_with_the_page(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -173,6 +174,7 @@ def test_one_figure_and_a_page_do_not_go_together(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_document_that_was_removed_stays_away_whatever_its_figures(
     run: Path, tmp_path: Path
 ) -> None:

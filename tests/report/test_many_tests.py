@@ -121,6 +121,7 @@ def test_the_page_opens_with_the_main_tests_and_each_test_has_all_of_its_own(
         assert numbers.count('<th scope="row">') == len(FOUND[name])
 
 
+@pytest.mark.slow
 def test_what_is_not_in_an_interval_on_top_is_told_there(
     made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
 ) -> None:

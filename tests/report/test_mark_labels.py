@@ -68,6 +68,7 @@ MARKS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("scale", ["linear", "log"])
 @pytest.mark.parametrize("panels", [1, 3])

@@ -18,6 +18,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["text", "edited", "link", "folder"])
 def test_a_figure_takes_nobody_s_place(made_up: ModuleType, tmp_path: Path, kind: str) -> None:
     run = made_up.made_up_run(tmp_path)
@@ -47,6 +48,7 @@ def test_a_figure_takes_nobody_s_place(made_up: ModuleType, tmp_path: Path, kind
     assert other.read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_figure_that_is_another_now_takes_the_older_one_s_place(
     made_up: ModuleType, tmp_path: Path
 ) -> None:
@@ -62,6 +64,7 @@ def test_a_figure_that_is_another_now_takes_the_older_one_s_place(
     assert drawn.read_bytes() == new
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("column", "wide"), [("single", 88.0), ("double", 180.0)])
 def test_figures_for_a_column_have_its_width_and_lettering_for_print(
     made_up: ModuleType, tmp_path: Path, column: Column, wide: float
@@ -85,6 +88,7 @@ def test_figures_for_a_column_have_its_width_and_lettering_for_print(
         assert max(sizes) <= 9, drawn.name
 
 
+@pytest.mark.slow
 def test_several_panels_have_letters(made_up: ModuleType, tmp_path: Path) -> None:
     run, wanted = made_up.made_up_run(tmp_path), "stabilization/position-error"
     (drawn,), _ = write_figures(run, wanted, tmp_path, experiments=made_up.EXPERIMENTS)

@@ -108,6 +108,7 @@ def scoreboard(folder: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
+@pytest.mark.slow
 def test_the_folder_has_the_page_its_tables_and_its_figures(report: Report) -> None:
     assert set(contents(report.path.parent)) == {
         MARKER,
@@ -336,6 +337,7 @@ def test_options_of_the_backend_are_told_in_words(made_up: ModuleType, tmp_path:
     assert "sim, check step: no, timeout: 2 (SI)" in text
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes_anywhere(
     made_up: ModuleType, report: Report, tmp_path: Path
 ) -> None:
@@ -593,6 +595,7 @@ def test_two_tests_with_one_published_figure_have_two_files(
     assert not any(name.startswith("table-4.3-") for name in files)
 
 
+@pytest.mark.slow
 def test_thousands_of_failed_trials_stay_a_page(made_up: ModuleType, tmp_path: Path) -> None:
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ("5.8",)})
     failed = dataclasses.replace(run.trials[0], ending=Ending(Outcome.DIVERGED, "rate is infinite"))

@@ -50,6 +50,7 @@ def several(count: int, **more: object) -> Figure:
     return Figure("key", "Title", "Caption.", "Alt.", panels, **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("column", COLUMNS)
 @pytest.mark.parametrize("count", [1, 3, 6, 12])
 @pytest.mark.parametrize("across", [1, 2, 3])

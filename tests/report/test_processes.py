@@ -65,6 +65,7 @@ def page_of(archive: Path, count: int) -> tuple[str, dict[str, str]]:
     return html, folder.files
 
 
+@pytest.mark.slow
 def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
     run = open_run(archive)
     with workers(run, 2) as two:
@@ -79,6 +80,7 @@ def test_two_processes_make_the_page_that_one_makes(archive: Path) -> None:
     assert page_of(archive, 2) == page_of(archive, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2])
 def test_what_was_found_is_told_once_and_the_page_is_the_same(archive: Path, count: int) -> None:
     told: list[Document] = []
@@ -154,6 +156,7 @@ def test_the_journal_is_parsed_once_for_a_report(
     assert parsed == [run.journal.encode()]
 
 
+@pytest.mark.slow
 def test_what_processes_need_is_imported_before_they_begin() -> None:
     """Experiments of the program and all that draws, in the process that the others are made of."""
     code = (
@@ -172,6 +175,7 @@ def test_what_processes_need_is_imported_before_they_begin() -> None:
     assert [importlib.util.find_spec(name) is not None for name in processes.PRELOADED] == [True]
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_costs_no_more_than_time(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +200,7 @@ print(*sorted({"matplotlib", "jinja2", "campaign.report.build"} & sys.modules.ke
 """
 
 
+@pytest.mark.slow
 def test_processes_are_begun_before_what_makes_a_page_is_imported() -> None:
     """They analyse while it is; half a second of every report, where there are two processors."""
     command = [sys.executable, "-c", IMPORTED_LATE]

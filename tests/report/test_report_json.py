@@ -220,6 +220,7 @@ def wrong_cells(table: dict[str, Any], rows: list[list[str]]) -> Iterator[str]:
                 yield place
 
 
+@pytest.mark.slow
 def test_each_number_in_a_table_is_in_the_json_and_rounds_alike(page, told):
     tables = {table["anchor"]: table for table in every_table(told)}
     shown = {a for a in page.tables if a.startswith("table-")}
@@ -365,6 +366,7 @@ def test_it_reads_back_as_what_it_was_and_nothing_else_does(folder):
             read_report(json.dumps({**tree, **change}))
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_text(made_up, folder, tmp_path):
     again = build_report(
         made_up.made_up_run(tmp_path, notes="a <script>alert(1)</script> & \u2028 note"),

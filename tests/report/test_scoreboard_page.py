@@ -50,6 +50,7 @@ def test_the_bench_as_described(made_up: ModuleType, tmp_path: Path) -> None:
     assert {line.status for line in found(run, made_up.EXPERIMENTS)} == {"selected"}
 
 
+@pytest.mark.slow
 def test_an_altered_bench_and_what_was_found_twice_are_told(
     made_up: ModuleType, tmp_path: Path
 ) -> None:

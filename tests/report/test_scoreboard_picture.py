@@ -85,6 +85,7 @@ SIZES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
 def test_it_fits_a_screen_and_its_words_are_legible(sizes: list[int]) -> None:
     root = picture(*sizes)
@@ -155,6 +156,7 @@ def test_signs_lie_at_their_deviation(others: int) -> None:
     assert ten > one > minus
 
 
+@pytest.mark.slow
 def test_signs_of_one_place_do_not_cover_each_other() -> None:
     root = drawn(board([4, 60]))
     places = set()

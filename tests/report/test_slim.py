@@ -63,6 +63,7 @@ def figures(made_up: ModuleType) -> Iterator[Figure]:
     )
 
 
+@pytest.mark.slow
 def test_what_is_painted_stays(made_up: ModuleType) -> None:
     for figure in figures(made_up):
         before = draw(figure)
@@ -78,6 +79,7 @@ def test_what_is_painted_stays(made_up: ModuleType) -> None:
                 assert was == pytest.approx(is_, abs=ABOUT), how
 
 
+@pytest.mark.slow
 def test_the_same_drawing_gives_the_same_bytes(made_up: ModuleType) -> None:
     for figure in figures(made_up):
         svg = draw(figure)

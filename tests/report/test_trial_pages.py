@@ -256,6 +256,7 @@ def test_a_number_links_to_its_page_where_there_is_one() -> None:
 # --- the page -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_report_links_to_them_and_is_otherwise_the_same(
     made_up: ModuleType, made: Path, folder: Path, tmp_path: Path
 ) -> None:

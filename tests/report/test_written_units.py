@@ -132,6 +132,7 @@ LONG = {"draws", "thesis"}
 """Some thousand trials of the tests that the other protocols have, too."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({path.stem for path in SHIPPED.glob("*.toml")} - LONG))
 def test_no_shipped_protocol_shows_what_only_programs_write(name: str) -> None:
     for test, found in conditions(SHIPPED / f"{name}.toml").items():

@@ -102,6 +102,7 @@ ABSURD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ABSURD)
 def test_an_absurd_protocol_is_bad_usage(narrow: Forks, tmp_path: Path, name: str):
     text, message = ABSURD[name]
@@ -113,6 +114,7 @@ def test_an_absurd_protocol_is_bad_usage(narrow: Forks, tmp_path: Path, name: st
     assert re.search(message, said), said
 
 
+@pytest.mark.slow
 def test_includes_count_together(narrow: Forks, tmp_path: Path):
     """Each file may be read; all of them would take what one of them may not."""
     for part in range(12):
@@ -128,6 +130,7 @@ def test_the_bound_is_above_what_allow_large_is_for():
     assert memory.MOST // memory.TRIAL > LARGEST_PLAN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axis", "bound"), [("frequency", memory.TRIAL), ("'bench.axis.inertia'", memory.BENCH)]
 )

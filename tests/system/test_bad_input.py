@@ -44,6 +44,7 @@ def test_a_plan_that_breaks_a_limit_moves_nothing(tmp_path: Path):
     assert "BROKEN" in planned.out
 
 
+@pytest.mark.slow
 def test_a_measured_limit_ends_the_trial_and_the_others_go_on(tmp_path: Path):
     limit = '"bench.limits.current" = ["3.18 A", "90 A"]\n'
     write(tmp_path, SEA + limit)

@@ -15,6 +15,7 @@ from .user import campaign
 QUICK = PROTOCOL.replace("starts = 2", "starts = 1")
 
 
+@pytest.mark.slow
 def test_the_calibrated_bench_reproduces_the_table(tmp_path: Path) -> None:
     write(tmp_path, QUICK)
     done = campaign(tmp_path, "calibrate", "calibrate.toml", "--no-leave-one-out")
@@ -43,6 +44,7 @@ def test_the_calibrated_bench_reproduces_the_table(tmp_path: Path) -> None:
         assert 0.0 <= half / (4.30265 * part["/".join(line[:3])]) - 1.0 < 0.05
 
 
+@pytest.mark.slow
 def test_a_second_calibration_leaves_the_first_alone(tmp_path: Path) -> None:
     write(tmp_path, QUICK.replace("max_evaluations = 30", "max_evaluations = 1"))
     paths = [

@@ -140,6 +140,7 @@ def test_a_bench_that_does_not_tell_is_taken_at_its_word(
     assert code is ExitCode.DONE
 
 
+@pytest.mark.slow
 def test_resume_asks_for_what_is_left_and_for_no_more(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

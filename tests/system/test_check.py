@@ -28,6 +28,7 @@ def too_fast(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_every_loop_and_every_fact_of_a_shipped_bench(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -44,6 +45,7 @@ def test_every_loop_and_every_fact_of_a_shipped_bench(
     assert {"Magnitude of L (dB)", "Phase of L (deg)", "Frequency (Hz)", "observer"} <= texts
 
 
+@pytest.mark.slow
 def test_json_has_the_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same gain margin that a swept sine finds on the bench: 30.86 dB at 200 Hz."""
     picture = tmp_path / "p.png"

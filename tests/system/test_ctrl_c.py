@@ -87,6 +87,7 @@ def check(folder: Path, seed: int, times: int) -> float:
     return took
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize("seed", range(4))
 def test_at_some_instants(tmp_path: Path, seed: int, times: int) -> None:
@@ -111,6 +112,7 @@ __main__.main()
 """
 
 
+@pytest.mark.slow
 def test_twice_while_the_run_is_begun(tmp_path: Path) -> None:
     """Its folder is there, and nobody has said so: the last line does."""
     write(tmp_path, LONG)
@@ -159,6 +161,7 @@ MOVES = BackendKind("stuck_live", "hangs", StuckOptions, Stuck, Source.HARDWARE,
 '''
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [False, True])
 def test_inside_a_call_that_does_not_return(tmp_path: Path, hold: bool) -> None:
     packages = tmp_path / "packages"

@@ -93,6 +93,7 @@ def test_hundreds_of_flipped_bits_change_nothing_or_are_told(
     assert attack(archive, tmp_path, seed, 100, 1) == []
 
 
+@pytest.mark.slow
 def test_a_trial_whose_record_is_damaged_is_told_by_every_reader(archive: Path, tmp_path: Path):
     whole = told.answers(archive, tmp_path / "whole")
     lose_a_record(archive)
@@ -304,6 +305,7 @@ def test_a_report_says_so_above_everything_else(archive: Path, tmp_path: Path):
     assert len(listed.splitlines()) == 3
 
 
+@pytest.mark.slow
 def test_a_report_names_a_record_that_nothing_else_needs(archive: Path, tmp_path: Path):
     with h5py.File(archive, "r+") as file:
         text = file["trial_00002/record/json"][()]

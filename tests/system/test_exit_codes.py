@@ -101,6 +101,7 @@ def test_what_hides_that_a_test_has_no_result(worse: ExitCode):
     assert worst_exit_code([ExitCode.NO_RESULT, ExitCode.TRIALS_FAILED, worse]) is worse
 
 
+@pytest.mark.slow
 def test_a_bug_in_the_report_of_a_good_run_is_shown_as_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

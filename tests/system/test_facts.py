@@ -135,6 +135,7 @@ def test_other_commands_take_it_or_say_what_they_miss(folder: Path) -> None:
     assert all(path in told for path in PURPOSES if path != "limits")
 
 
+@pytest.mark.slow
 def test_what_was_recorded_is_archived_analysed_and_shown(folder: Path, archive: Path) -> None:
     run = open_run(archive)
     assert [trial.ending.outcome for trial in run.trials] == ["completed", "completed"]

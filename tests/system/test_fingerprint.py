@@ -79,6 +79,7 @@ def statuses(folder: Path, *changes: str) -> list[tuple[str, str, str]]:
     return [(r["status"], r["verdict"], r["source"]) for r in rows]
 
 
+@pytest.mark.slow
 def test_a_status_follows_from_what_was_executed(bench: Path) -> None:
     folder = bench.parent
     write(folder, SEA)

@@ -46,6 +46,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {keep: executed(folder, keep) for keep in ("all", "none", "failed", "2", "extremes")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keep", "kept"), [("none", set()), ("failed", set()), ("2", {1, 2}), ("all", {*range(1, 7)})]
 )
@@ -115,6 +116,7 @@ def test_metrics_are_a_row_for_each_trial(runs: dict[str, Path]):
         ]
 
 
+@pytest.mark.slow
 def test_a_page_says_that_samples_were_not_kept(runs: dict[str, Path], tmp_path: Path):
     run = runs["none"]
     typed(tmp_path, "report", str(run), "--output", str(tmp_path / "page"))
@@ -152,6 +154,7 @@ def test_a_repetition_that_differs_is_seen_by_its_digests(runs, tmp_path, capsys
     assert "different, by the digests of: gyro_rate" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("protocol", "backend", "why"),
     [

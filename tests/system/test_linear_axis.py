@@ -60,6 +60,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return archive, archive.with_name(f"{archive.stem}-report")
 
 
+@pytest.mark.slow
 def test_the_page_has_nothing_of_a_rotary_axis(run: tuple[Path, Path]) -> None:
     text = (run[1] / "report.html").read_text(encoding="utf-8")
     text = text[: text.index('<section id="provenance">')]  # which quotes the files
@@ -97,6 +98,7 @@ def test_neither_has_its_data(run: tuple[Path, Path]) -> None:
     assert [each for text in texts for each in rotary_in(text)] == []
 
 
+@pytest.mark.slow
 def test_neither_have_its_tables_and_figures(run: tuple[Path, Path]) -> None:
     files = sorted((*run[1].glob("tables/*.csv"), *run[1].glob("figures/*.csv")))
     assert len(files) > 20
@@ -111,6 +113,7 @@ def test_neither_have_its_tables_and_figures(run: tuple[Path, Path]) -> None:
         assert not rotary_in(html.unescape(words)), path.name
 
 
+@pytest.mark.slow
 def test_neither_has_what_commands_print(run: tuple[Path, Path]) -> None:
     folder, name = run[0].parent.parent, run[0].stem
     for arguments in (
@@ -180,6 +183,7 @@ def test_the_samples_are_those_of_a_rotary_axis_with_its_numbers(test: str) -> N
     assert other.channels["relative_angle"].unit == "rad"
 
 
+@pytest.mark.slow
 def test_the_page_of_a_trial_tells_settings_and_metrics_in_its_units(
     run: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -23,6 +23,7 @@ def quickstart(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folder, folder / done.last_line
 
 
+@pytest.mark.slow
 def test_a_run_leaves_one_sealed_archive_and_a_report_where_documented(quickstart):
     folder, archive = quickstart
     report = archive.with_name(f"{archive.stem}-report")
@@ -59,6 +60,7 @@ def test_the_demo_opens_with_what_was_found_what_is_true_and_what_compensation_g
     assert "ublished" not in opening
 
 
+@pytest.mark.slow
 def test_the_scoreboard_reproduces_the_published_stabilization_error(tmp_path: Path):
     archive = tmp_path / campaign(tmp_path, "run", "stabilization", "--report").last_line
     path = archive.with_name(f"{archive.stem}-report") / "tables" / "scoreboard.csv"
@@ -86,6 +88,7 @@ def test_the_report_needs_the_archive_alone_and_is_the_same_elsewhere(quickstart
         assert same.read_bytes() == file.read_bytes(), file.name
 
 
+@pytest.mark.slow
 def test_report_and_identify_take_the_newest_run_when_none_is_named(tmp_path: Path):
     write(tmp_path, SEA)
     campaign(tmp_path, "run", "protocol.toml", "--only", "sea")
@@ -96,6 +99,7 @@ def test_report_and_identify_take_the_newest_run_when_none_is_named(tmp_path: Pa
     assert f"{Path(newest).stem}: nothing can be identified" in refused
 
 
+@pytest.mark.slow
 def test_own_templates_win_only_when_asked_for(tmp_path: Path):
     write(tmp_path, SEA)
     archive = tmp_path / campaign(tmp_path, "run", "protocol.toml", "--only", "sea").last_line
@@ -158,6 +162,7 @@ def test_set_changes_a_test_and_the_archive_says_so(tmp_path: Path):
     assert change in campaign(tmp_path, "show", run).out
 
 
+@pytest.mark.slow
 def test_init_gives_a_folder_to_start_from_and_never_overwrites(tmp_path: Path):
     campaign(tmp_path, "init", "lab")
     assert (tmp_path / "lab" / "protocols" / "benches" / "simulink.toml").is_file()
@@ -170,6 +175,7 @@ def test_init_gives_a_folder_to_start_from_and_never_overwrites(tmp_path: Path):
     assert (lab / "protocols" / "quickstart.toml").read_text(encoding="utf-8") == "# mine\n"
 
 
+@pytest.mark.slow
 def test_init_writes_protocols_that_fit_a_bench_of_ones_own(tmp_path: Path):
     shipped = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
     small = shipped.replace('angle = "120 deg"', 'angle = "4 deg"')
@@ -191,6 +197,7 @@ def test_init_writes_protocols_that_fit_a_bench_of_ones_own(tmp_path: Path):
     assert "nothing was written" in refused.err
 
 
+@pytest.mark.slow
 def test_init_for_a_bench_without_friction_has_a_pilot(tmp_path: Path):
     """Where friction is described the speeds follow from that: no pilot."""
     lines = (Path(__file__).parents[2] / "protocols/benches/platform.toml").read_text("utf-8")
@@ -219,6 +226,7 @@ def without_friction(text: str) -> str:
     return tomlkit.dumps(document)
 
 
+@pytest.mark.slow
 def test_init_writes_what_a_bench_top_motor_needs(tmp_path: Path):
     """Its loop is fed by an encoder, it turns for ever, it has no hull that swings."""
     page = (Path(__file__).parents[2] / "docs" / "protocols.md").read_text("utf-8")

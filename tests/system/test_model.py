@@ -58,6 +58,7 @@ def test_a_slow_lugre_slides_as_its_steady_curve(tmp_path: Path) -> None:
     assert found["stribeck_N_m"].max() == pytest.approx(40.0, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_specimens_are_drawn_beside_a_model_with_its_parameters(tmp_path: Path) -> None:
     """The bench of the thesis states all that they need; its viscous friction is not theirs."""
     motion = ("--rate", "5 deg/s", "--frequency", "0.1 Hz")

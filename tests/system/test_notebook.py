@@ -53,6 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_figure_has_the_bytes_of_the_report_s_whatever_the_user_s_style(folder: Path) -> None:
     run = campaign.open(results=folder / "results")
     with mpl.rc_context({"font.size": 20, "xtick.color": "red"}):
@@ -61,6 +62,7 @@ def test_a_figure_has_the_bytes_of_the_report_s_whatever_the_user_s_style(folder
     assert svg == file.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_figure_goes_by_its_test_or_key_and_what_is_none_is_said(folder: Path) -> None:
     results = campaign.open(results=folder / "results").results
     svg = results.plot("stabilization/position-error")._repr_svg_()

@@ -152,6 +152,7 @@ AIMS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "number", "began"), AIMS)
 def test_just_before_a_message(tmp_path: Path, kind: Kind, number: int, began: bool | None) -> None:
     with bench(tmp_path) as rig, proxy(rig.port, kind, number, rig.stop) as line:
@@ -207,6 +208,7 @@ def test_at_a_prompt(tmp_path: Path) -> None:
         os.close(theirs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on", [1, 2])
 def test_while_the_host_hangs(tmp_path: Path, on: int) -> None:
     with bench(tmp_path, speed="1") as rig:
@@ -219,6 +221,7 @@ def test_while_the_host_hangs(tmp_path: Path, on: int) -> None:
         rig.judged(process, began=True)
 
 
+@pytest.mark.slow
 def test_while_the_controller_starts_anew(tmp_path: Path) -> None:
     with bench(tmp_path, "--fault", "reboot=1@trial=2@time=0.2") as rig:
         process = rig.run()
@@ -227,6 +230,7 @@ def test_while_the_controller_starts_anew(tmp_path: Path) -> None:
         rig.judged(process, began=True)
 
 
+@pytest.mark.slow
 def test_while_the_line_is_cut(tmp_path: Path) -> None:
     """The host cannot be told then; it finds out as soon as it finds the controller again."""
     text = PROTOCOL.replace("cycles = 2", "cycles = 1000")
@@ -280,6 +284,7 @@ def test_a_host_that_slept_does_not_stop_who_has_the_controller_now(tmp_path: Pa
 # What is done about it
 
 
+@pytest.mark.slow
 def test_nobody_but_a_person_clears_it(tmp_path: Path) -> None:
     with bench(tmp_path) as rig:
         rig.stop()
@@ -315,6 +320,7 @@ def test_a_latch_that_is_lost_after_a_stop_does_not_let_the_drive_on(tmp_path: P
         assert Bench(tmp_path, port).count("drive on") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("answer", "code"), [("clear", 0), ("yes", 3), ("", 3)])
 def test_at_a_terminal_it_is_asked_with_when_and_by_whom(
     tmp_path: Path, answer: str, code: int
@@ -336,6 +342,7 @@ def test_at_a_terminal_it_is_asked_with_when_and_by_whom(
         assert rig.count("drive on") == (TRIALS if code == 0 else 0)
 
 
+@pytest.mark.slow
 def test_a_second_host_is_told_who_holds_it_and_disturbs_nothing(tmp_path: Path) -> None:
     with bench(tmp_path, speed="1", text=PROTOCOL.replace("cycles = 2", "cycles = 1000")) as rig:
         process = rig.run()
@@ -352,6 +359,7 @@ def test_a_second_host_is_told_who_holds_it_and_disturbs_nothing(tmp_path: Path)
         assert rig.count("latched") == 0
 
 
+@pytest.mark.slow
 def test_the_report_says_it(tmp_path: Path) -> None:
     with bench(tmp_path) as rig, proxy(rig.port, Kind.START, 2, rig.stop) as line:
         process = rig.run(line.port)

@@ -167,6 +167,7 @@ def test_no_output_of_any_command_holds_a_control_character(place: Path):
         assert not strange, (arguments, strange, said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [("plan", "evil.toml"), ("list",), ("show",), ("run", "evil.toml"), (EVIL,)]
 )
@@ -177,6 +178,7 @@ def test_a_terminal_is_told_nothing_but_what_we_tell_it(place: Path, arguments: 
         assert mark not in said, (mark, said)
 
 
+@pytest.mark.slow
 def test_markup_is_text(place: Path):
     assert "[red]x[/red]" in run(place, "plan", "evil.toml")
     assert b"[red]x[/red]" in on_a_terminal(place, "plan", "evil.toml")
@@ -187,6 +189,7 @@ def test_json_loses_no_letter(place: Path):
     assert EVIL in json.loads(said)[0]["tags"]
 
 
+@pytest.mark.slow
 def test_the_files_of_a_report_hold_no_control_characters(place: Path):
     run(place, "report", "--output", "page")
     files = [path for path in (place / "page").rglob("*") if path.is_file()]

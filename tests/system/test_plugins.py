@@ -155,12 +155,14 @@ def test_who_names_a_broken_kind_is_told_its_package_and_why(
     assert "SystemExit: no licence" in said
 
 
+@pytest.mark.slow
 def test_an_export_to_a_broken_format_is_refused(odd: Laboratory) -> None:
     odd.does("run", "sea.toml", "--only", "sea")
     done = odd.does("export", odd.archive.name, "--to", "odd_format", code=2)
     assert "of the package odd_pack 1.0 (entry point odd:EXPORT)" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_report_says_which_test_it_cannot_analyse_and_analyses_the_others(
     lab: Laboratory,
 ) -> None:
@@ -248,6 +250,7 @@ def test_the_archive_names_every_plug_in_and_resume_compares_it(lab: Laboratory)
     assert open_run(lab.archive).status == "complete"
 
 
+@pytest.mark.slow
 def test_an_edited_helper_changes_the_numbers_of_the_next_run(lab: Laboratory) -> None:
     """They stayed those of before the edit, silently."""
     lab.grease()
@@ -261,6 +264,7 @@ def test_an_edited_helper_changes_the_numbers_of_the_next_run(lab: Laboratory) -
     assert frictions[0] + 0.3 < frictions[1]
 
 
+@pytest.mark.slow
 def test_a_package_whose_entry_points_are_no_table_ends_no_command(tmp_path: Path):
     """pydantic looks for plug-ins of its own in every package, and such a one ended it."""
     info = tmp_path / "bad-1.0.dist-info"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from campaign.cli.profile import REST
 from campaign.stopwatch import Work
 from tests.system.user import SEA, campaign, write
@@ -12,6 +14,7 @@ from tests.system.user import SEA, campaign, write
 ROW = re.compile(r"^  (.+?) +(\d+\.\d\d) s +(\d+)% +(\d+\.\d\d) s$", re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_a_run_with_profile_tells_where_its_time_went(tmp_path: Path) -> None:
     write(tmp_path, SEA)
     done = campaign(tmp_path, "run", "protocol.toml", "--profile", "--report", "--workers", "2")

@@ -29,6 +29,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     return folder, {"<run>": Path(run).stem, "<later run>": Path(later).stem}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", [line for line in LINES if line.startswith("campaign identify")])
 def test_a_rig_is_identified_from_what_the_first_command_made(runs, line: str) -> None:
     folder, names = runs

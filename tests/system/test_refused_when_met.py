@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from campaign.device.session import LONGEST_ARRAY
 from campaign.errors import ExitCode
 from tests.link.controllers import controller
@@ -62,6 +64,7 @@ def test_a_command_longer_than_the_controller_takes_is_refused_before_the_first_
     assert not list(tmp_path.glob("results/*.partial"))
 
 
+@pytest.mark.slow
 def test_one_that_it_takes_is_executed(tmp_path: Path) -> None:
     _, events = run(tmp_path, 2.0, code=ExitCode.DONE)
     assert events.count("drive on") == 3

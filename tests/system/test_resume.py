@@ -83,6 +83,7 @@ def interrupted(lab: Lab) -> Path:
     return archive
 
 
+@pytest.mark.slow
 def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented(lab: Lab):
     archive = interrupted(lab)
     assert lab.resume(archive) is ExitCode.DONE
@@ -99,6 +100,7 @@ def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented
     assert "/trial_00003_attempt_1/data/gyro_rate" in differing
 
 
+@pytest.mark.slow
 def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Lab):
     archive = interrupted(lab)
     executed = []
@@ -112,6 +114,7 @@ def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Lab):
         lab.resume(archive)
 
 
+@pytest.mark.slow
 def test_white_space_and_comments_are_no_change(lab: Lab):
     archive = interrupted(lab)
     write(lab.folder, "# mine\n\n" + OWN_BENCH.replace(" = ", "   =  ") + "\n")
@@ -137,6 +140,7 @@ def change_version(lab: Lab) -> None:
     real.setattr(provenance, "versions", lambda: versions)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "field"),
     [
@@ -168,6 +172,7 @@ def test_another_list_of_trials_is_another_run_whatever_is_accepted(lab: Lab):
     assert "matrix.compensation" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: Lab, capsys):
     archive = interrupted(lab)
     planned = [trial.fingerprint for trial in open_run(archive).plan]
@@ -178,6 +183,7 @@ def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: 
     assert [each.trial.fingerprint for each in open_run(archive).trials] == planned
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("policy", "repeated"), [("skip", False), ("abort", True)])
 def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
     lab: Lab, policy: str, repeated: bool
@@ -216,6 +222,7 @@ def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: 
         assert remade.options.port == port
 
 
+@pytest.mark.slow
 def test_the_command_says_how_to_go_on_and_goes_on(tmp_path: Path):
     """The real thing, from the command line: Ctrl-C once, and the command that is then shown."""
     write(tmp_path, SEA.replace("cycles = 1\n", "cycles = 10\nrepeat = 15\n", 1))

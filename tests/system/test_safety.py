@@ -74,6 +74,7 @@ def running(folder: Path, port: str) -> Iterator[Process]:
             process.kill()
 
 
+@pytest.mark.slow
 def test_the_archive_of_a_rehearsal_is_that_of_the_simulation(tmp_path: Path) -> None:
     write(tmp_path, PROTOCOL)
     simulated = campaign(tmp_path, "run", "protocol.toml").last_line

@@ -405,6 +405,7 @@ def test_the_command_without_a_terminal_fails_at_once(tmp_path: Path, locked: Pa
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 @needs_ssh_keygen
 @needs_posix
 def test_a_passphrase_is_asked_for_at_the_terminal(tmp_path: Path, locked: Path):
@@ -511,6 +512,7 @@ def test_ctrl_c_while_it_is_signed_keeps_the_run_and_says_so(
     assert shown.out.splitlines()[-1].endswith(".nxs")
 
 
+@pytest.mark.slow
 @needs_ssh_keygen
 def test_a_run_that_was_gone_on_with_is_signed_anew_and_its_old_signature_is_no_longer_one(
     tmp_path: Path,

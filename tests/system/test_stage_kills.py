@@ -113,6 +113,7 @@ def of_a_map(tmp_path_factory: pytest.TempPathFactory) -> Nursery:
     return Nursery(tmp_path_factory.mktemp("maps"), MAP)
 
 
+@pytest.mark.slow
 def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):
     run = open_run(find_run(nursery.folder / "whole"))
     lines = run.journal.splitlines()[1:]
@@ -122,6 +123,7 @@ def test_the_journal_has_the_lines_that_are_killed_here(nursery: Nursery):
     assert nursery.points == [{"compensation": "none"}, {"compensation": "lugre"}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("where", "number"),
     [
@@ -135,6 +137,7 @@ def test_a_kill_in_a_gap_around_a_stage_changes_nothing(nursery: Nursery, where:
     nursery.goes_on(f"{where}-{number}", where, number)
 
 
+@pytest.mark.slow
 def test_a_stage_that_is_journalled_is_not_asked_again(nursery: Nursery):
     assert nursery.live("run protocol.toml --results once", "after", STAGES[0]) == -9
     run = open_run(find_run(nursery.folder / "once"))
@@ -143,6 +146,7 @@ def test_a_stage_that_is_journalled_is_not_asked_again(nursery: Nursery):
     assert run.journal.count("trials followed") == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("where", "number"), [("torn", PILOT), ("after", PILOT), ("after", PILOT + 5)]
 )

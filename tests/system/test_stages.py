@@ -93,6 +93,7 @@ def samples(run: RunReader) -> dict[int, tuple[str, bytes]]:
     }
 
 
+@pytest.mark.slow
 def test_two_workers_find_number_and_record_what_one_does(lab: Lab, whole: RunReader):
     two = lab.run(workers=2)
     assert len(whole.trials) == ALL
@@ -100,6 +101,7 @@ def test_two_workers_find_number_and_record_what_one_does(lab: Lab, whole: RunRe
     assert [stage.point for stage in two.stages] == [stage.point for stage in whole.stages]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 14])
 def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunReader, number: int):
     stopped = lab.stopped_in(number)
@@ -109,6 +111,7 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunR
     assert verify_run(resumed.path).problems == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 14])
 def test_a_protocol_that_is_gone_leaves_its_stages_in_the_archive(
     lab: Lab, whole: RunReader, number: int
@@ -127,6 +130,7 @@ def test_what_followed_on_one_bench_does_not_move_a_changed_one(lab: Lab):
     assert stopped.path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_change_before_anything_followed_is_accepted(lab: Lab):
     stopped = lab.stopped_in(1)
     assert stopped.stages == ()
@@ -139,6 +143,7 @@ def test_a_change_before_anything_followed_is_accepted(lab: Lab):
     assert limits[0] > stopped.planned(1).bench["limits"]["angle"]
 
 
+@pytest.mark.slow
 def test_a_user_sees_the_stages_before_during_and_after(lab: Lab):
     folder = lab.folder
     planned = campaign(folder, "plan", "protocol.toml").out
@@ -171,6 +176,7 @@ def test_they_are_trials_for_whoever_opens_the_run(whole: RunReader):
         assert swept[last - 1] / swept[first] > 1.12 / 0.88
 
 
+@pytest.mark.slow
 def test_a_replay_finds_the_same_trials_and_serves_them(lab: Lab, whole: RunReader):
     again = campaign(
         lab.folder, "run", "protocol.toml", "--backend", "replay", "--from", str(whole.path),

@@ -98,6 +98,7 @@ def run_wild(folder: Path, how: str) -> tuple[int, str, RunReader]:
     return done.returncode, done.stderr, open_run(folder / done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_what_a_plug_in_records_beyond_every_limit_is_no_completed_trial(tmp_path: Path) -> None:
     """It did end `complete`, exit code 0."""
     code, said, run = run_wild(tmp_path, "wild")

@@ -172,6 +172,7 @@ def test_no_analysis_can_reach_it(archive: Path) -> None:
     assert len(seen) > 100
 
 
+@pytest.mark.slow
 def test_the_report_opens_it_when_the_analyses_are_done(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,6 +211,7 @@ def test_it_is_shown(archive: Path, capsys) -> None:
     assert list(header["truth"]) == ["option", "plants"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_with_its_truth(lab: Lab) -> None:
     whole = open_run(lab.run()).trials
     archive = lab.interrupted()
@@ -220,6 +222,7 @@ def test_an_interrupted_run_goes_on_with_its_truth(lab: Lab) -> None:
         assert now.recording()["gyro_rate"].tobytes() == was.recording()["gyro_rate"].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accept", [False, True])
 def test_a_resume_refuses_another_truth(lab: Lab, accept: bool) -> None:
     archive = lab.interrupted()
@@ -230,6 +233,7 @@ def test_a_resume_refuses_another_truth(lab: Lab, accept: bool) -> None:
     assert lab.resume(archive) is ExitCode.DONE
 
 
+@pytest.mark.slow
 def test_a_truth_that_is_gone_is_in_the_archive(lab: Lab) -> None:
     archive = lab.interrupted()
     lab.truth.unlink()
@@ -237,6 +241,7 @@ def test_a_truth_that_is_gone_is_in_the_archive(lab: Lab) -> None:
     assert all(trial.trial.truth for trial in open_run(archive).trials)
 
 
+@pytest.mark.slow
 def test_a_replay_answers_the_same_truth_only(lab: Lab) -> None:
     archive = lab.run()
     again = open_run(lab.run("replay", f"backend.run={archive}"))

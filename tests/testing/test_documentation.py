@@ -120,6 +120,7 @@ def campaign(package: Path, folder: Path, *arguments: str) -> subprocess.Complet
     return forks_of(MODULES).run(folder, *arguments, environment={**os.environ, "PYTHONPATH": path})
 
 
+@pytest.mark.slow
 def test_a_whole_run(package: Path, tmp_path: Path) -> None:
     (tmp_path / "home.toml").write_text(PROTOCOL)
     with Drive() as drive:

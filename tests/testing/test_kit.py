@@ -245,6 +245,7 @@ def test_every_check_can_fail() -> None:
     assert {name for name, _, _ in BROKEN} | together == set(CHECKS)
 
 
+@pytest.mark.slow
 def test_the_kit_needs_no_test_framework() -> None:
     code = "import sys, campaign.testing; sys.exit('pytest' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

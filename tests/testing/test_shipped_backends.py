@@ -75,6 +75,7 @@ def slow_port() -> Iterator[str]:
         yield found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS)
 def test_serial_passes(name: str, port: str, hot_port: str, slow_port: str) -> None:
     in_time = name == "hands_samples_over_in_time"

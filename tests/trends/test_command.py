@@ -27,6 +27,7 @@ def typed(
     return trend_of_archives(names, results, output, "time", models, open_it=False)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unwritten")
 def test_what_is_declared_comes_first_and_the_rest_says_what_would_be_seen(runs: Path, capsys):
     page, code = typed(runs, [f"drift-{n}" for n in (7, 1, 2, 3, 6, 5, 4, 0)])
@@ -41,6 +42,7 @@ def test_what_is_declared_comes_first_and_the_rest_says_what_would_be_seen(runs:
     assert all("N·m/rad" in row[1] for row in table[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unwritten")
 def test_damaged_runs_are_named_and_the_code_says_so(runs: Path, tmp_path: Path, capsys):
     for n in range(4):
@@ -57,12 +59,14 @@ def test_damaged_runs_are_named_and_the_code_says_so(runs: Path, tmp_path: Path,
     assert "jumped is not determined: that takes 5 runs" in " ".join(out.split())
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unwritten")
 def test_unknown_models_are_refused_with_what_there_is(runs: Path):
     with pytest.raises(UsageError, match="inverse_dynamics"):
         typed(runs, ["still-0", "still-1", "still-2"], models=["guesswork"])
 
 
+@pytest.mark.slow
 def test_the_page_holds_the_command_and_no_folder_of_anybody(runs: Path, tmp_path: Path):
     names = [str(runs / f"still-{n}.nxs") for n in range(5)]
     page, _ = typed(runs, names, tmp_path / "out")
@@ -73,6 +77,7 @@ def test_the_page_holds_the_command_and_no_folder_of_anybody(runs: Path, tmp_pat
     assert len(data["content"]["runs"]) == 5
 
 
+@pytest.mark.slow
 def test_parameters_of_a_model_are_followed_by_the_structure_of_the_first_run(
     runs: Path, tmp_path: Path
 ):

@@ -126,6 +126,7 @@ def test_what_is_the_same_in_all_runs_is_no_test():
     assert "the same in all runs" in str(told.reason)
 
 
+@pytest.mark.slow
 def test_verdicts_are_of_all_numbers_together():
     """A p value that is declared alone is not among a hundred."""
     rng = np.random.default_rng(3)

@@ -43,6 +43,7 @@ def still(runs: Path) -> Trends:
     return follow(opened(runs, "still"), experiments())
 
 
+@pytest.mark.slow
 def test_a_drift_of_breakaway_is_declared_as_one(drift: Trends):
     quantities = {each.series.quantity for each in drift.declared}
     assert quantities == {"breakaway_torque"}
@@ -55,6 +56,7 @@ def test_a_drift_of_breakaway_is_declared_as_one(drift: Trends):
         assert each.detectable[TREND] < each.change.trend.slope.value
 
 
+@pytest.mark.slow
 def test_a_jump_is_declared_where_it_was_whatever_the_order_of_the_names(jump: Trends):
     assert [member.name for member in jump.members] == [f"jump-{n}" for n in range(8)]
     assert {each.series.quantity for each in jump.declared} == {"breakaway_torque"}
@@ -68,6 +70,7 @@ def test_a_jump_is_declared_where_it_was_whatever_the_order_of_the_names(jump: T
         assert "seed" not in told
 
 
+@pytest.mark.slow
 def test_where_nothing_changes_nothing_is_declared_and_it_is_said_what_would_be(still: Trends):
     assert not still.declared
     assert still.judged == len(still.followed) > 5
@@ -104,6 +107,7 @@ def test_of_several_benches_is_refused_in_one_line(runs: Path, tmp_path: Path):
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.slow
 def test_the_same_simulation_counts_once(runs: Path, tmp_path: Path):
     """Four archives of two simulations hold two numbers, not four."""
     found = []
@@ -163,6 +167,7 @@ def test_what_follows_the_temperature_is_told_per_kelvin(tmp_path: Path):
     }
 
 
+@pytest.mark.slow
 def test_a_recorded_temperature_counts_before_a_noted_one_and_a_damaged_is_refused(tmp_path: Path):
     warm = [(20.0, "degC"), (297.15, "K"), None, (22.0, "degC")]
     wanted = {
@@ -209,6 +214,7 @@ def test_a_tag_of_mixed_units_is_one_number(runs: Path):
         follow(tagged("load=2 kg", "load=2 N", "load=3 kg", "load=4 kg"), experiments(), "load")
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_and_the_same_every_time(jump: Trends, tmp_path: Path, runs: Path):
     page = write_trends(jump, tmp_path / "out", templates_folder(), "campaign trend ...")
     first = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}

@@ -108,6 +108,7 @@ def soak(frames: int, seed: int) -> None:
     assert decoder.counts.bad > frames * 0.2
 
 
+@pytest.mark.slow
 def test_damaged_frames_are_never_accepted() -> None:
     soak(20_000, seed=1)
 

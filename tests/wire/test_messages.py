@@ -117,6 +117,7 @@ def test_nobodys_session_cannot_be_said(message: wire.Message) -> None:
 VALUES = st.one_of(FINITE, INT64, st.booleans(), TEXT, st.lists(FINITE, max_size=200).map(tuple))
 
 
+@pytest.mark.slow
 @given(st.dictionaries(NAME, VALUES, max_size=20))
 def test_a_configuration_survives_being_cut_into_messages(parameters: dict[str, wire.Value]):
     sets = wire.parameter_messages(parameters)

@@ -32,8 +32,15 @@ from campaign.experiments.breakaway.means import Ramps, means_of, with_compariso
 from campaign.experiments.breakaway.parameters import parameters_of
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
-from campaign.experiments.interface import Experiment, Model, TestData, TrialData, bench_of, metrics
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import (
+    Experiment,
+    Model,
+    TestData,
+    TrialData,
+    bench_of,
+    key,
+    metrics,
+)
 from campaign.experiments.shared import default_ramps
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped

@@ -27,8 +27,7 @@ from campaign.estimation.readings import (
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
 from campaign.experiments.component_friction.sums import load_share, total_of
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, metrics
 from campaign.experiments.shared.captions import trials_of
 from campaign.experiments.shared.common import conditions, failures_note, grouped
 from campaign.options import Options

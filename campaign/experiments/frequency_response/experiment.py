@@ -51,9 +51,9 @@ from campaign.experiments.interface import (
     TestData,
     TrialData,
     bench_of,
+    key,
     metrics,
 )
-from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,

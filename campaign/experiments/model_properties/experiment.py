@@ -17,7 +17,7 @@ from pydantic import Field, JsonValue
 from campaign.channels import DRIVE_TORQUE, FRICTION_TORQUE, LOAD_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import bracketed
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, metrics
 from campaign.experiments.model_properties.parameter_set import Scale, options_of, with_friction
 from campaign.experiments.model_properties.rules import MARKS, MET, RULES, ModelVerdict
 from campaign.experiments.model_properties.tables_and_figures import figures, tables
@@ -26,7 +26,6 @@ from campaign.experiments.model_properties.virtual_experiments import (
     numbers_of,
     requests,
 )
-from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared.common import COUNTED, failures_note
 from campaign.experiments.shared.friction_models import places
 from campaign.options import Options

@@ -20,7 +20,14 @@ from pydantic import Field, JsonValue
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.experiments.interface import ChosenValue, Experiment, TestData, TrialData, bench_of
+from campaign.experiments.interface import (
+    ChosenValue,
+    Experiment,
+    TestData,
+    TrialData,
+    bench_of,
+    key,
+)
 from campaign.experiments.observer_gain.figures import (
     error_figure,
     noise_figure,
@@ -37,7 +44,6 @@ from campaign.experiments.observer_gain.metrics import (
     own_observer,
     worst_ratio,
 )
-from campaign.experiments.post_processing.key_numbers import key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import with_changes
 from campaign.experiments.shared.pointing_error import windows_of

@@ -18,8 +18,7 @@ from campaign.channels import COMPENSATION_TORQUE, POINTING_ERROR, RELATIVE_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import over_trials
 from campaign.estimation.threshold import Threshold
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
 from campaign.experiments.sensitivity.figures import (
     sensitivity_figure,
     thresholds_figure,

@@ -29,8 +29,7 @@ from campaign.estimation.prediction_interval import of_next
 from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
 from campaign.experiments.shared.detected_trials import hull_sine

@@ -19,8 +19,7 @@ from campaign.estimation.step_response import (
     StepCharacteristics,
     step_characteristics,
 )
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.post_processing.key_numbers import key
+from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics
 from campaign.experiments.shared import default_options
 from campaign.experiments.shared.common import (
     conditions,

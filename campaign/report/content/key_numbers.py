@@ -107,7 +107,7 @@ def _compensation(name: str) -> str:
 
 def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> tuple[str, bool]:
     """What is printed of it, and whether it is reproduced; of doubtful cells nothing."""
-    known = test.evidence().known if lines else ()
+    known = test.evidence().known if lines else {}
     for line in lines:
         if line.status is not Status.INCONSISTENT and concerns(finding, line.cell, known):
             shown = shown_line(line)

@@ -59,6 +59,7 @@ def modes(best: BestLinear) -> tuple[Mode, Mode]:
     return extrema(best.response.frequency, gain, relative_scatter(best))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("benches", "realisations", "friction"),
     [

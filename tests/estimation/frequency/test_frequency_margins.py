@@ -33,6 +33,7 @@ def half_turn(truth: Truth) -> float:
     return float(grid[np.flatnonzero(phase < -np.pi)[0]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.statistics)])
 def test_margins_hold_the_truth_as_often_as_they_say(count: int) -> None:
     held: dict[str, list[bool]] = defaultdict(list)
@@ -48,6 +49,7 @@ def test_margins_hold_the_truth_as_often_as_they_say(count: int) -> None:
     assert not rejected(held, "less")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [36, pytest.param(400, marks=pytest.mark.statistics)])
 def test_margins_near_the_last_frequency_hold_the_truth(count: int) -> None:
     """Loops with one crossing just before or behind it: intervals and bounds."""

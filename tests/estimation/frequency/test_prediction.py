@@ -47,6 +47,7 @@ def test_a_right_model_is_off_by_its_deviation() -> None:
     assert np.mean(np.concatenate([e.in_deviations for e in found[:20]]) > 3.0) < 0.02
 
 
+@pytest.mark.slow
 def test_what_the_fit_does_not_know_is_part_of_the_deviation() -> None:
     """A fit of poor data against good ones: without its own scatter it would be far off."""
     squares, alone = [], []

@@ -40,6 +40,7 @@ def truths(drive: Drive) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_from_simulated_multisines_blind() -> None:
     """From rest, with noise on torque and rate; resonance within 1 %."""
     held: dict[str, list[bool]] = defaultdict(list)
@@ -78,6 +79,7 @@ def measured(drive: Drive, side: Side, seed: int, level: float = 0.01):  # type:
     return noisy(FREQUENCY, truth, level * np.median(np.abs(truth)), random)
 
 
+@pytest.mark.slow
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:
     """Each number's own: a wrong gradient shows here, where coverage of thirty hardly does."""
     truth = DRIVE.response(FREQUENCY, "motor")

@@ -31,6 +31,7 @@ def own_curve(name: str, v: float, coulomb: float) -> float:
     return coulomb + (32.0 - coulomb) * math.exp(-((v / 0.03) ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_steady_sliding_is_the_models_own_curve_in_both_directions(name: str) -> None:
     driven = Driven(name, negative=NEGATIVE)

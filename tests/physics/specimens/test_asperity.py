@@ -126,6 +126,7 @@ def test_the_ends_of_the_curve_have_closed_forms() -> None:
     assert np.all(np.diff(curve) < 0)
 
 
+@pytest.mark.slow
 def test_friction_lags_behind_a_rate_that_varies() -> None:
     """In one direction, a contact touched when the base was at x - u: its age is what counts."""
     given = options(asperities=20_000)

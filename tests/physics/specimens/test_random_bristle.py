@@ -32,6 +32,7 @@ def torque(given: RandomBristleOptions, *corners: float, step: float = 0.05) -> 
     return angle, SPECIMEN.torque(given, np.zeros(len(angle)), angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spacing", [0.3, 1.0, 2.0])
 def test_mean_and_noise_of_sliding_are_those_of_the_renewal_process(spacing: float) -> None:
     """Samples a pitch and more apart are nearly independent; the deflection is delta_s - u with
@@ -92,6 +93,7 @@ def test_the_path_alone_counts_and_the_seed() -> None:
     assert not np.array_equal(fine, torque(options(seed=2), *corners, step=0.01)[1])
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     corners=st.lists(st.floats(-0.2, 0.2), min_size=1, max_size=6),
