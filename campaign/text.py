@@ -147,6 +147,12 @@ QUANTITIES = {
     "viscous_friction": "viscous friction σ2",
     "bristle_stiffness": "bristle stiffness σ0",
     "bristle_damping": "bristle damping σ1",
+    "stabilization_error_at_gain": "stabilization error",
+    "stick_slip_first_slip": "first slip after",
+    "stick_slip_period": "period of stick-slip",
+    "stick_slip_peak_torque": "largest torque of the spring",
+    "stick_slip_top_rate": "largest rate of the load",
+    "model_property": "property",
 }
 """What people call a quantity whose name in files is not what they call it."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from campaign.api.analysis import AnalysedTest
@@ -11,6 +11,7 @@ from campaign.api.quantity_words import display_unit
 from campaign.axis_kind import axis_terms
 from campaign.experiments.post_processing.draws import draws_of
 from campaign.experiments.shared.common import short_label
+from campaign.experiments.shared.friction_models import model_label
 from campaign.published.draws import without_seed
 from campaign.published.evidence import concerns
 from campaign.published.scoreboard import Line
@@ -21,10 +22,6 @@ from campaign.report.content.written_units import TestUnits
 from campaign.result import Finding, Table, Value
 from campaign.text import SHORT, number, pretty_unit, quantity_words
 from campaign.units import convert
-
-COMPENSATION = "compensation"
-SAYS_ITSELF = ("component", COMPENSATION, "direction", "model", "parameter", "statistic")
-"""Conditions whose value is clear without their name."""
 
 
 @dataclass(frozen=True)
@@ -92,17 +89,26 @@ def _shown(
 
 
 def _where(conditions: Mapping[str, Value], units: TestUnits) -> str:
-    alone = [
-        _compensation(str(value)) if name == COMPENSATION else str(value)
-        for name, value in conditions.items()
-        if name in SAYS_ITSELF
-    ]
-    others = {name: value for name, value in conditions.items() if name not in SAYS_ITSELF}
-    return ", ".join([*alone, *filter(None, [conditions_text(others, units)])]).replace("_", " ")
+    told = sorted(conditions.items(), key=lambda pair: pair[0] not in WITHOUT_NAME)
+    texts = (
+        WITHOUT_NAME[name](str(value))
+        if name in WITHOUT_NAME
+        else conditions_text({name: value}, units)
+        for name, value in told
+    )
+    return ", ".join(filter(None, texts)).replace("_", " ")
 
 
 def _compensation(name: str) -> str:
     return "without compensation" if name == "none" else short_label(name)
+
+
+WITHOUT_NAME: dict[str, Callable[[str], str]] = {
+    **dict.fromkeys(("component", "direction", "parameter", "statistic"), str),
+    "compensation": _compensation,
+    "model": model_label,
+}
+"""Conditions whose value is clear without their name, and what it is called."""
 
 
 def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> tuple[str, bool]:
