@@ -319,7 +319,7 @@ class Result:
 
     Attributes:
         notes: sentences for the report: caveats, assumptions, what failed and why.
-        key_numbers: what was asked for, the most important first; `findings`, or ratios of them.
+        key_numbers: what was asked for, the most important first; `findings`, or medians of draws.
         telling: key of the figure that tells it best; "" for the first.
         doubts: recordings that something is wrong with; `notes` say the same. Whoever calls an
             analysis adds them.

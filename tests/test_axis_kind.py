@@ -286,7 +286,15 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
     table = Table("t", "T", (Column("f", "F", "N"),), ({"f": found},))
     said = Result(key_numbers=(Finding.of(found, {}),))
     test = SimpleNamespace(
-        name="t", title="T", kind="k", problem="", trials=(), failed=(), result=said, sides=DIRECT
+        name="t",
+        title="T",
+        kind="k",
+        problem="",
+        trials=(),
+        failed=(),
+        result=said,
+        sides=DIRECT,
+        experiment=None,
     )
     remark = "Of unknown size, and in no interval: force constant."
     units = TestUnits(test)  # type: ignore[arg-type]

@@ -29,14 +29,18 @@ BENCH = "bench."
 
 
 def display_unit(test: AnalysedTest, finding: Finding) -> str:
-    """The unit in which the test's own tables show this number."""
-    for table in test.result.tables:
-        for column in table.columns:
-            if column.display and column.unit == finding.unit:
-                cells = (row.get(column.name) for row in table.rows)
-                if any(_is(cell, finding.value) for cell in cells):
-                    return column.display
-    return DISPLAY.get(finding.unit, finding.unit)
+    """The unit in which the test's own tables show this number, or else its quantity."""
+    columns = [
+        (table, column)
+        for table in test.result.tables
+        for column in table.columns
+        if column.display and column.unit == finding.unit
+    ]
+    for table, column in columns:
+        if any(_is(row.get(column.name), finding.value) for row in table.rows):
+            return column.display
+    own = (column.display for _, column in columns if column.name == finding.quantity)
+    return next(own, DISPLAY.get(finding.unit, finding.unit))
 
 
 def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:

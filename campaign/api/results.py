@@ -32,6 +32,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
+NOT_IN_A_NOTEBOOK = (
+    "standard_error", "freedom", "origin", "kind", "method", "scatter_low", "scatter_high",
+    "systematic", "reason_code", "reason_values",
+)  # fmt: skip
+"""Columns of numbers that a table to look at leaves out."""
 NO_FILE = "there is no file of results"
 
 
@@ -117,8 +122,7 @@ class Results:
         parts = [f"<p><code>{escape(repr(self))}</code></p>"]
         numbers = self.key_numbers
         if len(numbers):
-            shown = numbers[["test", "quantity", "value", "low", "high", "unit", "reason"]]
-            parts.append(shown.to_html(index=False))
+            parts.append(numbers.drop(columns=list(NOT_IN_A_NOTEBOOK)).to_html(index=False))
         for name, problem in self.problems.items():
             parts.append(f"<p>{escape(name)}: no result: {escape(problem)}.</p>")
         return "".join(parts)
@@ -174,13 +178,13 @@ def results_view(run: RunReader, *, strict: bool = False, measure_anew: bool = F
 
 def _kept(run: RunReader, *, strict: bool, measure_anew: bool) -> tuple[RunResults | None, str]:
     """What is kept beside a run, or why that is of no use."""
-    from campaign.archive.reading.results_file import read_results
+    from campaign.archive.reading.results_file import OtherLayoutError, read_results
 
     path = results_path(run.path)
     try:
         found = read_results(path, run.identity)
     except ArchiveError as error:
-        if strict:
+        if strict and not isinstance(error, OtherLayoutError):
             raise
         return None, str(error)
     why = ""

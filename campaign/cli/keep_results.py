@@ -5,7 +5,7 @@ from __future__ import annotations
 from campaign.api.results import results_of
 from campaign.archive import RunReader
 from campaign.archive.layout.results import results_path
-from campaign.archive.reading.results_file import read_any_results
+from campaign.archive.reading.results_file import OtherLayoutError, read_any_results
 from campaign.archive.writing.results_file import PreparedResults, prepare_results
 from campaign.cli.output import print_note
 from campaign.errors import ArchiveError, UsageError
@@ -49,6 +49,8 @@ def _found_when_whole(run: RunReader) -> bool:
     """
     try:
         kept = read_any_results(results_path(run.path))
+    except OtherLayoutError:
+        return True
     except ArchiveError:
         return False
     same = kept.root == run.root if run.root else kept.run == run.name

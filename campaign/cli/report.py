@@ -134,6 +134,10 @@ def _print_key_numbers(opening: FirstScreen) -> None:
             print_note(f"{answer.title}{where}", style="bold")
             grid = key_numbers([replace(answer, where="")])
             print_table(grid.headers, grid.rows, beside=True)
+    held = opening.held and f"{opening.held} of the simulated bench."
+    more = opening.left_out and f"Key numbers: {opening.left_out}"
+    for line in filter(None, (*opening.remarks, opening.intervals, opening.compared, held, more)):
+        print_note(line)
 
 
 def _published(results: PreparedResults) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from campaign.archive import find_runs
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_words
-from campaign.archive.reading.results_file import holds_results, read_any_results
+from campaign.archive.reading.results_file import OtherLayoutError, holds_results, read_any_results
 from campaign.archive.verification.result import Verification
 from campaign.archive.verification.verify_run import verify_run
 from campaign.cli.output import error_console, print_json, print_line, print_note
@@ -51,6 +51,8 @@ def _of_results(path: Path) -> Verification:
     problems: tuple[Damage, ...] = ()
     try:
         read_any_results(path)
+    except OtherLayoutError:
+        pass  # its hash was right
     except ArchiveError as error:
         problems = (Damage.of(path, error),)
     return Verification(path, problems, remarks=(), trials=0, datasets=0)

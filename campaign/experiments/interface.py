@@ -269,7 +269,8 @@ def result_of(experiment: Experiment, data: TestData) -> Result:
     """
     with axis_terms(_sides(data)):
         result = in_axis_units(_result_of(experiment, data))
-        chosen = key_numbers(result.findings, experiment.key_numbers)
+        draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
+        chosen = key_numbers(result.findings, experiment.key_numbers, draws)
         return replace(result, key_numbers=chosen)
 
 

@@ -209,11 +209,9 @@ EXPERIMENT = Experiment(
     warnings=map_warnings,
     requires=REQUIRED,
     can_use=CAN_USE,
-    key_numbers=(
-        *(
-            key(name, statistic=statistic)
-            for statistic in ("mean", "relative standard deviation")
-            for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
-        ),
+    key_numbers=tuple(
+        key(name, statistic=statistic)
+        for statistic in ("mean", "relative standard deviation")
+        for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
     ),
 )

@@ -62,11 +62,9 @@ EXPERIMENT = Experiment(
     recorded=stretches_found,
     windows=tuple(DIRECTIONS),
     model=MODEL,
-    key_numbers=(
-        *(
-            key(name, direction=direction, exponent="free")
-            for direction in DIRECTIONS
-            for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
-        ),
+    key_numbers=tuple(
+        key(name, direction=direction, exponent="free")
+        for direction in DIRECTIONS
+        for name in ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
     ),
 )

@@ -9,7 +9,7 @@ where one more draw would lie.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from statistics import fmean, median, stdev
 
@@ -29,6 +29,15 @@ DRAWS_ALIKE = Cause("draws alike", "all {draws} draws are alike")
 def without_seed(conditions: Mapping[str, Value]) -> dict[str, Value]:
     """What findings of several draws have in common."""
     return {name: value for name, value in conditions.items() if name != SEED}
+
+
+def by_draw(findings: Iterable[Finding]) -> list[list[Finding]]:
+    """Findings that differ in nothing but the seed of their draw, together."""
+    groups: dict[str, list[Finding]] = {}
+    for each in findings:
+        key = str((each.quantity, each.unit, sorted(without_seed(each.conditions).items())))
+        groups.setdefault(key, []).append(each)
+    return list(groups.values())
 
 
 def together(findings: Sequence[Finding], seeds: Collection[Value] = ()) -> Finding:

@@ -109,7 +109,7 @@ def test_published_values_stand_beside_and_a_mark_says_which_agree(
 def test_true_values_of_a_simulated_bench_stand_beside(made_up: ModuleType, tmp_path: Path):
     ways = [found("coulomb_torque", 30.0, direction=way, exponent="free") for way in ("positive",)]
     (own,) = answers(made_up, tmp_path, {"velocity_map": ()}, velocity_map=ways)
-    assert own.numbers[0].true == "30.235 N·m"
+    assert own.numbers[0].true == "30.235 N·m (outside)"
 
 
 def _stating(run: RunReader, **stated: str) -> RunReader:

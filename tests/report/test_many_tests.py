@@ -117,8 +117,8 @@ def test_the_page_opens_with_the_main_tests_and_each_test_has_all_of_its_own(
     assert top.count('<th scope="row">') == sum(len(FOUND[name]) for name in on_top)
     sections = re.findall(r'<section id="[^"]*" class="test">.*?</section>', below, re.DOTALL)
     for name, section in zip(FOUND, sections, strict=True):
-        numbers = section.split('class="key-numbers"')[1].split("</table>")[0]
-        assert numbers.count('<th scope="row">') == len(FOUND[name])
+        numbers = section.split('<dl class="key">')[1].split("</dl>")[0]
+        assert numbers.count("<dt>") == len(FOUND[name])
 
 
 @pytest.mark.slow

@@ -98,6 +98,14 @@ def test_a_sign_alone_takes_the_place_of_its_group() -> None:
     )
 
 
+def test_a_clip_stays_where_it_was() -> None:
+    """On `use` a clip moves with x and y, and would hide the mark."""
+    alone = '<g clip-path="url(#z)">\n' + use("c", 30) + "\n</g>"
+    told = drawn(*alone.split("\n"), group="<g>")
+    assert "<use" not in told
+    assert '<path clip-path="url(#z)" d="M30 3.25c.6' in told
+
+
 def test_signs_that_nothing_uses_any_more_are_gone() -> None:
     text = merged(f"{SIGNS}{use('b', 1)}\n{use('c', 1)}\n</svg>")
     assert re.findall('id="(.)"', text) == ["c"]

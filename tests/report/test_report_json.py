@@ -269,7 +269,7 @@ def test_each_key_number_of_the_page_is_in_the_json(page, told):
             assert shown["value"] in words
             unit = shown["value"].rpartition(" ")[2]
             factor = {"mrad": 1e3, "°": 180 / math.pi, "deg/s": 180 / math.pi}
-            if found["number"]["value"] is not None:
+            if found["number"]["value"] is not None and not shown["published"]:
                 values = of_number(found["number"], factor.get(unit, 1.0))
                 assert is_among(shown["value"], values), shown
             checked += 1

@@ -13,7 +13,7 @@ from campaign.archive.layout.header import PARTIAL, SEALED
 from campaign.result import Result, Table
 
 ENDING = f"-results{SEALED}"
-FORMAT = 1
+FORMAT = 2
 """Version of the layout (`docs/results-as-data.md`)."""
 ENTRY = "results"
 """The one group of the file, in place of a run's `run`."""

@@ -31,6 +31,10 @@ def is_results_file(path: Path) -> bool:
         return False
 
 
+class OtherLayoutError(ArchiveError):
+    """Sound results of another version of this program."""
+
+
 def holds_results(path: Path) -> bool | None:
     """Whether a file holds results in place of a run, of any version; None when it tells neither.
 
@@ -50,7 +54,7 @@ def read_results(path: Path, root: str) -> RunResults:
     """The results in a file, of the run that `root` stands for.
 
     Raises ArchiveError, which says in one line why they are not used: the file is none, is not
-    whole, was changed, has a newer layout, or is of another run.
+    whole, was changed, has another layout, or is of another run.
     """
     found = read_any_results(path)
     if found.root != root:
@@ -64,25 +68,25 @@ def read_results(path: Path, root: str) -> RunResults:
 def read_any_results(path: Path) -> RunResults:
     """The results in a file, of whatever run.
 
-    Raises ArchiveError in one line: the file is none, is not whole, was changed, or has a newer
-    layout.
+    Raises ArchiveError in one line: the file is none, is not whole, was changed, or has another
+    layout (OtherLayoutError).
     """
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, f"/{ENTRY}"):
         if ENTRY not in safe_hdf5.names(file):
             raise ArchiveError(f"{path}: holds no results")
         entry = safe_hdf5.inner_group(file, ENTRY)
-        _check_format(path, entry)
         digest, place = safe_hdf5.digest_at(entry, HASH)
         if sha256_of(path, place) != digest:
             raise ArchiveError(f"{path}: does not match its own hash; it was damaged or changed")
+        _check_format(path, entry)
         return _record(path, entry)
 
 
 def _check_format(path: Path, entry: h5py.Group) -> None:
     version = safe_hdf5.integer_at(safe_hdf5.inner_group(entry, "run"), "format")
-    if not 1 <= version <= FORMAT:
-        raise ArchiveError(
-            f"{path}: has results of layout {version}; this program reads up to {FORMAT}"
+    if version != FORMAT:
+        raise OtherLayoutError(
+            f"{path}: has results of layout {version}; this program reads {FORMAT}"
         )
 
 

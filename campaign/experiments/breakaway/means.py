@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import OF_ONE_TRIAL, Estimate, Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import (
     difference,
@@ -101,7 +101,8 @@ def mean(quantity: str, found: Sequence[Estimate]) -> Estimate:
     reason = next((each.reason for each in found if not each.has_interval), NONE)
     rule = found[0].origin is Origin.ASSUMED
     if count == 1:
-        return replace(found[0], systematic=systematic)
+        alone = found[0].reason or (OF_ONE_TRIAL() if found[0].has_interval else NONE)
+        return replace(found[0], systematic=systematic, reason=alone)
     outer = float(np.std([each.value for each in found], ddof=1)) / math.sqrt(count)
     if reason and outer < 3.0 * inner:
         return Estimate.without_interval(quantity, value, unit, reason, systematic=systematic)

@@ -17,7 +17,7 @@ from pydantic import Field, JsonValue
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import LOST, at_sample, bracketed, named, peak
-from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.interface import Experiment, TestData, TrialData, key
 from campaign.experiments.model_output.figures import (
     UNCHANGED,
     cycle,
@@ -255,4 +255,8 @@ EXPERIMENT = Experiment(
         COMPENSATION_TORQUE: "the output of a compensation",
     },
     measure=_measure,
+    key_numbers=(
+        key("model_peak", parameter="unchanged"),
+        key("model_at_reversal", parameter="unchanged"),
+    ),
 )

@@ -139,7 +139,7 @@ def _findings(judged: ModelVerdict) -> Iterator[Finding]:
     yield Finding.of(count, conditions)
     met = sum(judged.sign(rule) == MARKS[MET] for rule in RULES)
     told = Estimate("properties_met", met, "", kind="count", reason=COUNTED())
-    yield Finding.of(told, conditions)
+    yield Finding.of(told, {**conditions, "of": len(RULES)})
 
 
 def _analyse(data: TestData) -> Result:

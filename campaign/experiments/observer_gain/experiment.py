@@ -363,7 +363,7 @@ EXPERIMENT = Experiment(
     seeks_instability=True,
     key_numbers=(
         key("observer_corner_frequency"),
+        key("observer_gain"),
         key("unstable_corner_frequency"),
-        key("stabilization_error_at_gain"),
     ),
 )

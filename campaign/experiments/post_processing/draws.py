@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from campaign.experiments.post_processing.key_numbers import by_draw
-from campaign.published.draws import SEED, together
+from campaign.published.draws import SEED, by_draw, together
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.trial import Trial
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from campaign.published.draws import SEED, together, without_seed
+from campaign.published.draws import by_draw, together
 from campaign.result import Finding, Value
-from campaign.trial import canonical_json
 
 MOST = 8
 """Key numbers of a test that are shown of all of its places."""
+FIRST = 24
+"""Findings that stand for those of an experiment that declares none."""
 WITHIN_A_PLACE = (
     "compensation",
     "component",
@@ -37,15 +38,19 @@ def key(quantity: str, **where: Value) -> KeyQuantity:
     return KeyQuantity(quantity, where)
 
 
-def key_numbers(findings: Sequence[Finding], wanted: Sequence[KeyQuantity]) -> tuple[Finding, ...]:
-    """The findings that are wanted, in that order; all where there are none of these.
+def key_numbers(
+    findings: Sequence[Finding], wanted: Sequence[KeyQuantity], draws: Sequence[Value] = ()
+) -> tuple[Finding, ...]:
+    """The findings that are wanted, in that order; the first where there are none of these.
 
-    Several draws of a random bench have one number: their median, and where one more lies. Of a
-    sweep with more than `MOST` the numbers of its first and of its last place are chosen: by place
-    and not by size, so that their intervals still hold.
+    Several `draws` of a random bench, by their seeds, have one number: their median, and where one
+    more lies. Of a sweep with more than `MOST` the numbers of its first and of its last place are
+    chosen: by place and not by size, so that their intervals still hold.
     """
-    every = _together(findings)
-    chosen = [each for one in wanted for each in every if _is(one, each)] or every
+    every = list(findings)
+    if len(draws) > 1:
+        every = [together(group, draws) for group in by_draw(findings)]
+    chosen = [each for one in wanted for each in every if _is(one, each)] or every[:FIRST]
     if len(chosen) <= MOST:
         return tuple(chosen)
     places: dict[str, list[str]] = {}
@@ -62,21 +67,4 @@ def _is(wanted: KeyQuantity, finding: Finding) -> bool:
 
 
 def _place(finding: Finding) -> str:
-    rest = {name: v for name, v in finding.conditions.items() if name not in WITHIN_A_PLACE}
-    return canonical_json(rest)
-
-
-def by_draw(findings: Iterable[Finding]) -> list[list[Finding]]:
-    """Findings that differ in nothing but the seed of their draw, together."""
-    groups: dict[str, list[Finding]] = {}
-    for each in findings:
-        key = canonical_json([each.quantity, each.unit, without_seed(each.conditions)])
-        groups.setdefault(key, []).append(each)
-    return list(groups.values())
-
-
-def _together(findings: Sequence[Finding]) -> list[Finding]:
-    seeds = {each.conditions[SEED] for each in findings if SEED in each.conditions}
-    if not seeds:
-        return list(findings)
-    return [together(group, seeds) for group in by_draw(findings)]
+    return str({n: v for n, v in finding.conditions.items() if n not in WITHIN_A_PLACE})

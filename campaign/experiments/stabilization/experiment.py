@@ -326,8 +326,8 @@ EXPERIMENT = Experiment(
         FRICTION_TORQUE: "true friction beside the compensation torque",
     },
     key_numbers=(
+        key("error_growth"),
         key("stabilization_error"),
         key("error_reduction"),
-        key("error_growth"),
     ),
 )

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from campaign.estimate import OF_ONE_TRIAL, Estimate
+from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import quotient
 from campaign.physics.compensation.identified import stated_name
-from campaign.reason import Cause
 from campaign.result import Cell, Column, Table
 
 Row = Mapping[str, Cell]
@@ -15,10 +14,6 @@ RATIO = "ratio"
 ERROR = "stabilization_error"
 OWN = ("compensation", "error", "peak", "stuck", "repeats", "spread", "next")
 """What of a row of errors is not the place it is of."""
-OF_SINGLES = Cause(
-    "ratio of single trials",
-    "a ratio of which a side is of one trial: how trials scatter is not in it",
-)
 PRELOAD_PATH = "bench.gear.preload.torque"
 """Said already by the average friction."""
 
@@ -37,15 +32,12 @@ def _pairs(rows: Sequence[Row]) -> Iterator[Row]:
             continue
         if not error.is_determined or not before.is_determined:
             continue
-        ratio = quotient(RATIO, error, before)
-        if ratio.reason in OF_ONE_TRIAL:
-            ratio = Estimate.without_interval(RATIO, ratio.value, "", OF_SINGLES())
         yield {
             "compensation": stated,
             **_at(row),
             "stated": before,
             "identified": error,
-            RATIO: ratio,
+            RATIO: quotient(RATIO, error, before),
         }
 
 

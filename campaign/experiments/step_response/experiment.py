@@ -301,6 +301,5 @@ EXPERIMENT = Experiment(
         key("settling_time"),
         key("overshoot"),
         key("rise_time"),
-        key("steady_state_error"),
     ),
 )

@@ -63,7 +63,6 @@ class FrictionUnknown:
         rests_on: unknowns of which one at least has to be measured for it to mean anything.
         lasts: how long what it says takes in a reversal; None where it is seen between reversals.
         below_one, about_one: of a ratio, what it says where its interval lies below one or has it.
-        is_coulomb: whether it is the Coulomb friction, which a sentence states.
     """
 
     name: str
@@ -79,7 +78,6 @@ class FrictionUnknown:
     lasts: ReversalTime | None = None
     below_one: str = ""
     about_one: str = ""
-    is_coulomb: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ def line(sizes: Sizes, *, by_direction: bool) -> Unknowns:
             FrictionUnknown(
                 f"coulomb{tail}", f"{prefix}coulomb_torque", "N m",
                 f"Dry friction of fast sliding{told}.",
-                0.02 * mean, 20.0 * mean, start, REVERSE, logarithmic=True, is_coulomb=True,
+                0.02 * mean, 20.0 * mean, start, REVERSE, logarithmic=True,
             ),
             FrictionUnknown(
                 f"viscous{tail}", f"{prefix}viscous_friction", "N m s/rad",

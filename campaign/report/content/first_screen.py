@@ -37,6 +37,8 @@ INTERVALS = (
 
 ROOM, FEWEST = 18, 2
 """Key numbers that it has room for, and how many it has of each test, however many there are."""
+ENOUGH = 4
+"""Key numbers from which on a test is as telling as any."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,6 @@ class Answer:
     """What one test comes to.
 
     Attributes:
-        kind: of experiment, as people read it: `velocity map`.
         where: conditions that all of its key numbers share.
         numbers: its key numbers, the most important first.
         figure: the key of its most telling figure.
@@ -58,7 +59,6 @@ class Answer:
 
     test: str
     title: str
-    kind: str = ""
     where: str = ""
     numbers: tuple[KeyNumber, ...] = ()
     figure: str = ""
@@ -101,8 +101,15 @@ class FirstScreen:
         return tuple(replace(each, numbers=each.numbers[:most]) for each in chosen)
 
     @property
+    def left_out(self) -> str:
+        """That there are more key numbers than are shown; "" where there are not."""
+        shown = sum(len(each.numbers) for each in self.shown)
+        every = sum(len(each.numbers) for each in self.answers)
+        return f"{shown} of {every}; the report's sections have all." if shown < every else ""
+
+    @property
     def remarks(self) -> tuple[str, ...]:
-        """Those on the numbers that are shown, each once with the tests that it is of."""
+        """Those of the tests that are shown, each once with the tests that it is of."""
         shown = [each for each in self.shown if each.numbers]
         titles: dict[str, list[str]] = {}
         for each in shown:
@@ -142,17 +149,20 @@ def opening_of(
 def _main(tests: Sequence[AnalysedTest]) -> tuple[str, ...]:
     """Of many tests one of each of the kinds that tell most, in the protocol's order.
 
-    A test tells as much as it has key numbers with an interval: what a computation without noise
-    comes to is known to all digits, and of nothing but itself.
+    Those that reproduce printed numbers go first, then those that have more key numbers with an
+    interval, up to `ENOUGH`: what a computation without noise comes to is known to all digits, and
+    of nothing but itself.
     """
     if len(tests) <= MANY:
         return ()
-    kinds: dict[str, list[AnalysedTest]] = {}
+    told: dict[str, list[tuple[tuple[bool, int], str]]] = {}
     for test in tests:
         if test.result.key_numbers and not test.problem:
-            kinds.setdefault(test.kind, []).append(test)
-    best = [max(own, key=_tells) for own in kinds.values()]
-    chosen = [test.name for test in sorted(best, key=_tells, reverse=True)[:MANY]]
+            printed = any(not name.startswith("figure") for name in test.reproduces)
+            rank = printed, min(ENOUGH, _tells(test))
+            told.setdefault(test.kind, []).append((rank, test.name))
+    best = [max(own, key=lambda each: each[0]) for own in told.values()]
+    chosen = [name for _, name in sorted(best, key=lambda each: each[0], reverse=True)[:MANY]]
     return tuple(test.name for test in tests if test.name in chosen)
 
 
@@ -175,7 +185,6 @@ def _answer(
         return Answer(
             test.name,
             test.title,
-            test.kind.replace("_", " "),
             where,
             numbers,
             "" if figure is None else figure.key,
@@ -188,11 +197,12 @@ def _answer(
 
 
 def _nothing(test: AnalysedTest) -> str:
-    """Why there is no key number, though the analysis went through."""
+    """Why an analysis that went through found nothing; "" where it found something."""
+    if not test.result.is_empty:
+        return ""
     if test.trials and len(test.failed) == len(test.trials):
         return f"none of its {len(test.trials)} executed trials completed"
-    notes = [note.rstrip(".") for note in test.result.notes[:1]]
-    return notes[0] if notes else "it has no key number; tables and figures have what it found"
+    return "; ".join(note.rstrip(".") for note in test.result.notes[:1]) or "nothing was found"
 
 
 def _held(truth: Table) -> str:

@@ -1,4 +1,4 @@
-"""Key numbers of each test for the first screen."""
+"""Key numbers of each test as a reader is shown them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from campaign.axis_kind import axis_terms
 from campaign.experiments.post_processing.draws import draws_of
 from campaign.experiments.shared.common import short_label
 from campaign.experiments.shared.friction_models import model_label
-from campaign.published.draws import without_seed
 from campaign.published.evidence import concerns
 from campaign.published.scoreboard import Line
 from campaign.published.status import Status
@@ -34,7 +33,8 @@ class KeyNumber:
         value: with its interval and unit.
         published: what is printed of it, with its unit; "" where nothing is.
         agrees: whether that is reproduced.
-        true: what is true of the simulated bench, with its unit; "" unknown.
+        true: what is true of the simulated bench, with its unit, and whether it lies outside of
+            the interval; "" unknown.
     """
 
     quantity: str
@@ -53,43 +53,51 @@ def shown_key_numbers(
     lines: of the scoreboard. truth: the test's table of true values.
     """
     found = test.result.key_numbers
-    drawn = len(draws_of(each.trial for each in test.trials)) > 1  # a median is of no seed
-    every = [without_seed(f.conditions) if drawn else f.conditions for f in found]
+    draws = len(draws_of(each.trial for each in test.trials))
+    every = [finding.conditions for finding in found]
     shared: dict[str, Value] = {}
     if len(found) > 1:
         shared = {n: v for n, v in every[0].items() if all(n in c and c[n] == v for c in every)}
+    wanted = test.experiment.key_numbers if test.experiment else ()
+    plain = {pair for each in wanted for pair in each.where.items()}  # what is meant without a word
     own = [line for line in lines if line.test == test.name]
     with axis_terms(test.sides):
         numbers = tuple(
-            _shown(test, finding, {n: v for n, v in each.items() if n not in shared}, units, truth,
-                   *_published(finding, own, test))
+            _shown(test, finding, _where(rest, units), _published(finding, own, test), truth)
             for finding, each in zip(found, every, strict=True)
-        )  # fmt: skip
-        return _where(shared, units), numbers
+            for rest in [{name: v for name, v in each.items() if name not in shared}]
+        )
+        where = _where(dict(shared.items() - plain), units)
+    drawn = f"median of {draws} draws, and where one more lies" if draws > 1 else ""
+    return ", ".join(filter(None, (drawn, where))), numbers
 
 
 def _shown(
-    test: AnalysedTest,
-    finding: Finding,
-    conditions: Mapping[str, Value],
-    units: TestUnits,
-    truth: Table | None,
-    published: str,
-    agrees: bool,
+    test: AnalysedTest, finding: Finding, where: str, line: Line | None, truth: Table | None
 ) -> KeyNumber:
-    display = display_unit(test, finding)
-    return KeyNumber(
-        quantity_words(finding.quantity),
-        _where(conditions, units),
-        estimate_text(finding.known, display),
-        published,
-        agrees,
-        _true(finding, display, truth),
+    """As the scoreboard has it, if it is held against a published value; else as the test's tables.
+
+    So that a verdict and the interval that it rests on stand together.
+    """
+    quantity = quantity_words(finding.quantity)
+    # Of several draws the tables have each number, not their median.
+    same = (
+        f for f in test.result.findings if (f.quantity, f.unit) == (finding.quantity, finding.unit)
     )
+    unit = line.cell.unit if line else display_unit(test, next(same, finding))
+    true = _true(finding, unit, truth)
+    if line is None:
+        return KeyNumber(quantity, where, estimate_text(finding.known, unit), true=true)
+    shown = shown_line(line)
+    value, published = (
+        f"{text} {shown.unit}".rstrip() for text in (shown.reproduced, shown.published)
+    )
+    return KeyNumber(quantity, where, value, published, shown.good, true)
 
 
 def _where(conditions: Mapping[str, Value], units: TestUnits) -> str:
     told = sorted(conditions.items(), key=lambda pair: pair[0] not in WITHOUT_NAME)
+    told = [(n, v) for n, v in told if SAID_BY.get(n) not in conditions]
     texts = (
         WITHOUT_NAME[name](str(value))
         if name in WITHOUT_NAME
@@ -104,28 +112,29 @@ def _compensation(name: str) -> str:
 
 
 WITHOUT_NAME: dict[str, Callable[[str], str]] = {
-    **dict.fromkeys(("component", "direction", "parameter", "statistic"), str),
+    **dict.fromkeys(("component", "direction", "statistic"), str),
+    "parameter": quantity_words,
     "compensation": _compensation,
     "model": model_label,
 }
 """Conditions whose value is clear without their name, and what it is called."""
+SAID_BY = {"bench.gear.preload.torque": "average_friction"}
+"""Conditions that are the same number as another one."""
 
 
-def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> tuple[str, bool]:
-    """What is printed of it, and whether it is reproduced; of doubtful cells nothing."""
+def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> Line | None:
+    """The published value that it is held against; doubtful cells are none."""
     known = test.evidence().known if lines else {}
-    for line in lines:
-        if line.status is not Status.INCONSISTENT and concerns(finding, line.cell, known):
-            shown = shown_line(line)
-            return f"{shown.published} {shown.unit}".rstrip(), shown.good
-    return "", False
+    sound = (line for line in lines if line.status is not Status.INCONSISTENT)
+    return next((line for line in sound if concerns(finding, line.cell, known)), None)
 
 
 def _true(finding: Finding, display: str, truth: Table | None) -> str:
     """The value beside which the test's own table holds it."""
     rows = () if truth is None else truth.rows
-    same = (row["true"] for row in rows if row["found"] == finding.known)
-    value = next((each for each in same if isinstance(each, float)), None)
-    if value is None:
-        return ""
-    return f"{number(convert(value, finding.unit, display), SHORT)} {pretty_unit(display)}".rstrip()
+    for row in rows:
+        if row["found"] == finding.known and isinstance(value := row["true"], float):
+            told = number(convert(value, finding.unit, display), SHORT)
+            outside = " (outside)" if row["inside"] == "no" else ""
+            return f"{told} {pretty_unit(display)}".rstrip() + outside
+    return ""

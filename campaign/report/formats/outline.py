@@ -119,9 +119,8 @@ def key_numbers(answers: Sequence[Answer]) -> Grid:
         for each in answer.numbers
     )
     headers = ("Test", "Quantity", "Where", "Found", "Published", "True")
-    kept = [n for n in range(len(headers)) if any(row[n] for row in rows)]
-    if len(answers) == 1:
-        kept.remove(0)
+    several = len(answers) > 1
+    kept = [n for n in range(len(headers)) if any(row[n] for row in rows) and (n or several)]
     return Grid(
         None,
         "key-numbers",

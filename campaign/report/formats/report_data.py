@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, JsonValue
 
 from campaign.report.content.first_screen import FirstScreen
 
-FORMAT = 2
+FORMAT = 3
 """Rises when a field changes its meaning or goes; a new one may come at any time."""
 
 

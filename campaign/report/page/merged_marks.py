@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 NUMBER = r"-?(?:\d+\.?\d*|\.\d+)"
 _MOVE = re.compile(rf"m({NUMBER}) ?({NUMBER}) ?(.*)")
@@ -32,7 +33,7 @@ def merged(svg: str) -> str:
         return svg
     signs = {a["id"]: a for a in map(_attributes, head.split("\n")) if "id" in a and "d" in a}
     body = _PLAIN.sub(_dissolved, body)
-    body = _OF_ONE.sub(_alone, "\n".join(_merged(body.split("\n"), signs)))
+    body = _OF_ONE.sub(partial(_alone, signs), "\n".join(_merged(body.split("\n"), signs)))
     used = set(re.findall(r"#(\w+)", body))
     gone = signs.keys() - used
     kept = (line for line in head.split("\n") if _attributes(line).get("id") not in gone)
@@ -53,16 +54,32 @@ def _dissolved(group: re.Match[str]) -> str:
     return _ITEM.sub(own, group[2])
 
 
-def _alone(group: re.Match[str]) -> str:
+def _alone(signs: dict[str, Attributes], group: re.Match[str]) -> str:
     """What is alone in a group, with what the group says."""
-    outer, inner = _attributes(group[1]), _attributes(group[4])
+    outer, inner, name = _attributes(group[1]), _attributes(group[4]), group[3]
     if outer.keys() & inner.keys() - {"style"} or "transform" in outer.keys() | inner.keys():
         return group[0]
+    style = _style(outer) | _style(inner)
+    if name == "use" and "clip-path" in outer:  # the clip would move with x and y of `use`
+        sign = signs.get(inner.pop("xlink:href")[1:], {})
+        place = float(inner.pop("x", 0)), float(inner.pop("y", 0))
+        if (moved := _moved(sign.get("d", ""), *place)) is None:
+            return group[0]
+        name, inner, style = "path", {"d": moved, **inner}, style | _style(sign)
     own = outer | inner
-    if style := _css(_style(outer) | _style(inner)):
-        own["style"] = style
-    told = f"<{group[3]}{_told(own)}"
-    return f"{told}>{group[2].strip()}</{group[3]}>" if group[2] else f"{told}/>"
+    if style:
+        own["style"] = _css(style)
+    told = f"<{name}{_told(own)}"
+    return f"{told}>{group[2].strip()}</{name}>" if group[2] else f"{told}/>"
+
+
+def _moved(path: str, x: float, y: float) -> str | None:
+    """A path of relative steps, that far away; None for any other."""
+    start = _MOVE.fullmatch(path)
+    if start is None:
+        return None
+    steps = start[3] if re.match("[a-z]", start[3]) else f"l{start[3]}"
+    return f"M{round(x + float(start[1]), 2):g} {round(y + float(start[2]), 2):g}{steps}"
 
 
 def _told(attributes: Attributes) -> str:
@@ -130,17 +147,15 @@ def _mark(line: str, signs: dict[str, Attributes], styles: list[Attributes]) -> 
         straight = bool(_LINE.fullmatch(path))
     else:
         return None
-    start = _MOVE.fullmatch(path)
+    moved = _moved(path, x, y)
     all_styles: Attributes = {}
     for each in (*styles, style):
         all_styles |= each
-    if start is None or not (straight or _covers(all_styles)):
+    if moved is None or not (straight or _covers(all_styles)):
         return None
     if style:
         own["style"] = _css(style)
-    steps = start[3] if re.match("[a-z]", start[3]) else f"l{start[3]}"
-    place = f"M{round(x + float(start[1]), 2):g} {round(y + float(start[2]), 2):g}"
-    return _Mark(_told(own), f"{place}{steps}", straight)
+    return _Mark(_told(own), moved, straight)
 
 
 def _style(attributes: Attributes) -> Attributes:
