@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+import pytest
+from scipy.signal import lfilter
 from scipy.stats import binomtest
 
 from campaign.estimate import Estimate
@@ -11,6 +14,18 @@ from campaign.estimate import Estimate
 LEVEL = 0.95
 FALSE_ALARM = 0.01
 """Chance that intervals which hold are rejected somewhere, over all cases of one test (Holm)."""
+
+
+def draws(sample: int, every: int = 4000, *, name: str = "count") -> pytest.MarkDecorator:
+    """So many draws in every run, and as many as `every` in `make statistics`."""
+    all_of_them = pytest.param(every, id="all", marks=pytest.mark.statistics)
+    return pytest.mark.parametrize(name, [pytest.param(sample, id="sample"), all_of_them])
+
+
+def autoregressive(random: np.random.Generator, count: int, memory: float) -> np.ndarray:
+    """First-order autoregressive noise of unit variance."""
+    drive = random.standard_normal(count + 200) * np.sqrt(1 - memory**2)
+    return np.asarray(lfilter([1], [1, -memory], drive)[200:])
 
 
 def holds(estimate: Estimate, truth: float) -> bool:

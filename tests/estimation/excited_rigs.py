@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
-
-import numpy as np
 
 from campaign.physics.bench import Bench
+from tests.physics.random_benches import Draw, Tree
 
-Tree = dict[str, Any]
 ROTARY = {
     "inertia": "kg m^2", "force": "N m", "rate": "rad/s", "stiffness": "N m/rad",
     "damping": "N m s/rad", "angle": "rad", "acceleration": "rad/s^2", "gain": "A s/rad",
@@ -24,17 +21,6 @@ LINEAR = {
     "inertia": "kg", "force": "N", "rate": "m/s", "stiffness": "N/m",
     "damping": "N s/m", "angle": "m", "acceleration": "m/s^2", "gain": "A s/m",
 }  # fmt: skip
-
-
-class Draw:
-    """Random numbers of one seed."""
-
-    def __init__(self, seed: int) -> None:
-        self._random = np.random.Generator(np.random.PCG64((seed, 15)))
-
-    def log(self, low: float, high: float) -> float:
-        """Between low and high, every decade as likely as the next."""
-        return float(math.exp(self._random.uniform(math.log(low), math.log(high))))
 
 
 def excited_rig(
@@ -53,7 +39,7 @@ def excited_rig(
         alike: whether friction is the same both ways.
         appendage: whether something elastic hangs on the load.
     """
-    draw, of = Draw(seed), LINEAR if linear else ROTARY
+    draw, of = Draw(seed, 15), LINEAR if linear else ROTARY
     inertia = draw.log(2.0, 200.0) if linear else draw.log(0.01, 500.0)
     rate = draw.log(0.3, 1.0) if linear else draw.log(1.0, 6.0)
     torque = inertia * rate / 0.1

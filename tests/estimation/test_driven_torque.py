@@ -12,6 +12,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from campaign.estimate import Estimate
 from campaign.estimation.presliding_dynamics.driven_torque import Driven, driven_torques
 from campaign.estimation.presliding_dynamics.presliding_fit import (
     PreslidingDynamics,
@@ -19,7 +20,7 @@ from campaign.estimation.presliding_dynamics.presliding_fit import (
 )
 from campaign.estimation.presliding_dynamics.record import Record
 from tests.estimation.bristle_plants import Array
-from tests.estimation.coverage import rejected
+from tests.estimation.coverage import holds, rejected
 
 STEP, COUNT, FINER = 0.005, 1200, 10
 INERTIA, DAMPING, STIFFNESS = 2.0, 40.0, 2000.0
@@ -86,6 +87,11 @@ def identified(seed: int, doubt: bool) -> PreslidingDynamics:
     return identify_presliding_dynamics(records)
 
 
+def known(estimate: Estimate, truth: float) -> bool:
+    """Whether it has an interval, and that holds."""
+    return estimate.has_interval and holds(estimate, truth)
+
+
 def test_a_torque_loses_most_of_its_noise_and_nothing_else() -> None:
     for number, (torque, _) in enumerate(told(0), start=1):
         off = torque - driven(number)[0]
@@ -128,9 +134,7 @@ def test_a_torque_with_little_noise_is_regressed_where_the_rate_has_less(count: 
             seen = rate + 0.002 * np.std(rate) * rng.standard_normal(COUNT)
             records.append(Record(STEP, torque, rate=seen, doubt=columns))
         found = identify_presliding_dynamics(records)
-        for name, truth in TRUTH.items():
-            low, high = found.estimates[name].combined
-            held.append(low is not None and high is not None and low <= truth <= high)
+        held += [known(found.estimates[name], truth) for name, truth in TRUTH.items()]
     assert not rejected({"all": held}, "less")
 
 
@@ -168,10 +172,7 @@ def test_noise_of_the_torque_stiffens_what_is_found_where_it_is_taken_for_torque
 def hits(seed: int, doubt: bool) -> list[bool]:
     """Whether each interval of one identification holds; one that is not told does not."""
     found = identified(seed, doubt)
-    ends = [(found.estimates[name].combined, truth) for name, truth in TRUTH.items()]
-    return [
-        low is not None and high is not None and low <= truth <= high for (low, high), truth in ends
-    ]
+    return [known(found.estimates[name], truth) for name, truth in TRUTH.items()]
 
 
 @pytest.mark.slow

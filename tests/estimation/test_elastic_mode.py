@@ -26,7 +26,6 @@ def hung(s: np.ndarray, share: float = 0.02, damping: float = 0.03) -> np.ndarra
 def test_an_elastic_mode_is_found_at_its_frequency() -> None:
     """Antiresonance at the part's own frequency, resonance 1 / sqrt(1 - share) above it."""
     mode = elastic_mode(response(lambda s: hung(s) / (1 + 2.0 / s)))
-    assert mode is not None
     assert mode.frequency.value == pytest.approx(11.0 / np.sqrt(0.98), rel=1e-3)
     assert mode.antiresonance.value == pytest.approx(11.0, rel=1e-3)
     assert mode.damping_ratio.value == pytest.approx(0.03 / np.sqrt(0.98), rel=0.05)
@@ -62,7 +61,6 @@ def held(draws: int, seed: int) -> dict[str, list[bool]]:
         noise = random.standard_normal((2, len(SWEEP)))
         values = exact.values * (1 + 0.003 * (noise[0] + 1j * noise[1]))
         mode = elastic_mode(replace(exact, values=values))
-        assert mode is not None
         for found, true in zip(
             (mode.frequency, mode.damping_ratio, mode.antiresonance), TRUE, strict=True
         ):

@@ -20,9 +20,7 @@ def single(noise: float, *interfaces: Interface) -> BristleFit:
     time, rate, torque = bending(*interfaces)
     rate = rate + noise * np.random.default_rng(1).normal(size=len(rate))
     ramp = ramp_of(time, rate, torque, REST, 0.8 * ALL)
-    found = fit_bristles(ramp, 0.05 * ALL, one_interface(ramp, ALL))
-    assert found is not None
-    return found
+    return fit_bristles(ramp, 0.05 * ALL, one_interface(ramp, ALL))
 
 
 @pytest.mark.parametrize(("share", "earlier"), [(0.1, 20.0), (0.2, 10.0), (0.15, 300.0)])

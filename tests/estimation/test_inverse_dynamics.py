@@ -41,7 +41,7 @@ from campaign.estimation.inverse.validation import (
 )
 from campaign.experiments.any_motion.inverse_fit import find
 from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
-from tests.estimation.coverage import holds, rejected
+from tests.estimation.coverage import autoregressive, holds, rejected
 from tests.estimation.rigs import Rig, random_rigs
 
 Array = NDArray[np.float64]
@@ -202,11 +202,7 @@ def test_deviations_of_autocorrelated_residuals_are_those_of_a_closed_form() -> 
     """The mean of an AR(1): its variance over that of white noise tends to (1 + r) / (1 - r)."""
     draw = np.random.default_rng(5)
     n, r = 200_000, 0.6
-    noise = np.empty(n)
-    noise[0] = draw.standard_normal() / np.sqrt(1 - r**2)
-    shocks = draw.standard_normal(n)
-    for k in range(1, n):
-        noise[k] = r * noise[k - 1] + shocks[k]
+    noise = autoregressive(draw, n, r)
     fit = regress([Piece(np.ones((n, 1)), 3.0 + noise, np.arange(n, dtype=float))])
     assert fit.robust[0] / fit.ordinary[0] == pytest.approx(np.sqrt((1 + r) / (1 - r)), rel=0.05)
     assert fit.effective == pytest.approx(n * (1 - r) / (1 + r), rel=0.1)
@@ -216,25 +212,9 @@ def test_the_bandwidth_is_that_of_andrews_for_an_autoregression() -> None:
     """1.1447 (a n)^(1/3) with a = 4 r^2 / ((1 - r)^2 (1 + r)^2) for one column."""
     draw = np.random.default_rng(2)
     n, r = 100_000, 0.5
-    series = np.empty(n)
-    series[0] = 0.0
-    shocks = draw.standard_normal(n)
-    for k in range(1, n):
-        series[k] = r * series[k - 1] + shocks[k]
+    series = autoregressive(draw, n, r)
     expected = 1.1447 * (4 * r**2 / ((1 - r) ** 2 * (1 + r) ** 2) * n) ** (1 / 3)
     assert bandwidth([series[:, None]]) == pytest.approx(expected, rel=0.03)
-
-
-def test_bartletts_weights_sum_as_by_hand() -> None:
-    scores = np.array([[1.0], [2.0], [-1.0], [0.5]])
-    c0, c1, c2 = 1 + 4 + 1 + 0.25, 2 - 2 - 0.5, -1 + 1.0
-    assert long_run([scores], 3.0)[0, 0] == pytest.approx(c0 + 2 * (2 / 3) * c1 + 2 * (1 / 3) * c2)
-
-
-def test_pieces_do_not_know_of_each_other() -> None:
-    one, two = np.array([[1.0], [2.0]]), np.array([[3.0], [1.0]])
-    apart = long_run([one, two], 2.0)[0, 0]
-    assert apart == pytest.approx(1 + 4 + 9 + 1 + 2 * 0.5 * (2 + 3))
 
 
 @pytest.mark.parametrize("lags", [0.5, 1.0, 1.4, 2.0, 7.3, 60.0, 133.7])
@@ -277,10 +257,7 @@ def test_intervals_hold_with_autocorrelated_residuals() -> None:
         n, r = 400, 0.8
         x = np.cumsum(draw.standard_normal(n)) / 5
         columns = np.column_stack([np.sin(x), np.ones(n)])
-        e = np.empty(n)
-        e[0] = draw.standard_normal() / 0.6
-        for k in range(1, n):
-            e[k] = r * e[k - 1] + draw.standard_normal()
+        e = autoregressive(draw, n, r) / 0.6
         fit = regress([Piece(columns, columns @ [2.0, 1.0] + e, np.arange(n, dtype=float))])
         held.append(abs(fit.values[0] - 2.0) <= fit.quantile * fit.robust[0])
         ordinary.append(abs(fit.values[0] - 2.0) <= 1.96 * fit.ordinary[0])

@@ -13,11 +13,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from campaign.estimation.both_directions import (
-    correlation,
-    cross_covariance,
-    fitted_nominal,
-)
+from campaign.estimation.both_directions import correlation, cross_covariance, fitted_nominal
 from campaign.estimation.ripple import harmonic, ripple_of_points, window_noise
 from campaign.estimation.steady_sliding import steady_sliding
 from campaign.estimation.stribeck import PARAMETERS, fit_stribeck, stribeck
@@ -29,6 +25,7 @@ from campaign.estimation.velocity_map import (
 )
 from tests.estimation.coverage import holds, rejected
 
+MANY = pytest.mark.statistics
 Random = np.random.Generator
 Array = np.ndarray
 TRUE = dict(zip(PARAMETERS, (3.87, 25.3, 32.7, 0.0271, 0.96), strict=True))
@@ -145,7 +142,6 @@ def rippled(random: Random, amplitude: float) -> DirectionFit:
     mean = np.array([each.torque.value for each in told])
     first, last = (np.array([getattr(each, end) for each in told]) for end in ("first", "last"))
     taken, error, ripple = ripple_of_points(harmonics, mean - 3.87 * SPEED, first, last)
-    assert ripple is not None
     assert abs(ripple.amplitude) == pytest.approx(amplitude, rel=0.05)
     window = np.array([each.torque.standard_error or 0.0 for each in told])
     window = np.hypot(window_noise(window, ripple, first, last, mean - 3.87 * SPEED), error)
@@ -163,13 +159,9 @@ def held_with_ripple(count: int, seed: int, amplitudes: tuple[float, ...]) -> di
 
 
 @pytest.mark.slow
-def test_a_sample_holds_with_ripple() -> None:
-    assert rejected(held_with_ripple(15, 31, (0.005, 0.02))) == {}
-
-
-@pytest.mark.statistics
-def test_intervals_hold_with_ripple() -> None:
-    assert rejected(held_with_ripple(4000, 32, (0.005, 0.02))) == {}
+@pytest.mark.parametrize(("count", "seed"), [(15, 31), pytest.param(4000, 32, marks=MANY)])
+def test_intervals_hold_with_ripple(count: int, seed: int) -> None:
+    assert rejected(held_with_ripple(count, seed, (0.005, 0.02))) == {}
 
 
 # Both directions
@@ -193,14 +185,9 @@ def held_nominal(count: int, seed: int, together: float) -> dict[str, list[bool]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("together", [0.0, 0.9])
-def test_a_sample_of_nominal_values_holds(together: float) -> None:
-    assert rejected(held_nominal(30, 77, together)) == {}
-
-
-@pytest.mark.statistics
-@pytest.mark.parametrize("together", [0.0, 0.9])
-def test_nominal_values_hold(together: float) -> None:
-    assert rejected(held_nominal(4000, 78, together)) == {}
+@pytest.mark.parametrize(("count", "seed"), [(30, 77), pytest.param(4000, 78, marks=MANY)])
+def test_nominal_values_hold(together: float, count: int, seed: int) -> None:
+    assert rejected(held_nominal(count, seed, together)) == {}
 
 
 def test_directions_are_compared_speed_by_speed() -> None:
@@ -250,7 +237,6 @@ def test_only_repeats_tell_a_lack_of_fit() -> None:
         curve = EXACT * (1.0 + bend * np.sin(3.0 * np.log(SPEED)))
         torque = np.tile(curve, 2) * (1.0 + BETWEEN * random.normal(size=2 * len(SPEED)))
         found = fit_direction(np.tile(SPEED, 2), torque, zeros, np.tile(SPEED, 2))
-        assert found.lack_of_fit is not None
         told.append(found.lack_of_fit)
         assert fit_direction(SPEED, curve, np.zeros(len(SPEED))).lack_of_fit is None
     assert told[0] > 0.05
@@ -295,7 +281,7 @@ def held_at_a_bound(count: int, seed: int) -> dict[str, list[bool]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [30, pytest.param(200, marks=MANY)])
 def test_a_parameter_at_its_bound_is_not_known_to_the_others(count: int) -> None:
     """Tc held in 49 % of the maps with the viscous friction at 0 when they took it as known."""
     held = held_at_a_bound(count, 41)
@@ -324,7 +310,7 @@ def coulomb_at_zero(coulomb: float, count: int, seed: int) -> dict[str, list[boo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=MANY)])
 def test_a_coulomb_torque_that_the_map_does_not_tell_has_no_limit(count: int) -> None:
     """25.3 N m or 0 with forty times the viscous friction: the curves are the same there."""
     held = coulomb_at_zero(25.3, count, 43)
@@ -379,20 +365,13 @@ def random_maps(count: int, seed: int) -> dict[str, Random16]:
     return told
 
 
-def hides_nothing(told: dict[str, Random16]) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "seed"), [(40, 700), pytest.param(4000, 701, marks=MANY)])
+def test_random_maps_hide_nothing(count: int, seed: int) -> None:
     """At most a tenth not determined, and half-widths at most twice the bound, as the median."""
+    told = random_maps(count, seed)
     for name, each in told.items():
         assert np.mean(each.hidden) <= 0.1, name
         assert np.median(each.ratio) <= 2.0, name
     held = {name: each.held for name, each in told.items()}
     assert rejected(held, "less", 0.90) == {}
-
-
-@pytest.mark.slow
-def test_a_sample_of_random_maps_hides_nothing() -> None:
-    hides_nothing(random_maps(40, 700))
-
-
-@pytest.mark.statistics
-def test_random_maps_hide_nothing() -> None:
-    hides_nothing(random_maps(4000, 701))

@@ -32,7 +32,6 @@ def test_its_doubt_holds_what_is_wrongly_taken_off_short_strokes() -> None:
     for seed in range(150):
         parts = strokes(np.random.default_rng(seed))
         found = over_a_turn(parts)
-        assert found is not None
         angle = parts[0][1]
         off = float(np.mean(found.at(angle) - GRAVITY * np.sin(angle)))
         held.append(abs(off) <= 1.96 * float(np.linalg.norm(found.doubts(angle))))

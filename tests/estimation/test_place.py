@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from campaign.estimation.prediction_interval import of_next
-from tests.estimation.coverage import rejected
+from tests.estimation.coverage import draws, rejected
 
 T2 = 4.302653  # Student's t with 2 degrees of freedom, 97.5 %: any table
 
@@ -20,10 +20,7 @@ def test_the_next_value_of_three() -> None:
     assert of_next("error", [1.0], "rad").reason
 
 
-@pytest.mark.parametrize(
-    "count",
-    [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
-)
+@draws(400)
 def test_the_next_value_lies_there(count: int) -> None:
     held = {}
     for size in (2, 3, 5, 20):

@@ -19,6 +19,7 @@ from campaign.estimation.presliding_curve import (
 )
 from campaign.estimation.presliding_dynamics.simulation import Motion
 from campaign.estimation.torque_ramp import ramp_of
+from tests.estimation.coverage import autoregressive
 from tests.estimation.test_ramp_coverage import INERTIA, bending, letting_go
 
 LOAD = Interface(18000.0, 32.0)
@@ -86,7 +87,6 @@ def test_errors_of_two_interfaces_come_from_the_true_slopes() -> None:
     time, rate, torque = bending(LOAD, MOTOR)
     ramp = ramp_of(time, rate, torque, REST, 30.0)
     found = fit_bristles(ramp, 2.0, two_interfaces(ramp, 37.647, 2.0))
-    assert found is not None
     (load, motor), spans = found.interfaces, np.diff(ramp.edges)
     total = load.torque + motor.torque
 
@@ -198,9 +198,7 @@ def test_errors_of_a_mean_of_ar1_noise() -> None:
     """Var of a mean of n: s^2 (1 + r)/(1 - r)/n; of white noise: s^2/n."""
     random = np.random.default_rng(5)
     count, rho = 4000, 0.8
-    noise = random.normal(size=count)
-    for k in range(1, count):
-        noise[k] += rho * noise[k - 1]
+    noise = autoregressive(random, count, rho) / np.sqrt(1.0 - rho**2)
     found = errors_of(np.ones((count, 1)), noise - noise.mean())
     assert found.correlation == pytest.approx(rho, abs=0.051)  # a grid of 0.05
     expected = 1.0 / (1.0 - rho) ** 2 / count  # innovations of variance 1

@@ -11,14 +11,11 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 from scipy.stats import binomtest
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Origin
 from campaign.estimation.intervals import MODEL_MISFIT
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics
 from campaign.estimation.presliding_dynamics.plant import Appendage, Bristles, Plant
-from campaign.estimation.presliding_dynamics.presliding_fit import (
-    PreslidingDynamics,
-    identify_presliding_dynamics,
-)
+from campaign.estimation.presliding_dynamics.presliding_fit import identify_presliding_dynamics
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import ANSWER_MISSED
 from campaign.estimation.presliding_dynamics.simulation import (
@@ -27,14 +24,8 @@ from campaign.estimation.presliding_dynamics.simulation import (
     torque_on_grid,
 )
 from campaign.estimation.presliding_dynamics.uncertainty import spread_of
-from tests.estimation.bristle_plants import (
-    LUGRE_1995,
-    Array,
-    Interface,
-    Torque,
-    Truth,
-    multisine,
-)
+from tests.estimation.bristle_plants import LUGRE_1995, Array, Interface, Torque, Truth, multisine
+from tests.estimation.coverage import holds
 
 CURVE_1995 = Assumptions(0.4, coulomb_share=1.0 / 1.5, stribeck_velocity=0.001)
 SLOW = Truth(2.0, 0.0, (Interface(2000.0, 40.0, 5.0, 5.0, 1.0),))
@@ -87,13 +78,6 @@ def records(
         seen = rate + noise * size * rough + size * (0.5 + 0.3 * np.linspace(0.0, 1.0, count))
         found.append(Record(STEP, torque, rate=seen, label=f"{amplitude} N m"))
     return found
-
-
-def held(estimate: Estimate, truth: float) -> bool:
-    low, high = estimate.combined
-    assert low is not None
-    assert high is not None
-    return low <= truth <= high
 
 
 def true_values(truth: Truth) -> dict[str, float]:
@@ -189,8 +173,8 @@ def test_gyro_and_encoder_together_say_more_than_the_encoder_alone() -> None:
     alone = identify_presliding_dynamics([Record(STEP, torque, angle=coarse)])
     both = identify_presliding_dynamics([Record(STEP, torque, rate=noisy, angle=coarse)])
     for name, truth in true_values(SLOW).items():
-        assert held(alone.estimates[name], truth), name
-        assert held(both.estimates[name], truth), name
+        assert holds(alone.estimates[name], truth), name
+        assert holds(both.estimates[name], truth), name
         assert both.estimates[name].half_width < alone.estimates[name].half_width
 
 
@@ -201,7 +185,7 @@ def test_a_record_that_begins_in_motion_is_fitted_with_what_it_begins_with() -> 
     record = Record(STEP, torque[cut], rate=(rate + noise)[cut], at_rest=False)
     found = identify_presliding_dynamics([record])
     for name, truth in true_values(SLOW).items():
-        assert held(found.estimates[name], truth), name
+        assert holds(found.estimates[name], truth), name
     wrong = identify_presliding_dynamics([replace(record, at_rest=True)])
     wide = wrong.estimates["bristle_stiffness"].half_width
     assert wrong.reason or wide > 5.0 * found.estimates["bristle_stiffness"].half_width
@@ -209,12 +193,11 @@ def test_a_record_that_begins_in_motion_is_fitted_with_what_it_begins_with() -> 
 
 def test_lost_samples_cost_only_themselves() -> None:
     (whole,) = records(SLOW, (2.0,), 0.02)
-    assert whole.rate is not None
     rate = whole.rate.copy()
     rate[300:330] = np.nan
     found = identify_presliding_dynamics([replace(whole, rate=rate)])
     for name, truth in true_values(SLOW).items():
-        assert held(found.estimates[name], truth), name
+        assert holds(found.estimates[name], truth), name
 
 
 # Intervals that hold -----------------------------------------------------------------------------
@@ -231,7 +214,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(draws: int, correlation: 
         found = identify_presliding_dynamics(every)
         assert not found.reason
         for name, truth in true_values(SLOW).items():
-            hits[name] += held(found.estimates[name], truth)
+            hits[name] += holds(found.estimates[name], truth)
     assert binomtest(min(hits.values()), draws, 0.95, "less").pvalue > 0.0015, hits
 
 
@@ -245,16 +228,10 @@ def test_records_that_differ_widen_the_intervals() -> None:
     assert mixed.spread.freedom[index] == 2.0
     narrow = one.estimates["bristle_stiffness"].standard_error
     wide = mixed.estimates["bristle_stiffness"].standard_error
-    assert narrow is not None
-    assert wide is not None
     assert wide > 5.0 * narrow
 
 
 # What is refused ---------------------------------------------------------------------------------
-
-
-def _estimate(found: PreslidingDynamics, name: str) -> Estimate:
-    return found.estimates[name]
 
 
 @pytest.mark.slow
@@ -268,14 +245,10 @@ def test_an_elastic_part_that_nobody_tells_is_a_misfit_and_one_that_is_told_is_n
     guess = Assumptions(appendage=Appendage(0.15, 7.3, 0.03), appendage_free=True)
     told = identify_presliding_dynamics(every, guess)
     assert not told.reason
-    own = {
-        "appendage_inertia": 0.2,
-        "appendage_frequency": 7.0,
-        "appendage_damping_ratio": 0.02,
-    }
+    own = {"appendage_inertia": 0.2, "appendage_frequency": 7.0, "appendage_damping_ratio": 0.02}
     for name, value in (true_values(truth) | own).items():
-        assert held(_estimate(told, name), value), name
-    assert _estimate(told, "bristle_damping").half_width < 0.05 * 40.0
+        assert holds(told.estimates[name], value), name
+    assert told.estimates["bristle_damping"].half_width < 0.05 * 40.0
 
 
 def test_what_is_missed_for_certain_but_is_little_widens_the_interval() -> None:
@@ -283,10 +256,10 @@ def test_what_is_missed_for_certain_but_is_little_widens_the_interval() -> None:
     found = identify_presliding_dynamics(records(truth, (1.0, 2.0), 0.005))
     assert not found.reason
     for name, value in true_values(truth).items():
-        estimate = _estimate(found, name)
+        estimate = found.estimates[name]
         parts = {part.source: part.standard_uncertainty or 0.0 for part in estimate.systematic}
         assert parts["what the model misses"] > 1e-3 * value
-        assert held(estimate, value), name
+        assert holds(estimate, value), name
 
 
 def test_interfaces_that_slip_at_different_angles_are_a_misfit() -> None:
@@ -298,8 +271,8 @@ def test_interfaces_that_slip_at_different_angles_are_a_misfit() -> None:
 def test_below_the_first_slip_they_are_one_bristle_and_their_sum_is_found() -> None:
     found = identify_presliding_dynamics(records(TWO, (0.005, 0.01), 0.02))
     assert not found.reason
-    assert held(_estimate(found, "bristle_stiffness"), 2000.0)
-    assert held(_estimate(found, "bristle_damping"), 40.0)
+    assert holds(found.estimates["bristle_stiffness"], 2000.0)
+    assert holds(found.estimates["bristle_damping"], 40.0)
 
 
 def test_a_load_that_breaks_away_is_refused() -> None:
@@ -325,10 +298,10 @@ def test_slow_reversals_say_nothing_of_inertia_and_damping() -> None:
         return np.asarray(3.0 * np.sin(2.0 * np.pi * 0.05 * time))
 
     found = identify_presliding_dynamics([_slow_motion(slow, 4000, 1.0)], Assumptions(delay=0.0))
-    assert held(_estimate(found, "bristle_stiffness"), 2000.0)
+    assert holds(found.estimates["bristle_stiffness"], 2000.0)
     for name in ("bristle_damping", "inertia"):
-        assert _estimate(found, name).origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND), name
-        assert _estimate(found, name).reason
+        assert found.estimates[name].origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND), name
+        assert found.estimates[name].reason
 
 
 def test_errors_that_repeat_with_the_torque_make_no_interval_narrower() -> None:
@@ -348,11 +321,11 @@ def test_errors_that_repeat_with_the_torque_make_no_interval_narrower() -> None:
 def test_both_dampings_cannot_be_told_apart_below_the_first_slip() -> None:
     every = records(SLOW, (0.2, 0.4), 0.02)
     sum_known = identify_presliding_dynamics(every)
-    assert held(_estimate(sum_known, "bristle_damping"), 40.0)
+    assert holds(sum_known.estimates["bristle_damping"], 40.0)
     free = identify_presliding_dynamics(every, Assumptions(viscous_free=True))
-    assert _estimate(free, "viscous_friction").origin is not Origin.MEASURED
-    assert held(_estimate(free, "bristle_damping"), 40.0)
-    both = (_estimate(each, "bristle_damping").half_width for each in (sum_known, free))
+    assert free.estimates["viscous_friction"].origin is not Origin.MEASURED
+    assert holds(free.estimates["bristle_damping"], 40.0)
+    both = (each.estimates["bristle_damping"].half_width for each in (sum_known, free))
     assert 20.0 * next(both) < next(both)
 
 

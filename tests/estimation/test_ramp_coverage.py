@@ -10,15 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from campaign.estimate import Estimate
 from campaign.estimation.breakaway_torque import NO_FALL, STILL_RISING, breakaway_torque
 from campaign.estimation.presliding import fit_presliding
 from campaign.estimation.presliding_curve import Interface, presliding_angle
 from campaign.estimation.readings import deviation_of_readings, mean_of_readings
+from tests.estimation.coverage import autoregressive as correlated
 from tests.estimation.coverage import holds, rejected
 
+MANY = pytest.mark.statistics
 Random = np.random.Generator
 Array = np.ndarray
 INTERVAL, INERTIA = 1e-3, 70.0
@@ -31,8 +32,7 @@ def white(random: Random, rate: Array) -> Array:
 
 
 def autoregressive(random: Random, rate: Array, rho: float = 0.9) -> Array:
-    noise = random.normal(size=len(rate) + 500) * np.sqrt(1.0 - rho**2)
-    return rate + np.deg2rad(0.001) * np.asarray(lfilter([1.0], [1.0, -rho], noise))[500:]
+    return rate + np.deg2rad(0.001) * correlated(random, len(rate), rho)
 
 
 def quantised(random: Random, rate: Array) -> Array:
@@ -211,34 +211,26 @@ def of_readings(draws: int, seed: int) -> dict[str, list[bool]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
-def test_stiffness(interfaces: tuple[Interface, ...]) -> None:
-    assert not rejected(of_stiffness(5, 1, interfaces))
+@pytest.mark.parametrize(("draws", "seed"), [(5, 1), pytest.param(4000, 11, marks=MANY)])
+def test_stiffness(interfaces: tuple[Interface, ...], draws: int, seed: int) -> None:
+    assert not rejected(of_stiffness(draws, seed, interfaces))
 
 
 @pytest.mark.slow
-def test_no_number_leaves_out_an_interface_that_noise_hides() -> None:
+@pytest.mark.parametrize(("draws", "seed"), [(6, 4), pytest.param(400, 14, marks=MANY)])
+def test_no_number_leaves_out_an_interface_that_noise_hides(draws: int, seed: int) -> None:
     """As they were, 0 of 18 stiffnesses at rest below the noise held, with intervals of ±27 %."""
-    assert not rejected(of_hidden(6, 4), "less")
+    assert not rejected(of_hidden(draws, seed), "less")
 
 
 def test_breakaway_torque() -> None:
     assert not rejected(of_torque(12, 2))
 
 
-def test_readings_of_a_coarse_sensor() -> None:
+@pytest.mark.parametrize(("draws", "seed"), [(150, 3), pytest.param(4000, 13, marks=MANY)])
+def test_readings_of_a_coarse_sensor(draws: int, seed: int) -> None:
     """Wide on purpose where one count hides how they scatter."""
-    assert not rejected(of_readings(150, 3), "less")
-
-
-@pytest.mark.statistics
-@pytest.mark.parametrize("interfaces", [ONE, TWO], ids=["one", "two"])
-def test_stiffness_often(interfaces: tuple[Interface, ...]) -> None:
-    assert not rejected(of_stiffness(4000, 11, interfaces))
-
-
-@pytest.mark.statistics
-def test_no_number_leaves_out_an_interface_that_noise_hides_often() -> None:
-    assert not rejected(of_hidden(400, 14), "less")
+    assert not rejected(of_readings(draws, seed), "less")
 
 
 TOO_WIDE, SCATTER_TOO_WIDE = 0.985, 0.97
@@ -254,8 +246,3 @@ def test_breakaway_torque_often() -> None:
     assert not rejected(held, "greater", TOO_WIDE)
     assert len(scatter) == 8
     assert not rejected(scatter, "greater", SCATTER_TOO_WIDE)
-
-
-@pytest.mark.statistics
-def test_readings_often() -> None:
-    assert not rejected(of_readings(4000, 13), "less")

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from campaign.estimation.sine_amplitude import TOO_FEW_CYCLES, amplitude
-from tests.estimation.coverage import holds, rejected
+from tests.estimation.coverage import autoregressive, draws, holds, rejected
 
 STEP = 1e-3
 FREQUENCY = 10.0
@@ -23,10 +22,7 @@ def test_amplitude_with_offset_and_whole_cycles_only_in_its_scatter() -> None:
     assert once.reason in TOO_FEW_CYCLES
 
 
-@pytest.mark.parametrize(
-    "count",
-    [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
-)
+@draws(250)
 def test_the_interval_holds_the_amplitude(count: int) -> None:
     held = {}
     for number, (cycles, level, memory) in enumerate(
@@ -35,8 +31,7 @@ def test_the_interval_holds_the_amplitude(count: int) -> None:
         random, time = np.random.default_rng([515, number]), np.arange(100 * cycles) * STEP
         found = []
         for _ in range(count):
-            drive = random.standard_normal(len(time) + 200) * np.sqrt(1 - memory**2)
-            noise = level * lfilter([1], [1, -memory], drive)[200:]
+            noise = level * autoregressive(random, len(time), memory)
             wave = np.sin(2 * np.pi * FREQUENCY * time + random.uniform(0, 2 * np.pi))
             found.append(holds(amplitude("a", time, wave + noise, FREQUENCY, ""), 1.0))
         held[f"{cycles} cycles, noise {level}, memory {memory}"] = found

@@ -40,8 +40,7 @@ def test_the_error_of_a_point_is_the_scatter_of_repeated_measurements() -> None:
 
 
 @pytest.mark.parametrize(
-    ("samples", "frequency", "why"),
-    [(200, 600.0, "samples at"), (200, 0.5, "less than one cycle")],
+    ("samples", "frequency", "why"), [(200, 600.0, "samples at"), (200, 0.5, "less than one cycle")]
 )
 def test_what_cannot_be_seen_is_refused(samples: int, frequency: float, why: str) -> None:
     time = np.arange(samples) * 1e-3

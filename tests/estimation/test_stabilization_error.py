@@ -23,7 +23,7 @@ from campaign.estimation.stabilization_error import (
     over_trials,
     quotient,
 )
-from tests.estimation.coverage import holds, rejected
+from tests.estimation.coverage import autoregressive, draws, holds, rejected
 
 Array = np.ndarray
 PER_CYCLE = 400
@@ -119,12 +119,6 @@ def friction_error(cycles: int) -> Array:
     return shape / np.std(shape)
 
 
-def autoregressive(random: np.random.Generator, count: int, memory: float) -> Array:
-    """First-order autoregressive noise of unit variance."""
-    drive = random.standard_normal(count + 200) * np.sqrt(1 - memory**2)
-    return lfilter([1], [1, -memory], drive)[200:]
-
-
 def narrow(random: np.random.Generator, count: int, period: float, damping: float) -> Array:
     """Noise through a resonance of unit gain in its sum, as of a rolling ship."""
     omega = 2 * np.pi / period
@@ -142,10 +136,6 @@ def resonance_deviation(period: float, damping: float) -> float:
     return float(np.sqrt((1 - b) / ((1 + b) * ((1 - b) ** 2 - a**2))))
 
 
-draws = pytest.mark.parametrize(
-    "count",
-    [pytest.param(250, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
-)
 Draw = Callable[[np.random.Generator], bool]
 
 
@@ -157,7 +147,7 @@ def coverage(cases: dict[str, Draw], count: int, seed: int) -> dict[str, list[bo
     return held
 
 
-@draws
+@draws(250)
 def test_half_cycles_hold_the_error_of_the_trial(count: int) -> None:
     """Noise that remembers a fifth of a half cycle costs one or two percent."""
 
@@ -182,7 +172,7 @@ def test_half_cycles_hold_the_error_of_the_trial(count: int) -> None:
     assert rejected(coverage(long, count, 516), "less", 0.93) == {}
 
 
-@draws
+@draws(250)
 def test_blocks_hold_the_error_of_an_irregular_motion(count: int) -> None:
     """Of narrow-band noise they hold a little less, 91 %, with only six periods in a block."""
 
@@ -204,7 +194,7 @@ def test_blocks_hold_the_error_of_an_irregular_motion(count: int) -> None:
     assert rejected(coverage(cases, count, 512), "less", 0.92) == {}
 
 
-@draws
+@draws(250)
 def test_trials_hold_what_they_have_in_common_and_so_do_their_ratios(count: int) -> None:
     """Welch's ratios hold a little more than they promise, 96 % with three trials each."""
 

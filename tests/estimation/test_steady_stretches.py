@@ -7,6 +7,7 @@ import pytest
 
 from campaign.estimation.friction_line import friction_line, mean_of_stretches
 from campaign.estimation.steady_stretches import steady_stretches
+from tests.estimation.coverage import autoregressive
 
 
 def moves(speeds, sample_rate=500.0, ramp=0.2, cruise=2.0, rest=0.5):
@@ -131,10 +132,7 @@ def test_the_mean_of_stretches_that_are_alike_holds_the_truth_nearly_as_often(
     rng = np.random.default_rng(9)
     held, runs = 0, 600
     for _ in range(runs):
-        values = np.zeros(count)
-        values[0] = rng.normal() / np.sqrt(1.0 - kinship**2)
-        for k in range(1, count):
-            values[k] = kinship * values[k - 1] + rng.normal()
+        values = autoregressive(rng, count, kinship)
         found = mean_of_stretches("friction", 5.0 + values, "")
         held += found.low <= 5.0 <= found.high
     assert held / runs >= least

@@ -23,7 +23,7 @@ from campaign.estimation.velocity_map import (
     is_bent,
     passed,
 )
-from tests.estimation.coverage import rejected
+from tests.estimation.coverage import holds, rejected
 
 SPEED = np.deg2rad(np.geomspace(0.05, 65.0, 80))
 TRUE = {
@@ -99,10 +99,7 @@ def test_a_flat_map_says_that_it_shows_no_stribeck_effect(noise: float) -> None:
     # A fall below the slowest speed would not show: the curve's end there is no static torque.
     assert estimates["static_torque"].reason in NO_EFFECT
     line = direction_estimates(found, "none")
-    low, high = line["coulomb_torque"].combined
-    assert low is not None
-    assert high is not None
-    assert low < TRUE["coulomb_torque"] < high
+    assert holds(line["coulomb_torque"], TRUE["coulomb_torque"])
 
 
 def test_a_map_without_slow_points_doubts_its_parameters() -> None:
@@ -137,9 +134,7 @@ def test_static_torque_of_maps_that_begin_above_vs_holds_where_it_is_told(
         fit = fit_direction(speed, equation_4_6(speed) * (1.0 + noise), np.zeros(30))
         one = direction_estimates(fit, "free")["static_torque"]
         if one.origin is Origin.MEASURED:
-            assert one.low is not None
-            assert one.high is not None
-            told.append(one.low <= TRUE["static_torque"] <= one.high)
+            told.append(holds(one, TRUE["static_torque"]))
     assert len(told) > count / 40
     assert not rejected({"static_torque": told}, "less")
 

@@ -9,7 +9,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_positive_repeats
 from campaign.estimation.threshold import BEYOND_WITHOUT_CHANGE, Threshold, crossing, passing
 from campaign.reason import Cause
-from tests.estimation.coverage import holds, rejected
+from tests.estimation.coverage import draws, holds, rejected
 
 CHANGES = np.array([-0.8, -0.4, -0.2, 0.0, 0.2, 0.4, 0.8])
 LIMIT = Threshold(0.2)
@@ -132,10 +132,7 @@ def drawn(curve, random, repeats, deviation, ratio) -> Estimate:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "count",
-    [pytest.param(80, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
-)
+@draws(80)
 def test_the_interval_holds_where_the_true_curve_passes(count: int) -> None:
     """Straight between the changes, of known scatter: as promised. With few repeats a little more
     (Welch), and so where both sides pass alike, of which the nearer counts. What a bend does to a

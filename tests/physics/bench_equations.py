@@ -179,10 +179,7 @@ def equations(bench: Bench, task: Task) -> Equations:
     motor, gains = bench.motor, bench.controller
     p[INERTIA], p[RATIO], p[KT] = bench.axis.inertia, bench.gear.ratio, motor.torque_constant
     p[KE], p[R], p[L] = motor.back_emf_constant, motor.resistance, motor.inductance
-    for controller, proportional, integral in (
-        (gains.current, KPC, KIC),
-        (gains.rate, KPV, KIV),
-    ):
+    for controller, proportional, integral in ((gains.current, KPC, KIC), (gains.rate, KPV, KIV)):
         p[proportional] = controller.proportional
         factor = controller.proportional if controller.form == "ideal" else 1.0
         p[integral] = factor * controller.integral

@@ -226,7 +226,6 @@ def _interface(item: Dry, on_motor: bool) -> dict[str, Any]:
             "viscous_friction": f"{curve.viscous / scale!r} N m s/rad",
         }
 
-    assert item.backward is not None
     return {
         "model": "stribeck",
         "side": "motor" if on_motor else "load",

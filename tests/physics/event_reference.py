@@ -1,7 +1,8 @@
 """A loop with dry friction, switched at its events: the reference that the engine is held against.
 
-Nothing of `campaign.physics` is used: the thesis' equations as in `tests.physics.reference`, with
-friction that is a set at rest. Between events the right-hand side is smooth and scipy's order-8
+Nothing of `campaign.physics` is used: symbols and gains are the thesis appendix', the rate error
+is in deg/s, as the gyro constant 180/pi says, and friction is a set at rest. Between events
+the right-hand side is smooth and scipy's order-8
 Runge-Kutta solves it; an event is where the regime changes, and its instant is found as a root:
 
 - sliding, until the relative rate is zero. Then it is stuck if the applied torque is within the
@@ -22,7 +23,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.physics.benches import DEG, INERTIA, KE, KIC, KIV, KPC, KPV, KT, LOAD, MOTOR, RATIO, L, R
-from tests.physics.reference import lugre
 
 NAMES = ("load_rate", "pointing_angle", "relative_angle", "motor_current")
 SCALE = np.array([1e-3, 1e-4, 1e-2, 1.0, 1e-2, 1e-2, 1e-3, 1e-5, 1e-3, 1e-5, 1e-3, 1e-3])
@@ -65,6 +65,13 @@ THESIS_DRY = (
 
 def still(_: float) -> float:
     return 0.0
+
+
+def lugre(v: float, z: float, p: dict[str, float]) -> tuple[float, float]:
+    """Torque and dz/dt of Equations 4.2 to 4.4."""
+    s = p["tc"] + (p["ts"] - p["tc"]) * math.exp(-((v / p["vs"]) ** 2))
+    dz = v - p["s0"] * abs(v) / s * z
+    return p["s0"] * z + p["s1"] * dz + p["s2"] * v, dz
 
 
 def bristles(v: float, load: float, motor: float) -> tuple[float, float, float]:

@@ -19,8 +19,8 @@ from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Task
 from tests.physics.bench_equations import poles
+from tests.physics.benches import Tree
 
-Tree = dict[str, Any]
 DURATION = 5.0
 SAMPLE_RATE = 1000.0
 WIDE = {
@@ -66,21 +66,6 @@ def random_bench(seed: int, extreme: bool) -> tuple[Bench, Task]:
         if growth < SLOWEST_GROWTH:
             return bench, task
     raise ArithmeticError(f"seed {seed}: no stable bench")
-
-
-def contact(bench: Bench) -> tuple[float, float, float]:
-    """Sum of sigma0 (N m/rad), of sigma1 (N m s/rad) at the load, and the inertia they meet."""
-    stiffness = damping = 0.0
-    for options in bench.friction.values():
-        at_load = bench.gear.ratio if options.side == "motor" else 1.0
-        at_load *= bench.gear.ratio if options.velocity == "motor" else 1.0
-        stiffness += at_load * options.bristle_stiffness
-        damping += at_load * options.bristle_damping
-    return (
-        stiffness,
-        damping,
-        bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0),
-    )
 
 
 def _bench_tree(draw: Draw, extreme: bool) -> Tree:
@@ -224,11 +209,7 @@ def _compensations(
         }
     return {
         "lugre": {"method": "friction-model", "friction": models},
-        "static": {
-            "method": "friction-model",
-            "friction": static,
-            "gain": draw.flat(0.3, 0.9),
-        },
+        "static": {"method": "friction-model", "friction": static, "gain": draw.flat(0.3, 0.9)},
         # Its corner is N K0 / J.
         "observer": {
             "gain": f"{rate_loop * draw.log(0.5, 5.0) * inertia / ratio!r} N m s/rad",

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from campaign.physics.bench_facts import Fact, current_bandwidth, facts_of, rate_steps
+from campaign.physics.bench_facts import Fact, current_bandwidth, facts_of
 from tests.physics.benches import KIC, KPC, L, R, Tree, bench
 
 
@@ -43,16 +43,6 @@ def test_over_the_judging_time_it_is_a_fraction_of_that() -> None:
     """10 ms at most, and not more than 1 % of 90 deg at 150 deg/s: 6 ms, 12 samples."""
     count = fact(facts_of(bench(small_servo)), "encoder over limits.rate_time", "rate limit")
     assert count.value == pytest.approx(math.radians(360 / 4096 * 2000 / 12))
-
-
-def test_a_low_pass_takes_its_share_of_a_count() -> None:
-    def filtered(tree: Tree) -> None:
-        small_servo(tree)
-        tree["controller"]["relative_rate_filter"] = "5 ms"
-
-    passed = 1 - math.exp(-0.1)
-    plain, behind = rate_steps(bench(small_servo)), rate_steps(bench(filtered))
-    assert behind["encoder"] == pytest.approx(passed * plain["encoder"])
 
 
 def test_presliding_is_counted_in_the_encoder_whose_angle_is_analysed() -> None:

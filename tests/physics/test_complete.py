@@ -73,16 +73,9 @@ def test_a_name_and_an_axis_are_a_bench() -> None:
 
 def test_what_a_simulation_needs() -> None:
     """Every symbol of the loop's equations (`physics/loop.py`), and the limits."""
-    assert set(PURPOSES) == {
-        "axis.inertia",  # J
-        "motor.torque_constant",  # Kt
-        "motor.back_emf_constant",  # Ke
-        "motor.resistance",  # R
-        "motor.inductance",  # L
-        "controller.rate",  # Kpv, Kiv
-        "controller.current",  # Kpc, Kic
-        "limits",
-    }
+    motor = ("torque_constant", "back_emf_constant", "resistance", "inductance")  # Kt, Ke, R, L
+    others = {"axis.inertia", "controller.rate", "controller.current", "limits"}
+    assert set(PURPOSES) == {f"motor.{name}" for name in motor} | others
 
 
 def test_all_that_is_missing_is_named_with_what_it_is_for() -> None:

@@ -1,28 +1,66 @@
-"""Samples of what is archived must not change: the friction of a day and a trial, to the bit."""
+"""Samples of what is archived must not change: the friction of a day and a trial, to the bit.
+
+The numbers were computed by the program as it was before scatter and preload went by path.
+"""
 
 from __future__ import annotations
 
+import copy
+import hashlib
+import json
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from campaign.physics.bench import Bench
-from tests.physics.drawn import digest, drawn
+from campaign.physics.variation import as_it_is
+from tests.physics.test_friction_paths import LUGRE
+from tests.physics.test_variation import SCATTER as WIDE
 
 KEPT = Path(__file__).parent / "kept"  # benches as they were when the digests were taken
 PLATFORM = "1e5b0a23510bbb530736c275e6bd566d37207d0912e6c3667f0e8038b464b549"
 SIMULINK = "f77a99ae99f6e9af74d7e6df0791387053e401ca6dbfb174451a6e26ff21b3bd"
 TRIAL_ONLY = "42ec1a623a1d1a0029e78a5ba2716da65ec903f249c7b20be4089adbb7373ad5"
 
-WIDE = {
-    "coulomb_torque": 0.02,
-    "static_torque": 0.04,
-    "stribeck_velocity": 0.06,
-    "viscous_friction": 0.05,
-    "bristle_stiffness": 0.03,
-}
+PRELOADS = ("33 N m", "50 N m", "31.5 N m")
+DAYS = range(6)
+SEEDS = (0, 1, 44, 2**62 + 7)
+
+
+def friction_numbers(bench: Bench) -> Iterator[tuple[str, float]]:
+    """Every parameter of every interface and direction that is given, by dotted path."""
+    for name, options in bench.friction.items():
+        for prefix, table in ((name, options), (f"{name}.negative", options.negative)):
+            for parameter in LUGRE:
+                value = getattr(table, parameter, None)
+                if value is not None:
+                    yield f"{prefix}.{parameter}", value
+
+
+def drawn(tree: dict[str, Any], preload: str, day: int, seed: int) -> dict[str, float]:
+    """The friction of one trial, of a bench as written."""
+    tree = copy.deepcopy(tree)
+    tree["variation"]["day"] = day
+    tree["gear"]["preload"]["torque"] = preload
+    return dict(friction_numbers(as_it_is(Bench.model_validate(tree), seed)))
+
+
+def digest(tree: dict[str, Any]) -> str:
+    """SHA-256 of the friction of all preloads, days and seeds, to the bit."""
+    found = {
+        f"{preload}, day {day}, seed {seed}": {
+            path: value.hex() for path, value in drawn(tree, preload, day, seed).items()
+        }
+        for preload in PRELOADS
+        for day in DAYS
+        for seed in SEEDS
+    }
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+
+
 TOGETHER = {"paths": ["coulomb_torque", "static_torque"], "relative": 0.1}
 NOMINAL = {"torque": "33 N m", "nominal": "33 N m"}
 

@@ -417,25 +417,12 @@ def test_exact_powers_are_exact() -> None:
 @pytest.mark.parametrize(
     ("x", "y", "expected"),
     [
-        (0.0, 0.5, 0.0),
-        (0.0, 1e308, 0.0),
-        (INF, 0.5, INF),
-        (1.0, 1e308, 1.0),
-        (1.0, INF, 1.0),
-        (1.0 + 2.0**-52, 1e308, INF),
-        (1.0 - 2.0**-53, 1e308, 0.0),
-        (1e-200, 1.9, 0.0),
-        (1e200, 1.9, INF),
-        (4.0, 0.5, 2.0),
-        (-4.0, 0.5, NAN),
-        (NAN, 0.5, NAN),
-        (NAN, 1.0, NAN),
-        (NAN, 2.0, NAN),
-        (0.0, NAN, NAN),
-        (1.0, NAN, NAN),
-        (INF, NAN, NAN),
+        (0.0, 0.5, 0.0), (0.0, 1e308, 0.0), (INF, 0.5, INF), (1.0, 1e308, 1.0), (1.0, INF, 1.0),
+        (1.0 + 2.0**-52, 1e308, INF), (1.0 - 2.0**-53, 1e308, 0.0), (1e-200, 1.9, 0.0),
+        (1e200, 1.9, INF), (4.0, 0.5, 2.0), (-4.0, 0.5, NAN), (NAN, 0.5, NAN), (NAN, 1.0, NAN),
+        (NAN, 2.0, NAN), (0.0, NAN, NAN), (1.0, NAN, NAN), (INF, NAN, NAN),
     ],
-)
+)  # fmt: skip
 def test_edges_of_power(x: float, y: float, expected: float) -> None:
     out = np.empty(9)
     powers(np.full(9, x), np.full(9, y), out)

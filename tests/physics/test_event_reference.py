@@ -8,16 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.physics.benches import INERTIA, RATIO
-from tests.physics.event_reference import (
-    STATES,
-    THESIS_DRY,
-    Curve,
-    Dry,
-    DryLoop,
-    simulate_events,
-)
-from tests.physics.reference import trajectory
+from campaign.signals import Sine
+from tests.physics.bench_reference import reference
+from tests.physics.benches import INERTIA, RATIO, bench, task
+from tests.physics.event_reference import STATES, THESIS_DRY, Curve, Dry, DryLoop, simulate_events
 
 AMPLITUDE, OMEGA = math.radians(18.0), 2 * math.pi * 0.24
 SWINGING = DryLoop(
@@ -102,7 +96,8 @@ def test_its_loop_is_that_of_the_other_reference() -> None:
     times = np.arange(300) * 1e-3
     loop = replace(SWINGING, bristles=True, bristle_compensation=True)
     out, _ = simulate_events(loop, times)
-    expected = trajectory(times, loop.base_rate, "lugre")
+    swing = Sine(amplitude=AMPLITUDE, frequency=0.24)
+    expected = reference(bench(), task(base_acceleration=swing, compensation="lugre", duration=0.3))
     for name in ("load_rate", "relative_angle", "motor_current"):
         scale = float(np.max(np.abs(expected[name])))
         np.testing.assert_allclose(out[name], expected[name], atol=2e-7 * scale)

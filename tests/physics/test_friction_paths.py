@@ -116,7 +116,6 @@ def refusal(variation: Tree | None = None, shares: Tree | None = None) -> tuple[
 def test_what_scatters_is_what_the_path_says_and_nothing_else(parameter: str) -> None:
     draws = []
     on = scattering({parameter: 0.04})
-    assert on.variation is not None
     for day in range(1, 201):
         today = on.variation.model_copy(update={"day": day})
         changed = of_its_day(on.model_copy(update={"variation": today}))
@@ -192,74 +191,23 @@ def test_a_model_without_the_parameter_is_passed_over_when_another_has_it() -> N
 
 
 @pytest.mark.parametrize(
-    ("variation", "where", "message"),
-    [
+    ("variation", "shares", "where", "message"),
+    [  # what a protocol's file can say wrong is in tests/protocol/test_errors.py
         (
-            {"day_to_day": {"coulomb_torqe": 0.01}},
-            "day_to_day/coulomb_torqe",
-            (
-                "no friction interface has a parameter 'coulomb_torqe' that can change; allowed "
-                f"are {', '.join(LUGRE)}; did you mean 'coulomb_torque'?"
-            ),
+            {"day_to_day": {"motor": {"bristle_damping": 0.01}}},  # declared by another model
+            None,
+            "variation/day_to_day/motor/interface/bristle_damping",
+            f"'bristle_damping' that can change; allowed are {', '.join(LUGRE[:5])}",
         ),
-        (
-            {"trial_to_trial": {"load": {"static_torqe": 0.01}}},
-            "trial_to_trial/load/interface/static_torqe",
-            "friction.load has no parameter 'static_torqe' that can change",
-        ),
-        (
-            {"day_to_day": {"laod.coulomb_torque": 0.01}},
-            "day_to_day/laod.coulomb_torque",
-            "there is no friction interface 'laod'; allowed are load, motor; did you mean 'load'?",
-        ),
-        (  # declared by another model, not by this one
-            {"day_to_day": {"motor": {"bristle_damping": 0.01}}},
-            "day_to_day/motor/interface/bristle_damping",
-            (
-                "friction.motor has no parameter 'bristle_damping' that can change; allowed are "
-                f"{', '.join(LUGRE[:5])}"
-            ),
-        ),
-        (  # an option that is no property of the friction
-            {"day_to_day": {"sign_smoothing": 0.01}},
-            "day_to_day/sign_smoothing",
-            "no friction interface has a parameter 'sign_smoothing' that can change",
-        ),
-        (
-            {"trial_to_trial": {"all": {"paths": ["static_torque", "gain"], "relative": 0.1}}},
-            "trial_to_trial/all/Scatter/paths/1",
-            "no friction interface has a parameter 'gain'",
-        ),
-        (
-            {"day_to_day": {"coulomb_torque": {"relatve": 0.1}}},
-            "day_to_day/coulomb_torque/interface/relatve",
-            "unknown key 'relatve'; allowed are paths, relative; did you mean 'relative'?",
-        ),
-        (
-            {"day_to_day": {"coulomb_torque": 0.1, "*.coulomb_torque": 0.1}},
-            "day_to_day/*.coulomb_torque",
-            "'coulomb_torque' stands there twice; write it once, without quotes",
-        ),
+        (None, {"load": {"gain": 0.1}}, "gear/preload/shares/load/interface/gain", "no parameter"),
+        (None, {"laod.static_torque": 1.0}, "gear/preload/shares/laod.static_torque", "'load'?"),
     ],
 )
-def test_a_path_that_leads_nowhere_is_refused(variation: Tree, where: str, message: str) -> None:
-    found, text = refusal(variation)
-    assert found == f"variation/{where}"
-    assert message in text
-
-
-@pytest.mark.parametrize(
-    ("shares", "where", "message"),
-    [
-        ({"stribeck_velocity": 1.0}, "stribeck_velocity", "allowed are coulomb_torque, static"),
-        ({"static_torqe": 1.0}, "static_torqe", "did you mean 'static_torque'?"),
-        ({"load": {"gain": 0.1}}, "load/interface/gain", "friction.load has no parameter 'gain'"),
-        ({"laod.static_torque": 1.0}, "laod.static_torque", "did you mean 'load'?"),
-    ],
-)
-def test_a_share_of_no_torque_is_refused(shares: Tree, where: str, message: str) -> None:
-    found, text = refusal(shares=shares)
-    assert found == f"gear/preload/shares/{where}"
+def test_a_path_that_leads_nowhere_is_refused(
+    variation: Tree | None, shares: Tree | None, where: str, message: str
+) -> None:
+    found, text = refusal(variation, shares)
+    assert found == where
     assert message in text
 
 

@@ -170,15 +170,10 @@ def test_only_trials_of_one_structure_go_together() -> None:
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        ("none", "filtered"),
-        ("none", "another exponent"),
-        ("none", "rippled"),
-        ("none", "elastic"),
-        ("none", "sampled"),
-        ("lugre", "static"),
-        ("none", "dry"),
+        ("none", "filtered"), ("none", "another exponent"), ("none", "rippled"),
+        ("none", "elastic"), ("none", "sampled"), ("lugre", "static"), ("none", "dry"),
     ],
-)
+)  # fmt: skip
 def test_what_takes_other_code_is_another_structure(one: str, other: str) -> None:
     """Else a lane's last bits could depend on what its neighbours need."""
     (first,), (second,) = trials(one, 1), trials(other, 1)

@@ -55,7 +55,6 @@ def test_angle_torque_and_current_are_judged_at_every_sample(
     assert judge(limits(), still(100, **{channel: values})) is None
     values[37] = sign * np.nextafter(bound, 9e9)
     found = judge(limits(), still(100, **{channel: values}))
-    assert found is not None
     assert (found.sample, found.limit, found.channel) == (37, limit, channel)
     assert found.value == values[37]
     assert f"the {limit} limit is" in found.text
@@ -70,20 +69,17 @@ def test_the_rate_is_judged_by_its_mean_over_the_judging_time() -> None:
     spike[55] = -9.9
     spike[57] = 10.5
     found = judge(limits(), still(100, relative_rate=spike))
-    assert found is not None
     assert found.sample == 57
     assert found.value == pytest.approx(1.05)
     assert "mean of 10 ms" in found.text
     lasting = np.where(np.arange(100) < 40, 0.0, -1.02)
     found = judge(limits(), still(100, relative_rate=lasting))
-    assert found is not None
     assert (found.sample, found.value) == (49, pytest.approx(-1.02))  # the tenth of them
 
 
 def test_before_the_trial_the_bench_was_at_rest() -> None:
     at_once = still(100, relative_rate=1.5)
     found = judge(limits(), at_once)
-    assert found is not None
     assert found.sample == 6  # seven samples of 1.5 in a mean over ten
     assert judge(limits(), still(100, relative_rate=1.0)) is None
 
@@ -96,7 +92,6 @@ def test_lost_samples_count_as_zero_and_do_not_shift_the_numbers() -> None:
     undefined = still(3, relative_rate=np.nan, relative_angle=np.nan)
     assert watch.look(time[10:13], undefined) is None
     found = watch.look(time[13:], still(27, relative_rate=1.5))
-    assert found is not None
     assert (found.sample, found.index) == (19, 6)
 
 
@@ -121,7 +116,6 @@ def test_a_limit_whose_channel_is_not_recorded_is_named() -> None:
     assert watch.unwatched == ("rate", "torque", "current")
     block = np.array([[0.0, 2.5], [99.0, 99.0]])
     found = watch.look(np.array([0.0, 1e-3]), block)
-    assert found is not None
     assert (found.sample, found.limit) == (1, "angle")
 
 
@@ -129,7 +123,6 @@ def test_of_several_limits_the_first_in_time_is_named() -> None:
     block = still(50, relative_angle=np.linspace(0, 4, 50), motor_current=np.linspace(0, 4, 50))
     block[CURRENT, 10] = 5.0
     found = judge(limits(), block)
-    assert found is not None
     assert (found.limit, found.sample) == ("current", 10)
 
 
@@ -198,7 +191,6 @@ def test_an_axis_that_runs_away_goes_at_most_2_percent_of_the_angle_limit_furthe
     away = 1.0 + 1e-6 + random.exponential(random.choice([1e-3, 1.0, 10.0, 100.0]), 1000)
     rates = np.concatenate([before, away * random.choice([-1, 1])])
     found = judge(on, still(1200, relative_rate=rates), sample_rate)
-    assert found is not None
     assert 200 <= found.sample < 200 + judged_samples(on, sample_rate)
     further = abs(np.sum(rates[201 : found.sample])) / sample_rate
     assert further <= 0.02 * angle

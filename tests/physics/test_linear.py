@@ -76,22 +76,16 @@ def characteristic(viscous: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     return polynomial.polyadd(left, np.array([0.0, 0.0, KE * RATIO])), pc
 
 
-def test_step_response_without_friction() -> None:
+@pytest.mark.parametrize("viscous", [0.0, 40.0])
+def test_step_response(viscous: float) -> None:
     """A constant command is a straight line, so the engine is exact at any step."""
-    left, pc = characteristic()
-    time, found = run(
-        bench(frictionless), task(command=Polyline(times=(0.0,), values=(0.2,))), 1e-3
-    )
-    _, expected = signal.step(signal.lti(pc[::-1], left[::-1]), T=time)
-    np.testing.assert_allclose(found["load_rate"], 0.2 * expected, atol=1e-9)
 
-
-def test_step_response_with_viscous_friction_only() -> None:
     def viscous_only(tree: dict[str, dict[str, object]]) -> None:
         frictionless(tree)
-        tree["friction"] = {"load": stribeck(0.0, 0.0, 40.0)}
+        if viscous:
+            tree["friction"] = {"load": stribeck(0.0, 0.0, viscous)}
 
-    left, pc = characteristic(40.0)
+    left, pc = characteristic(viscous)
     time, found = run(
         bench(viscous_only), task(command=Polyline(times=(0.0,), values=(0.2,))), 1e-3
     )

@@ -23,7 +23,7 @@ from campaign.physics.open_loop import Mode, OpenLoop, open_loop
 from campaign.physics.plan_loops import loops_used
 from campaign.physics.variation import of_its_day
 from campaign.signals import Polyline, Sine, Zero
-from tests.physics.benches import DEG, INERTIA, KPV, KT, RATIO, Tree, bench, run, stribeck, task
+from tests.physics.benches import INERTIA, KPV, RATIO, Tree, bench, run, stribeck, task
 
 Edit = Callable[[Tree], object]
 
@@ -179,7 +179,6 @@ def test_the_gain_margin_is_where_the_engine_begins_to_grow(
     """1 % below it a knock dies away, 1 % above it grows, as fast as the pole says."""
     margins = margins_of(open_loop(bench(sampled), compensation, "rate", regime))
     assert margins.stable
-    assert margins.gain_margin is not None
     for factor in (0.99, 1.01):
         on = with_gain(sampled, factor * margins.gain_margin)
         growth = margins_of(open_loop(on, compensation, "rate", regime)).growth
@@ -199,7 +198,6 @@ def test_the_delay_margin_is_where_the_engine_begins_to_grow(regime: Regime) -> 
         return bench(edit)
 
     margin = margins_of(open_loop(bench(sampled), "none", "rate", regime)).delay_margin
-    assert margin is not None
     quarter = 0.25e-3
     below = math.floor((0.6e-3 + margin) / quarter) * quarter - quarter
     for delay in (below, below + 3 * quarter):
@@ -354,7 +352,6 @@ def test_second_order_margins() -> None:
     assert found.gain_margin is None
     pole = found.poles[0]
     assert pole.real == pytest.approx(-zeta * wn)
-    assert found.least_damped is not None
     assert -found.least_damped.real / abs(found.least_damped) == pytest.approx(zeta)
 
 
@@ -365,14 +362,6 @@ def test_third_order_gain_margin() -> None:
     assert found.gain_crossing == pytest.approx(math.sqrt(2.0), rel=1e-7)
     assert found.stable
     assert not margins_of(transfer(0.0, -1.0, -2.0, gain=6.1)).stable
-
-
-def test_a_gain_that_may_not_fall_is_a_margin_below_one() -> None:
-    """k / (s - 1) needs k > 1: with k = 1.25 the gain may fall by 1.94 dB, and no more."""
-    found = margins_of(transfer(1.0, gain=1.25))
-    assert found.stable
-    assert found.gain_margin == pytest.approx(0.8)
-    assert found.low
 
 
 def test_both_ends_of_a_gain_that_may_neither_fall_nor_rise_count() -> None:
@@ -396,7 +385,6 @@ def test_a_turn_the_other_way_is_a_phase_margin_too() -> None:
     assert found.crossover == omega
     assert found.phase_margin == pytest.approx(math.pi - lead, rel=1e-6)
     # Only a delay that turns it all the way round does harm there; the last crossing is sooner.
-    assert found.delay_margin is not None
     assert found.delay_margin < math.pi / found.crossovers[-1]
 
 
@@ -453,17 +441,6 @@ def test_a_sensor_is_late_by_the_nearest_number_of_samples(
     _, true = run(exact, push)
     _, mine = run(rounded, push)
     assert mine["gyro_rate"].tobytes() == true["gyro_rate"].tobytes()
-
-
-def test_the_sliding_loop_by_hand() -> None:
-    """Ideal current loop, no friction: 180/pi Kpv (1 + 30/s) N Kt / (J s), crossing in closed form.
-
-    The shipped current loop is 327 Hz wide and costs little of it.
-    """
-    found = margins_of(open_loop(bench(lambda t: t.update(friction={})), "none", "rate", "sliding"))
-    k = DEG * KPV * RATIO * KT / INERTIA
-    crossover = math.sqrt(0.5 * (k**2 + math.sqrt(k**4 + 4 * (30 * k) ** 2)))
-    assert found.crossover == pytest.approx(crossover, rel=0.02)
 
 
 def test_margins_are_low_below_20_deg_or_3_db() -> None:

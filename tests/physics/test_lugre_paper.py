@@ -73,15 +73,10 @@ def slide(
 @pytest.mark.parametrize(
     ("rate", "peak"),
     [
-        (0.1, 1.4852),
-        (1.0, 1.4324),
-        (2.0, 1.3944),
-        (5.0, 1.3132),
-        (10.0, 1.2200),
-        (20.0, 1.0986),
+        (0.1, 1.4852), (1.0, 1.4324), (2.0, 1.3944), (5.0, 1.3132), (10.0, 1.2200), (20.0, 1.0986),
         (50.0, 1.0075),
     ],
-)
+)  # fmt: skip
 def test_break_away_force_falls_with_the_force_rate(rate: float, peak: float) -> None:
     """The peak before sliding; long after it viscous friction would exceed any of them."""
     _, friction, velocity = slide(lambda t, x: rate * t, 1.6 / rate)

@@ -117,7 +117,6 @@ def test_all_is_made_for_one_width_and_one_processor(tmp_path, monkeypatch) -> N
 
 
 def test_a_temporary_cache_is_none(tmp_path, monkeypatch) -> None:
-    assert machine_code.folder() is not None
     monkeypatch.setattr(machine_code, "cache_folder", lambda module: tmp_path)
     assert machine_code.folder() is None
 

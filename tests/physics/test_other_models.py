@@ -69,9 +69,6 @@ MAXWELL = FrictionModel(
     step=_maxwell_step,
     viscous=lambda options: 0.0,
     steady_state=lambda options, v: options.slip_torque * np.sign(v),
-    stored_energy=lambda options, state: float(
-        0.5 * np.sum(state**2) / (options.stiffness / options.elements)
-    ),
 )
 
 
@@ -155,20 +152,6 @@ def test_ten_elements_have_a_memory_of_where_they_turned() -> None:
         assert moved(way, own) == pytest.approx(turned - 2 * virgin(-way / 2), rel=1e-12)
     moved(-5e-4, inner)
     assert moved(5e-4, inner) == pytest.approx(turned, rel=1e-12)
-
-
-def test_a_state_is_as_large_as_the_options_say() -> None:
-    for elements in (1, 3, 50):
-        tree = {**MAXWELL_TREE, "elements": elements}
-        assert MAXWELL.state_size(MaxwellOptions.model_validate(tree), 1e-3) == elements
-
-
-def test_ten_elements_give_back_what_they_store() -> None:
-    """The work on them is what they store and what they dissipate; at first they only store."""
-    options, state = MaxwellOptions.model_validate(MAXWELL_TREE), np.zeros(10)
-    moved(2e-4, state)  # all stick below 30/55/2000 rad
-    assert MAXWELL.stored_energy is not None
-    assert MAXWELL.stored_energy(options, state) == pytest.approx(0.5 * 20000 * 2e-4**2, rel=1e-12)
 
 
 @pytest.mark.slow

@@ -49,7 +49,6 @@ def test_the_limit_of_the_gain_is_where_the_simulation_begins_to_grow(gyro_delay
         return Bench.model_validate(tree, context={"si": True})
 
     limit = predicted_limit(at(2.0), "observer", 400.0)
-    assert limit is not None
     knock = Sine(amplitude=1.0, frequency=20.0)
     for factor, grows in ((0.95, False), (1.05, True)):
         on = at(factor * limit)

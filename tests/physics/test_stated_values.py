@@ -49,7 +49,6 @@ def sigma(size: str) -> dict[str, str]:
 def test_a_value_of_one_interface_has_its_own_interval() -> None:
     rig = bench({COULOMB: sigma("0.2 N m")})
     found = stated_value(rig, "coulomb_torque", {"direction": "positive"}, "N m")
-    assert found is not None
     assert found.value == 16.0
     assert found.combined == pytest.approx((16.0 - 0.2 * NORMAL_95, 16.0 + 0.2 * NORMAL_95))
 
@@ -60,7 +59,6 @@ def test_the_mean_of_both_directions_knows_how_they_go_together(share: float) ->
     known = {COULOMB: sigma("0.2 N m"), NEGATIVE: sigma("0.3 N m")}
     rig = bench(known, [(COULOMB, NEGATIVE, share)])
     found = stated_value(rig, "coulomb_torque", {"direction": "nominal"}, "N m")
-    assert found is not None
     assert found.value == 16.5
     assert found.standard_error == pytest.approx(
         0.5 * math.sqrt(0.04 + 0.09 + 2 * share * 0.2 * 0.3)
@@ -73,7 +71,6 @@ def test_a_sum_of_interfaces_needs_all_of_them_known() -> None:
     assert stated_value(bench(known, motor=OTHER), *where) is None
     known["friction.motor.coulomb_torque"] = sigma("0.1 N m")
     found = stated_value(bench(known, motor=OTHER), *where)
-    assert found is not None
     assert found.value == pytest.approx(16.0 + 10.0 * 0.5)
     assert found.standard_error == pytest.approx(math.hypot(0.2, 10.0 * 0.1))
 
@@ -94,8 +91,6 @@ def test_inertia_and_damping_at_rest() -> None:
     )
     inertia = stated_value(rig, "inertia", {}, "kg m^2")
     damping = stated_value(rig, "damping_at_rest", {}, "N m s/rad")
-    assert inertia is not None
-    assert damping is not None
     assert (inertia.value, inertia.standard_error) == (2.0, pytest.approx(0.1))
     assert damping.value == 904.0
     assert damping.standard_error == pytest.approx(math.hypot(30.0, 1.0))

@@ -24,25 +24,24 @@ from tests.physics.random_benches import random_bench
 TORQUE = 20.0  # N m, sliding and static
 
 
-def contact(stiffness: float, damping: float, sampled: bool = True, **more: Any) -> Bench:
+def contact(
+    stiffness: float, damping: float, sampled: bool = True, own: Tree | None = None, **more: Any
+) -> Bench:
     """35 kg m^2 on one interface of Coulomb friction with bristles; nothing else is a spring."""
-
-    def edit(tree: Tree) -> None:
-        tree["friction"] = {
-            "load": {
-                "model": "lugre",
-                "static_torque": f"{TORQUE} N m",
-                "coulomb_torque": f"{TORQUE} N m",
-                "stribeck_velocity": "0.03 rad/s",
-                "bristle_stiffness": f"{stiffness!r} N m/rad",
-                "bristle_damping": f"{damping!r} N m s/rad",
-            }
+    tree = bench().model_dump(mode="json")
+    tree["friction"] = {
+        "load": {
+            "model": "lugre",
+            "static_torque": TORQUE,
+            "coulomb_torque": TORQUE,
+            "stribeck_velocity": 0.03,
+            "bristle_stiffness": stiffness,
+            "bristle_damping": damping,
+            **(own or {}),
         }
-        if sampled:
-            tree["controller"]["sample_rate"] = "1 kHz"
-        tree.update(more)
-
-    return bench(edit)
+    }
+    tree["controller"]["sample_rate"] = 1e3 if sampled else None
+    return Bench.model_validate({**tree, **more}, context={"si": True})
 
 
 def damped(frequency: float) -> tuple[float, float]:
@@ -62,20 +61,36 @@ def test_the_step_is_the_next_finer_one_of_a_ladder_of_halves() -> None:
     assert found.refused is None
 
 
-def test_bristle_damping_decides_of_a_resting_load() -> None:
-    """0.2 J / sigma1."""
-    found = longest_step(contact(1e4, 20_000.0), task())
-    assert found.needed == pytest.approx(0.2 * INERTIA / 20_000.0)
-    assert found.because == "bristle damping of friction.load"
+APPENDAGE = {"inertia": 7.0, "frequency": 5.0, "damping_ratio": 0.02}
+# tau_p = 1 / 100 and tau_r = sqrt(Tc / sigma0 / a)
+REVERSAL = 0.05 * math.sqrt(math.sqrt(TORQUE / damped(100.0)[0] / 2.0) / 100.0)
+# With p = 100 i for T = 60 s: t = T / 2, and 0.2 / sqrt(|p|^3 t sqrt(t / T)).
+RINGING = 0.2 / math.sqrt(100.0**3 * 30.0 * math.sqrt(0.5))
 
 
-def test_reversals_decide_under_a_swinging_hull() -> None:
-    """0.05 sqrt(tau_p tau_r), with tau_p = 1 / 100 and tau_r = sqrt(Tc / sigma0 / a)."""
-    stiffness, damping = damped(100.0)
-    found = longest_step(contact(stiffness, damping), task(base_acceleration=swing(2.0)))
-    bending = math.sqrt(TORQUE / stiffness / 2.0)
-    assert found.needed == pytest.approx(0.05 * math.sqrt(bending / 100.0), rel=1e-6)
-    assert found.because == "reversals on the bristles of friction.load"
+@pytest.mark.parametrize(
+    ("bristles", "more", "of", "needed", "because"),
+    [
+        ((1e4, 2e4), {}, {}, 0.2 * INERTIA / 2e4, "bristle damping of"),
+        ((1e4, 2e4), {"appendage": APPENDAGE}, {}, 0.2 * (INERTIA - 7) / 2e4, "bristle damping of"),
+        (
+            damped(100.0),
+            {},
+            {"base_acceleration": swing(2.0)},
+            REVERSAL,
+            "reversals on the bristles",
+        ),
+        ((INERTIA * 100.0**2, 700.0), {}, {"mode": "torque"}, 0.05 / 100.0, "bristle stiffness of"),
+        ((INERTIA * 100.0**2, 700.0), {}, {"mode": "spring"}, 0.05 / 100.0, "bristle stiffness of"),
+        ((INERTIA * 1e4, 0.0), {}, {"mode": "torque", "duration": 60.0}, RINGING, "ringing on the"),
+    ],
+)
+def test_what_decides(bristles: Any, more: Tree, of: Tree, needed: float, because: str) -> None:
+    """0.2 J / sigma1 at rest, 0.05 sqrt(tau_p tau_r) at reversals, 0.05 sqrt(J / sigma0) pulled."""
+    found = longest_step(contact(*bristles, **more), task(**of))
+    assert found.needed == pytest.approx(needed, rel=1e-6)
+    assert found.because.startswith(because)
+    assert found.because.endswith("friction.load")
 
 
 def test_a_commanded_rate_reverses_as_a_hull_does() -> None:
@@ -99,52 +114,20 @@ def test_the_start_decides_where_friction_holds_the_load() -> None:
         assert not longest_step(on, task(base_acceleration=other)).because.startswith("the start")
 
 
-@pytest.mark.parametrize("mode", ["torque", "spring"])
-def test_stiffness_decides_where_a_load_at_rest_is_pulled(mode: Any) -> None:
-    """0.05 sqrt(J / sigma0)."""
-    found = longest_step(contact(INERTIA * 100.0**2, 700.0), task(mode=mode))
-    assert found.needed == pytest.approx(0.05 / 100.0)
-    assert found.because == "bristle stiffness of friction.load"
-
-
-def test_ringing_decides_of_bristles_without_damping() -> None:
-    """With p = 100 i for T = 60 s: t = T / 2, and 0.2 / sqrt(|p|^3 t sqrt(t / T))."""
-    found = longest_step(contact(INERTIA * 100.0**2, 0.0), task(mode="torque", duration=60.0))
-    assert found.needed == pytest.approx(0.2 / math.sqrt(100.0**3 * 30.0 * math.sqrt(0.5)))
-    assert found.because == "ringing on the bristles of friction.load"
-
-
-def test_an_appendage_takes_its_inertia_away() -> None:
-    appendage = {"inertia": "7 kg m^2", "frequency": "5 Hz", "damping_ratio": 0.02}
-    found = longest_step(contact(1e4, 20_000.0, appendage=appendage), task())
-    assert found.needed == pytest.approx(0.2 * (INERTIA - 7.0) / 20_000.0)
-
-
 def test_a_motor_side_contact_counts_by_the_gear() -> None:
     """N of torque and N of rate: N^2 of damping; z, of the load's angle, N times less."""
-
-    def at_motor(tree: Tree) -> None:
-        tree["gear"]["ratio"] = 10.0
-        tree["controller"]["sample_rate"] = "1 kHz"
-        tree["friction"] = {
-            "shaft": {
-                "model": "lugre",
-                "side": "motor",
-                "velocity": "motor",
-                "static_torque": f"{TORQUE / 10} N m",
-                "coulomb_torque": f"{TORQUE / 10} N m",
-                "stribeck_velocity": "0.3 rad/s",
-                "bristle_stiffness": f"{damped(200.0)[0] / 100} N m/rad",
-                "bristle_damping": f"{damped(200.0)[1] / 100} N m s/rad",
-            }
-        }
-
-    swinging = task(base_acceleration=swing(2.0))
-    found = longest_step(bench(at_motor), swinging)
-    still = [longest_step(on, task()).needed for on in (bench(at_motor), contact(*damped(200.0)))]
-    assert still[0] == pytest.approx(still[1])
-    assert found.needed == pytest.approx(longest_step(contact(*damped(200.0)), swinging).needed)
-    assert found.because.endswith("friction.shaft")
+    own = {
+        "side": "motor",
+        "velocity": "motor",
+        "static_torque": TORQUE / 10,
+        "coulomb_torque": TORQUE / 10,
+        "stribeck_velocity": 0.3,
+    }
+    stiffness, damping = damped(200.0)
+    at_load = contact(stiffness, damping)
+    at_motor = contact(stiffness / 100, damping / 100, own=own, gear={"ratio": 10.0})
+    for of in (task(), task(base_acceleration=swing(2.0))):
+        assert longest_step(at_motor, of).needed == pytest.approx(longest_step(at_load, of).needed)
 
 
 @pytest.mark.parametrize("seed", [6, 24, 30, 68, 85, 99])
@@ -181,26 +164,10 @@ def test_a_compensation_behind_a_low_pass_has_the_poles_of_the_equations(seed: i
 
 def test_the_weaker_direction_counts() -> None:
     """z is that of the direction in which friction is a quarter: tau_r halves."""
-
-    def weak(tree: Tree) -> None:
-        tree["controller"]["sample_rate"] = "1 kHz"
-        tree["friction"] = {
-            "load": {
-                "model": "lugre",
-                "static_torque": f"{TORQUE} N m",
-                "coulomb_torque": f"{TORQUE} N m",
-                "stribeck_velocity": "0.03 rad/s",
-                "bristle_stiffness": f"{damped(100.0)[0]} N m/rad",
-                "bristle_damping": f"{damped(100.0)[1]} N m s/rad",
-                "negative": {
-                    "static_torque": f"{TORQUE / 4} N m",
-                    "coulomb_torque": f"{TORQUE / 4} N m",
-                },
-            }
-        }
-
+    back = {"static_torque": TORQUE / 4, "coulomb_torque": TORQUE / 4}
+    weak = contact(*damped(100.0), own={"negative": back})
     swinging = task(base_acceleration=swing(2.0))
-    found = longest_step(bench(weak), swinging).needed
+    found = longest_step(weak, swinging).needed
     assert found == pytest.approx(longest_step(contact(*damped(100.0)), swinging).needed / 2**0.5)
 
 
@@ -251,7 +218,6 @@ def test_stiffer_more_damped_or_faster_never_takes_a_longer_step() -> None:
 def test_what_is_too_stiff_is_refused_in_words() -> None:
     found = longest_step(contact(1e4, 1e8), task())
     assert found.step == LONGEST / 2**HALVINGS
-    assert found.refused is not None
     assert found.refused.startswith("bristle damping of friction.load needs steps of 0.07 us")
 
 

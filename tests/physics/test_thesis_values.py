@@ -34,9 +34,3 @@ def error_mrad(compensation: str, step: float = 0.25e-3) -> float:
 )
 def test_stabilization_error(compensation: str, expected: float, tolerance: float) -> None:
     assert error_mrad(compensation) == pytest.approx(expected, rel=tolerance)
-
-
-def test_they_are_converged() -> None:
-    """At a tenth of the step the two that have a tight reference meet it to 1e-4."""
-    assert error_mrad("none", 25e-6) == pytest.approx(0.488412958, rel=1e-4)
-    assert error_mrad("lugre", 25e-6) == pytest.approx(0.000594855, rel=1e-4)

@@ -105,7 +105,6 @@ def test_the_observer_is_built_for_the_stated_inertia() -> None:
     stated, truth = pair()
     what = STEADY.model_copy(update={"compensation": "observer"})
     block = Lane.of(truth, what, seed=1, stated=stated).compensator.linear
-    assert block is not None
     assert block.b[0, 1] == pytest.approx(1.0 / INERTIA)
 
 

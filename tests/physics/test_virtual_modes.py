@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from pathlib import Path
 
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
 
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.physics.bench import Bench
-from campaign.physics.limits import margins
 from campaign.physics.steady_friction import steady_friction
+from campaign.protocol.bench_file import load_bench
 from campaign.recording import MemoryRecorder, Outcome, Recording
 from campaign.signals import Polyline, Sine
 from campaign.trial import Task, Trial
-from tests.physics.benches import KT, RATIO, Tree, bench, run, stribeck, task
+from tests.physics.benches import RATIO, Tree, bench, run, stribeck, task
 
-SPECIMEN = (
-    Path(__file__).parents[2] / "protocols" / "benches" / "specimen-lugre-1995.toml"
-).read_text(encoding="utf-8")
 # The paper's numbers, typed from it.
 S0, S1, S2, FC, FS, VS = 1e5, math.sqrt(1e5), 0.4, 1.0, 1.5, 1e-3
-
-
-def specimen() -> Bench:
-    return Bench.model_validate(tomllib.loads(SPECIMEN))
 
 
 def free(**extra: str) -> Bench:
@@ -76,7 +66,9 @@ def test_lugre_friction_at_a_prescribed_rate_solves_its_equation() -> None:
         return np.asarray(v - S0 * abs(v) * z / (FC + (FS - FC) * np.exp(-((v / VS) ** 2))))
 
     swing = Sine(amplitude=amplitude, frequency=frequency)
-    time, out = run(specimen(), task(mode="prescribed", command=swing), step=2e-5)
+    time, out = run(
+        load_bench("specimen-lugre-1995"), task(mode="prescribed", command=swing), step=2e-5
+    )
     solved = solve_ivp(
         bristle, (0, 1), [0.0], method="LSODA", rtol=1e-9, atol=1e-14, t_eval=time, max_step=1e-3
     )
@@ -134,42 +126,6 @@ def test_the_backend_says_what_pulls_the_load() -> None:
     moved = recorded(free(), task(mode="prescribed", command=Sine(amplitude=0.1, frequency=1.0)))
     assert moved.channels["command"].unit == "rad/s"
     assert not moved["drive_torque"].any()
-
-
-def test_limits_of_a_prescribed_motion() -> None:
-    what = task(
-        mode="prescribed",
-        command=Sine(amplitude=0.2, frequency=0.5),
-        base_acceleration=Sine(amplitude=100.0, frequency=1.0),  # of no effect on it
-        duration=2.0,
-        start_angle=0.1,
-    )
-    found = {margin.limit: margin.value for margin in margins(bench(), what)}
-    assert found["rate"] == pytest.approx(0.2)
-    assert found["angle"] == pytest.approx(0.4 / np.pi + 0.1)
-    assert found["acceleration"] == pytest.approx(0.2 * np.pi)
-    assert found["torque"] == found["current"] == 0.0
-
-
-def test_limits_behind_a_spring() -> None:
-    command = Polyline(times=(0.0, 10.0), values=(0.0, 4.0))
-    pulled = {"mode": "spring", "command": command, "duration": 5.0, "start_angle": 0.5}
-    found = {
-        margin.limit: margin.value
-        for margin in margins(bench(), task(spring_stiffness=3.0, **pulled))
-    }
-    assert found["torque"] == pytest.approx(3.0 * (2.0 - 0.5))
-    assert found["current"] == found["rate"] == found["acceleration"] == 0.0
-    assert found["angle"] == pytest.approx(2.0)
-    loose = {m.limit: m.value for m in margins(bench(), task(**pulled))}
-    assert (loose["torque"], loose["angle"]) == (0.0, 0.5)
-
-
-def test_the_drive_holds_against_a_disturbance() -> None:
-    push = task(disturbance=Sine(amplitude=12.0, frequency=1.0))
-    found = {margin.limit: margin.value for margin in margins(bench(), push)}
-    assert found["torque"] == pytest.approx(12.0)
-    assert found["current"] == pytest.approx(12.0 / (RATIO * KT))
 
 
 def test_steady_friction_adds_up_at_the_load() -> None:

@@ -13,6 +13,7 @@ from campaign.protocol import load_protocol
 
 HEAD = '[[test]]\nname = "t"\nkind = "swing"\nbench = "simulink"\n'
 GOOD = HEAD + 'frequency = "0.24 Hz"\n'
+SWEPT = GOOD + "[test.matrix]\n"
 
 
 @pytest.mark.parametrize(
@@ -49,24 +50,17 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD + "seed = §99999999999999999999\n", r"more than 64 bits"),
         (GOOD + "matrix = §3\n", r"3 is not a table"),
         # The options of its kind.
-        (
-            HEAD.replace("[[", "§[["),
-            r"'frequency' is missing: a frequency such as \"1 Hz\"; Of the",
-        ),
+        (HEAD.replace("[[", "§[["), r"'frequency' is missing: a frequency such as \"1 Hz\"; Of"),
         (GOOD + '§frequenzy = "1 Hz"\n', r"unknown key 'frequenzy'; .*did you mean 'frequency'\?"),
         (GOOD + "§repaet = 3\n", r"did you mean 'repeat'\?"),
         (HEAD + 'frequency = §"0,24 Hz"\n', r"decimal sign is a point"),
         (HEAD + "frequency = §0.24\n", r"0.24 has no unit; .*\"0.24 Hz\""),
         (HEAD + 'frequency = §"0.24"\n', r"has no unit"),
-        (
-            HEAD + 'frequency = §"0.24 rad/s"\n',
-            r"'rad/s' is not a unit of frequency; allowed are Hz",
-        ),
+        (HEAD + 'frequency = §"1 rad/s"\n', r"'rad/s' is not a unit of frequency; allowed are Hz"),
         (HEAD + 'frequency = §"0.24 Hurtz"\n', r"'Hurtz' is not a unit; allowed are Hz"),
         (HEAD + 'frequency = §"fast"\n', r"does not begin with a number"),
         (HEAD + 'frequency = §"-1 Hz"\n', r"-1.0 Hz is out of range; it must be greater than 0 Hz"),
         (HEAD + 'frequency = §"nan Hz"\n', r"not a finite number"),
-        (HEAD + 'frequency = §"1e999 Hz"\n', r"not a finite number"),
         (HEAD + "frequency = §nan\n", r"nan is not a finite number"),
         (HEAD + "frequency = §true\n", r"true is not a frequency as text"),
         (HEAD + 'frequency = §["1 Hz"]\n', r"a list is not a frequency as text, such as \"1 Hz\""),
@@ -78,34 +72,15 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD + "flag = §1\n", r"1 is not true or false"),
         (GOOD + "cycles = §2.5\n", r"2.5 is not a whole number"),
         (GOOD + 'style = §"fsat"\n', r"'fsat' is not allowed here; .*did you mean 'fast'\?"),
-        (
-            GOOD + 'compensation = §"lugree"\n',
-            r"no compensation of the bench 'simulink'.*'lugre'\?",
-        ),
+        (GOOD + 'compensation = §"lugree"\n', r"no compensation of the bench 'simuli.*'lugre'\?"),
         # The matrix: paths.
         (GOOD + 'matrix = { §acceleratio = ["1 deg/s^2"] }\n', r"did you mean 'acceleration'\?"),
+        (SWEPT + '§"bench.axis.inertai" = ["3 kg m^2"]\n', r"mean 'bench.axis.inertia'\?"),
         (
-            GOOD + '[test.matrix]\n§"bench.axis.inertai" = ["3 kg m^2"]\n',
-            (
-                r"nothing to sweep at 'bench.axis.inertai'; allowed are bench.axis.name, "
-                r"bench.axis.kind, bench.axis.inertia; did you mean 'bench.axis.inertia'\?"
-            ),
+            SWEPT + "bench.friction.laod.§coulomb_torque = ['3 N m']\n",
+            r"nothing to sweep at 'bench.friction.laod'; .*did you mean 'bench.friction.load'\?",
         ),
-        (
-            GOOD + "[test.matrix]\nbench.friction.laod.§coulomb_torque = ['3 N m']\n",
-            (
-                r"nothing to sweep at 'bench.friction.laod'; allowed are bench.friction.load, "
-                r"bench.friction.motor; did you mean 'bench.friction.load'\?"
-            ),
-        ),
-        (
-            GOOD + '[test.matrix]\n§"bench.friction.load.coulomb" = ["3 N m"]\n',
-            r"did you mean 'bench.friction.load.coulomb_torque'\?",
-        ),
-        (
-            GOOD + '[test.matrix]\n§"bench.compensation.observer.gian" = ["3 N m s/rad"]\n',
-            r"did you mean 'bench.compensation.observer.gain'\?",
-        ),
+        (SWEPT + '§"bench.compensation.observer.gian" = ["3 N m s/rad"]\n', r"observer.gain'\?"),
         (GOOD + 'matrix = { §bench = ["simulink"] }\n', r"one \[\[test\]\] for each bench"),
         (GOOD + "matrix = { §repeat = [1, 2] }\n", r"'repeat' belongs to the whole test"),
         (GOOD + "matrix = { frequency.§x = [1] }\n", r"'frequency.x': 'frequency' has no parts"),
@@ -116,26 +91,14 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD + "matrix = { cycles = [§'x', 1] }\n", r"'x' is not a whole number"),
         (GOOD + "matrix = { gain = [1, 2, §nan] }\n", r"nan is not a finite number"),
         (GOOD + "matrix = { cycles = [1, 2, §1] }\n", r"1 stands there twice; .*repeat"),
+        (SWEPT + 'acceleration = ["1 deg/s^2", §18]\n', r"18 has no unit; .*\"18 deg/s\^2\""),
         (
-            GOOD + 'matrix = { acceleration = ["1 deg/s^2", §18] }\n',
-            r"18 has no unit; write it as text, such as \"18 deg/s\^2\"",
-        ),
-        (
-            GOOD + '[test.matrix]\n"bench.axis.inertia" = ["35 kg m^2", §"0 kg m^2", §"3 kg"]\n',
+            SWEPT + '"bench.axis.inertia" = ["35 kg m^2", §"0 kg m^2", §"3 kg"]\n',
             r"greater than 0 kg m\^2[\s\S]*'kg' is not a unit of moment of inertia",
         ),
-        (
-            GOOD + 'matrix = { compensation = ["none", §"sttic", "lugre"] }\n',
-            r"did you mean 'static'\?",
-        ),
-        (
-            GOOD + '[test.matrix]\n"bench.friction.load.model" = ["lugre", §"lugri"]\n',
-            r"unknown model 'lugri'; allowed are armstrong, .*, stribeck; did you mean 'lugre'\?",
-        ),
-        (
-            GOOD + '§acceleration = "1 deg/s^2"\nmatrix = { acceleration = ["2 deg/s^2"] }\n',
-            r"'acceleration' is swept by the matrix and given here",
-        ),
+        (SWEPT + 'compensation = ["none", §"sttic", "lugre"]\n', r"did you mean 'static'\?"),
+        (SWEPT + '"bench.friction.load.model" = ["lugre", §"lugri"]\n', r"unknown model 'lugri'"),
+        (GOOD + "§gain = 1\nmatrix = { gain = [2] }\n", r"'gain' is swept by the matrix and given"),
         # The matrix: ranges.
         (GOOD + "matrix = { gain = { start = 1, stop = 2, §nun = 3 } }\n", r"did you mean 'num'\?"),
         (GOOD + "matrix = { gain = §{ start = 1, stop = 2 } }\n", r"either 'num' or 'step'"),
@@ -146,17 +109,13 @@ GOOD = HEAD + 'frequency = "0.24 Hz"\n'
         (GOOD + "matrix = { gain = §{ start = 1, stop = 2, step = 0 } }\n", r"never reaches"),
         (GOOD + "matrix = { gain = §{ start = 0, stop = 1, step = 1e-300 } }\n", r"over 10000000"),
         (GOOD + "matrix = { gain = { start = 0, stop = 1, num = §999999999999 } }\n", r"at most"),
+        (SWEPT + "gain = §{ start = 0, stop = 1, num = 3, spacing = 'log' }\n", r"one sign, nei"),
+        (SWEPT + "gain = { start = 1, stop = 2, num = 3, spacing = §'lin' }\n", r"mean 'linear'\?"),
+        (SWEPT + 'acceleration = §{ start = "1 deg/s^2", stop = 2, num = 3 }\n', r"different unit"),
         (
-            GOOD + "matrix = { gain = §{ start = 0, stop = 1, num = 3, spacing = 'log' } }\n",
-            r"one sign, neither zero",
-        ),
-        (
-            GOOD + "matrix = { gain = { start = 1, stop = 2, num = 3, spacing = §'lin' } }\n",
-            r"allowed are linear, log; did you mean 'linear'\?",
-        ),
-        (
-            GOOD + 'matrix = { acceleration = §{ start = "1 deg/s^2", stop = 2, num = 3 } }\n',
-            r"different units: 'deg/s\^2' and ''",
+            SWEPT
+            + "acceleration = §{ start = '1 rad/s^2', stop = '2 rad/s^2', step = '9 deg/s^2' }\n",
+            r"different un",
         ),
         (GOOD + "matrix = { acceleration = §{ start = 1, stop = 2, num = 3 } }\n", r"has no unit"),
         (GOOD + "matrix = { gain = §{ start = -1, stop = 2, num = 3 } }\n", r"at least 0"),
@@ -171,38 +130,19 @@ def test_mistake_in_a_protocol(desk, text: str, message: str) -> None:
     ("old", "new", "message"),
     [
         ('inertia = "35 kg m^2"', "inertia = §35", r"35 has no unit; .*\"35 kg m\^2\""),
-        (
-            '[axis]\nname = "azimuth"\ninertia = "35 kg m^2"',
-            '[axis]\nname = "azimuth"\n§inertai = "35 kg m^2"',
-            r"unknown key 'inertai'.*did you mean 'inertia'\?",
-        ),
+        ('inertia = "35', '§inertai = "35', r"unknown key 'inertai'.*did you mean 'inertia'\?"),
         ('[axis]\nname = "azimuth"', "§[axis]", r"'name' is missing"),
         ('inertia = "35 kg m^2"', 'inertia = §"-35 kg m^2"', r"must be greater than 0 kg m\^2"),
         ("ratio = 141.176", "ratio = §'many'", r"'many' is not a number"),
-        ("ratio = 141.176", "ratio = §true", r"true is not a number"),
         ("[gear]\nratio = 141.176", "§[gear]", r"'ratio' is missing: N: motor rate over load"),
-        (
-            'form = "ideal"',
-            'form = §"ideel"',
-            r"unknown form 'ideel'; .*ideal, parallel; .*'ideal'",
-        ),
+        ('form = "ideal"', 'form = §"ideel"', r"unknown form 'ideel'; .*ideal, parallel"),
         ('[controller.rate]\nform = "ideal"', "§[controller.rate]", r"'form' is missing; allowed"),
         (
-            '[friction.load]\nmodel = "lugre"',
-            '[friction.load]\nmodel = §"LuGree"',
-            r"unknown model 'LuGree'; allowed are armstrong, .*, stribeck; did you mean 'lugre'\?",
+            'model = "lugre"',
+            'model = §"LuGree"',
+            r"'LuGree'; allowed are armstrong.*; did you mean",
         ),
-        (
-            '[friction.load]\nmodel = "lugre"\nstatic_torque = "32 N m"',
-            '[friction.load]\nmodel = "lugre"\nstatic_torque = §"32 Nm/s"',
-            r"'Nm/s' is not a unit",
-        ),
-        (
-            "[compensation.observer]\n",
-            "[compensation.§obsrver]\n",
-            r"unknown method 'obsrver'; .*did you mean 'observer'\?, or say which with 'method",
-        ),
-        ('gain = "2000 N m s/rad"', 'gain = §"2000 N m"', r"not a unit of rotational damping"),
+        ("compensation.obs", "compensation.§obz", r"'obzerver'; .*'observer'\?, or say which with"),
         ('[limits]\nangle = "90 deg"', "§[limits]", r"'angle' is missing: an angle"),
         ('[limits]\nangle = "90 deg"', '[limits]\nangle = §"90 deg/s"', r"not a unit of angle"),
         ("[motor]\n", "[motor]\nbad = §\n", r"not valid TOML"),
@@ -220,59 +160,32 @@ PRELOAD = "[gear.preload]\ntorque = '2 N m'\nnominal = '1 N m'\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "messages"),
+    ("text", "message"),
     [
+        (DAYS + "§coulomb_torqe = 0.1\n", "did you mean 'coulomb_torque'"),
+        (TRIALS + "load.§gain = 0.1\n", "friction.load has no parameter 'gain'"),
+        (TRIALS + "§'laod.static_torque' = 0.1\n", "no friction interface 'laod'; allowed are lo"),
         (
-            DAYS + "§coulomb_torqe = 0.1\n",
-            [
-                "'coulomb_torqe' that can change; allowed are coulomb_",
-                "did you mean 'coulomb_torque'",
-            ],
+            TRIALS + "a = { relative = 0.1, paths = [§'x'] }\n",
+            "no friction interface has a par.*'x'",
         ),
-        (TRIALS + "load.§gain = 0.1\n", ["friction.load has no parameter 'gain'"]),
-        (
-            TRIALS + "§'laod.static_torque' = 0.1\n",
-            ["no friction interface 'laod'; allowed are lo"],
-        ),
-        (
-            TRIALS + "both = { relative = 0.1, paths = ['static_torque', §'x'] }\n",
-            ["no friction interface has a parameter 'x'"],
-        ),
-        (DAYS + "'*' = { §sign_smoothing = 0.1 }\n", ["has a parameter 'sign_smoothing' that can"]),
-        (
-            DAYS + "static_torque = { §relatve = 0.1 }\n",
-            ["unknown key 'relatve'; allowed are paths"],
-        ),
-        (
-            DAYS + "static_torque = §0.4\nload.coulomb_torque = §'3 %'\n",
-            ["0.4 is out of range; it must be at most 0.3", "'3 %': not a relative standard dev"],
-        ),
-        (
-            DAYS + "static_torque = 0.1\n§'*.static_torque' = 0.1\n",
-            ["'static_torque' stands there twice"],
-        ),
-        (
-            "[variation]\n§static_torque = 0.1\nday_to_day.static_torque = 0.1\n",
-            ["unknown key 'static_torque'; allowed are seed, day, day_to_day, trial_to_trial"],
-        ),
-        (
-            PRELOAD + "§static_share = 1.0\n",
-            ["unknown key 'static_share'; allowed are torque, nominal, shares"],
-        ),
-        (
-            PRELOAD + "shares = { §stribeck_velocity = 1.0 }\n",
-            ["'stribeck_velocity' that is a torque; allowed are coulomb_torque, static_torque"],
-        ),
-        (PRELOAD + "shares = { load = { static_torque = §3 } }\n", ["3 is out of range"]),
+        (DAYS + "'*' = { §sign_smoothing = 0.1 }\n", "has a parameter 'sign_smoothing' that can"),
+        (DAYS + "static_torque = { §relatve = 0.1 }\n", "unknown key 'relatve'; allowed are paths"),
+        (DAYS + "static_torque = §0.4\n", "0.4 is out of range; it must be at most 0.3"),
+        (DAYS + "load.coulomb_torque = §'3 %'\n", "'3 %': not a relative standard dev"),
+        (DAYS + "viscous_friction = 0.1\n§'*.viscous_friction' = 0.1\n", "stands there twice"),
+        ("[variation]\n§static_torque = 0.1\n", "allowed are seed, day, day_to_day, trial_to_tri"),
+        (PRELOAD + "§static_share = 1.0\n", "allowed are torque, nominal, shares"),
+        (PRELOAD + "shares = { §stribeck_velocity = 1.0 }\n", "is a torque; allowed are coulomb_t"),
+        (PRELOAD + "shares = { load = { static_torque = §3 } }\n", "3 is out of range"),
     ],
 )
 def test_mistake_in_the_path_of_a_friction_parameter(
-    desk, simulink: str, text: str, messages: list[str]
+    desk, simulink: str, text: str, message: str
 ) -> None:
     desk.write("own.toml", simulink.replace("[limits]\n", f"{text}[limits]\n"))
     problems = desk.problems(GOOD.replace('"simulink"', '"own.toml"'))
-    for message in messages:
-        assert message in str(ProtocolError(problems))
+    assert re.search(message, str(ProtocolError(problems)))
 
 
 def test_everything_wrong_is_said_at_once(desk, simulink: str) -> None:
@@ -294,13 +207,6 @@ def test_a_bench_of_two_tests_complains_once(desk, simulink: str) -> None:
     assert len(desk.problems(test + test.replace('"t"', '"u"'))) == 1
 
 
-def test_names_are_unique_over_includes(desk) -> None:
-    desk.write("more.toml", GOOD)
-    problems = desk.problems('include = ["more.toml"]\n' + GOOD.replace('"t"', '§"t"'))
-    assert "the first is at" in problems[0].message
-    assert problems[0].message.endswith("more.toml:2:8")
-
-
 def test_column_counts_characters_not_bytes(desk) -> None:
     desk.problems(GOOD + 'matrix = { style = ["slow", §"größe", §"x"] }\n')
 
@@ -314,24 +220,46 @@ def test_windows_line_ends_and_byte_order_mark(desk) -> None:
 # Files that cannot be used.
 
 
-def test_include_of_itself_names_the_chain(desk) -> None:
-    desk.write("a.toml", 'include = ["b.toml"]\n' + GOOD)
-    desk.write("b.toml", 'include = [§"protocol.toml"]\n')
-    problems = desk.problems('include = ["a.toml"]\n')
-    assert "includes itself: protocol.toml → a.toml → b.toml → protocol.toml" in problems[0].message
+BACK = 'include = [§"protocol.toml"]\n'
 
 
-def test_loop_through_another_spelling_of_the_path(desk) -> None:
-    desk.write("sub/a.toml", 'include = [§"../sub/../protocol.toml"]\n')
-    problems = desk.problems('include = ["sub/a.toml"]\n')
-    assert "protocol.toml → sub/a.toml → protocol.toml" in problems[0].message
-
-
-def test_include_twice_names_the_first(desk) -> None:
-    desk.write("a.toml", 'include = ["c.toml"]\n')
-    desk.write("c.toml", GOOD)
-    problems = desk.problems('include = ["a.toml", §"c.toml"]\n')
-    assert "included twice, the first time: protocol.toml → a.toml → c.toml" in problems[0].message
+@pytest.mark.parametrize(
+    ("files", "text", "message"),
+    [
+        (
+            {"a.toml": 'include = ["b.toml"]\n' + GOOD, "b.toml": BACK},
+            'include = ["a.toml"]\n',
+            "includes itself: protocol.toml → a.toml → b.toml → protocol.toml",
+        ),
+        (
+            {"sub/a.toml": 'include = [§"../sub/../protocol.toml"]\n'},
+            'include = ["sub/a.toml"]\n',
+            "protocol.toml → sub/a.toml → protocol.toml",
+        ),
+        (
+            {"a.toml": 'include = ["c.toml"]\n', "c.toml": GOOD},
+            'include = ["a.toml", §"c.toml"]\n',
+            "included twice, the first time: protocol.toml → a.toml → c.toml",
+        ),
+        ({}, 'include = [§"other.toml"]\n' + GOOD, "'other.toml': no such file (looked for"),
+        ({}, 'published = §"own.toml"\n' + GOOD, "no such file"),
+        (
+            {"benches/platform.toml": ""},
+            GOOD.replace('"simulink"', '§"benches/platfrom.toml"'),
+            "did you mean 'platform.toml'?",
+        ),
+        (
+            {"more.toml": GOOD},
+            'include = ["more.toml"]\n' + GOOD.replace('"t"', '§"t"'),
+            "more.toml:2:8",  # the first of that name
+        ),
+    ],
+)
+def test_files_that_name_others(desk, files: dict[str, str], text: str, message: str) -> None:
+    for name, content in files.items():
+        desk.write(name, content)
+    problems = desk.problems(text)
+    assert message in problems[0].message
 
 
 def test_deep_chain_of_includes(desk) -> None:
@@ -340,17 +268,6 @@ def test_deep_chain_of_includes(desk) -> None:
         desk.write(f"{number}.toml", f'include = [{mark}"{number + 1}.toml"]\n')
     problems = desk.problems('include = ["1.toml"]\n')
     assert "more than 16 files" in problems[0].message
-
-
-def test_missing_include(desk) -> None:
-    problems = desk.problems('include = [§"other.toml"]\n' + GOOD)
-    assert "'other.toml': no such file (looked for" in problems[0].message
-
-
-def test_near_name_of_a_missing_bench(desk, simulink: str) -> None:
-    desk.write("benches/platform.toml", simulink)
-    problems = desk.problems(GOOD.replace('"simulink"', '§"benches/platfrom.toml"'))
-    assert "did you mean 'platform.toml'?" in problems[0].message
 
 
 def test_a_missing_bench_is_not_taken_for_the_protocol_that_names_it(desk, simulink: str) -> None:
@@ -366,11 +283,6 @@ def test_a_bench_that_is_included_is_told_to_be_one(desk, simulink: str) -> None
     problems = desk.problems('include = ["rig.toml"]\n' + GOOD)
     assert [str(each.file.name) for each in problems] == ["rig.toml"]
     assert "this is a bench, and a protocol is asked for" in problems[0].message
-
-
-def test_missing_published_values(desk) -> None:
-    problems = desk.problems('published = §"own.toml"\n' + GOOD)
-    assert "no such file" in problems[0].message
 
 
 def _only_problem(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -30,16 +31,14 @@ x = [1]
 
 @pytest.fixture
 def known(desk, simulink: str):
-    """Problems of a protocol whose bench has these lines under [known]."""
+    """Writes a bench that has these lines under [known]."""
 
-    def problems(*lines: str) -> list[str]:
+    def write(*lines: str) -> Path:
         plain = re.sub(r"\[known\]\n(?:[a-z]+ = .*\n)+", "", simulink)
         assert "[known]" not in plain
-        table = "\n".join(("[known]", *lines)) + "\n"
-        desk.write("own.toml", plain + "\n" + table)
-        return desk.problems(GOOD)
+        return desk.write("own.toml", "\n".join((plain, "[known]", *lines, "")))
 
-    return problems
+    return write
 
 
 @pytest.mark.parametrize(
@@ -61,22 +60,19 @@ def known(desk, simulink: str):
 def test_where_it_stands(desk, known, lines: tuple[str, ...], message: str) -> None:
     desk.write("ours.toml", DOCUMENT)
     desk.write("wrong.toml", "")
-    (problem,) = known(*lines)
+    known(*lines)
+    (problem,) = desk.problems(GOOD)
     assert re.search(message, problem.message)
 
 
-def test_a_document_that_is_not_at_hand_is_missed_by_who_looks_at_the_bench(
-    desk, simulink: str
-) -> None:
+def test_a_document_that_is_not_at_hand_is_missed_by_who_looks_at_the_bench(desk, known) -> None:
     """A bench travels without it, and can be used."""
-    plain = re.sub(r"\[known\]\n(?:[a-z]+ = .*\n)+", "", simulink)
-    path = desk.write("own.toml", plain + '\n[known]\ndocument = "none.toml"\nfitted = ["Z.9"]\n')
+    path = known('document = "none.toml"', 'fitted = ["Z.9"]')
     assert desk.load(GOOD)
     with pytest.raises(ProtocolError, match=r"'none\.toml': no such file \(looked for"):
         load_bench(str(path))
 
 
-def test_a_bench_that_names_no_document_may_mean_any(desk, simulink: str) -> None:
-    plain = re.sub(r"\[known\]\n(?:[a-z]+ = .*\n)+", "", simulink)
-    desk.write("own.toml", plain + '\n[known]\nfitted = ["Z.9"]\n')
+def test_a_bench_that_names_no_document_may_mean_any(desk, known) -> None:
+    known('fitted = ["Z.9"]')
     assert desk.load(GOOD)

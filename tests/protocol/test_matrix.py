@@ -70,39 +70,28 @@ def test_a_repetition_is_the_whole_matrix_once_more(desk) -> None:
     assert found == [(1, 1), (1, 2), (2, 1), (2, 2)]
 
 
-BENCH_PATHS = [
-    ('"bench.axis.inertia" = ["40 kg m^2"]', ("axis", "inertia"), 40.0),
-    ('bench.axis.inertia = ["40 kg m^2"]', ("axis", "inertia"), 40.0),
-    ('"bench.gear.ratio" = [100]', ("gear", "ratio"), 100.0),
-    (
-        '"bench.friction.load.coulomb_torque" = ["30 N m"]',
-        ("friction", "load", "coulomb_torque"),
-        30.0,
-    ),
-    # Fields that the bench file leaves to their defaults.
-    (
-        '"bench.controller.relative_rate_filter" = ["2 ms"]',
-        ("controller", "relative_rate_filter"),
-        0.002,
-    ),
-    ('"bench.controller.sample_rate" = ["2 kHz"]', ("controller", "sample_rate"), 2000.0),
-    # Through two unions and two tables of free names.
-    (
-        '"bench.compensation.lugre.friction.load.static_torque" = ["33 N m"]',
-        ("compensation", "lugre", "friction", "load", "static_torque"),
-        33.0,
-    ),
-]
-
-
-@pytest.mark.parametrize(("matrix", "keys", "value"), BENCH_PATHS)
-def test_a_bench_can_be_swept(desk, matrix: str, keys: tuple[str, ...], value: float) -> None:
-    trial = make_plan(desk.load(GOOD + f"[test.matrix]\n{matrix}\n")).trials[0]
-    found = trial.bench
-    for key in keys:
+@pytest.mark.parametrize(
+    ("path", "written", "value"),
+    [
+        ("bench.axis.inertia", '"40 kg m^2"', 40.0),
+        ("bench.gear.ratio", "100", 100.0),
+        ("bench.friction.load.coulomb_torque", '"30 N m"', 30.0),
+        # Fields that the bench file leaves to their defaults.
+        ("bench.controller.relative_rate_filter", '"2 ms"', 0.002),
+        ("bench.controller.sample_rate", '"2 kHz"', 2000.0),
+        # Through two unions and two tables of free names.
+        ("bench.compensation.lugre.friction.load.static_torque", '"33 N m"', 33.0),
+    ],
+)
+@pytest.mark.parametrize("quote", ['"', ""])
+def test_a_bench_can_be_swept(desk, path: str, written: str, value: float, quote: str) -> None:
+    text = f"{GOOD}[test.matrix]\n{quote}{path}{quote} = [{written}]\n"
+    trial = make_plan(desk.load(text)).trials[0]
+    found = {"bench": trial.bench}
+    for key in path.split("."):
         found = found[key]
     assert found == value
-    assert trial.point == {"bench." + ".".join(keys): value}
+    assert trial.point == {path: value}
 
 
 def test_a_table_that_the_bench_file_leaves_out_can_be_swept(desk) -> None:

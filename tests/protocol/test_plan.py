@@ -243,16 +243,6 @@ def test_a_request_s_own_bench_is_validated(desk) -> None:
         make_plan(load_protocol(path, {"swing": replace(swing, trials=bad)}, shipped=SHIPPED))
 
 
-def test_the_size_counts_what_the_simulator_records_and_what_comes_with_it(desk) -> None:
-    plan = make_plan(desk.load(SWING + MATRIX), seed=1)
-    from campaign.backends.sim import CHANNELS
-
-    samples = sum(
-        8 * (1 + len(CHANNELS)) * int(t.task.duration * t.task.sample_rate) for t in plan.trials
-    )
-    assert samples < plan.size < samples + 500_000 * len(plan.trials)
-
-
 def test_no_archive_is_larger_than_the_plan_says(desk, tmp_path) -> None:
     """Noise cannot be compressed: the largest archive that the trials can have."""
     import numpy as np

@@ -90,7 +90,6 @@ def test_mistake(desk: Desk, text: str, message: str) -> None:
 def test_set(desk: Desk) -> None:
     settings = ("faults.default=skip", "rest.pause=1 min", "faults.sensor={do='retry'}")
     policy = desk.load(WRITTEN + TEST, *settings).policy
-    assert policy.rest is not None
     assert policy.rest.pause == 60.0
     assert policy.faults["default"].do == "skip"
     assert policy.faults["sensor"].do == "retry"

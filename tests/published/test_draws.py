@@ -16,7 +16,7 @@ from campaign.published.provenance import Provenance, SweepPoint
 from campaign.published.scoreboard import Line, score, to_csv
 from campaign.published.values import read_published
 from campaign.result import Finding
-from tests.estimation.coverage import rejected
+from tests.estimation.coverage import draws, rejected
 
 T2 = 4.302653  # Student's t with 2 degrees of freedom, 97.5 %: any table
 PUBLISHED = read_published(
@@ -81,10 +81,7 @@ def test_without_scatter_there_is_no_spread() -> None:
     assert coarse.combined == pytest.approx((2.0 - 0.979982, 2.0 + 0.979982))
 
 
-@pytest.mark.parametrize(
-    "count",
-    [pytest.param(400, id="sample"), pytest.param(4000, id="all", marks=pytest.mark.statistics)],
-)
+@draws(400)
 def test_the_interval_holds_one_more(count: int) -> None:
     """Of normal ones whatever their number, of deviations of ten and of steps from 39 on."""
     held = {}
@@ -121,12 +118,10 @@ def test_draws_are_one_line() -> None:
     found = line_of(*SEVEN, executed=tuple(range(1, 8)))
     assert found.reproduced == pytest.approx(10.2)
     half = math.hypot(2.446912 * 0.2160247 * math.sqrt(8 / 7), 1.959964 * 0.3)
-    assert found.found is not None
     ends = (found.found.low, found.found.high)
     assert ends == pytest.approx((10.2 - half, 10.2 + half), rel=1e-6)
     assert found.verdict == "compatible"
     assert found.draws == pytest.approx([9.9 + 0.1 * n for n in range(7)])
-    assert found.place is not None
     # 9.9 is below 10.0 and does not round to it; 10.0 is a tie.
     assert found.place.value == pytest.approx(1.5 / 7)
     (row,) = csv.DictReader(io.StringIO(to_csv([found])))
@@ -146,8 +141,6 @@ def test_a_published_value_beyond_all_draws_differs() -> None:
     """Although its share may be 3 %, as far as seven draws tell."""
     beyond = [draw(seed, 11.5e-3 + 0.05e-3 * seed) for seed in range(7)]
     found = line_of(*beyond)
-    assert found.place is not None
-    assert found.place.high is not None
     assert found.place.high > 0.025
     assert found.verdict == "differs"
 

@@ -138,7 +138,6 @@ def test_the_sentences_say_all_of_it() -> None:
 
 def test_deviations_stand_by_status_within_limits() -> None:
     table = closeness(board(fitted=("2",)))
-    assert table is not None
     rows = [tuple(row.values()) for row in table.rows]
     assert rows == [("calibrated", 2, 0, 2, 0, 0, 1, 2), ("predicted", 6, 2, 3, 1, 1, 1, 1)]
     assert closeness(Scoreboard()) is None

@@ -56,14 +56,23 @@ def trial(
     )
 
 
-def test_the_bench_as_described() -> None:
-    found = provenance_of([trial(described()), trial(described(), "lugre")])
-    assert found.why_altered({}) == ""
+PRELOAD, HEAVY = "bench.gear.preload.torque", with_value("axis.inertia", 60.0)
 
 
-def test_a_changed_bench_alters_what_it_found() -> None:
-    found = provenance_of([trial(with_value("axis.inertia", 60.0))])
-    assert "not the 'platform' that was described" in found.why_altered({})
+@pytest.mark.parametrize(
+    ("trials", "altered"),
+    [
+        ([trial(described()), trial(described(), "lugre")], False),
+        ([trial(HEAVY)], True),
+        # A matrix over an operating path, and a warm-up, which is behind nothing.
+        ([trial(with_value(PRELOAD, v), **{PRELOAD: v}) for v in (33.0, 50.0)], False),
+        ([trial(HEAVY, role=Role.WARM_UP), trial(described())], False),
+    ],
+)
+def test_what_was_measured_on_another_bench_is_altered(trials: list[Trial], altered: bool) -> None:
+    why = provenance_of(trials).why_altered({})
+    assert bool(why) is altered
+    assert ("not the 'platform' that was described" in why) is altered
 
 
 def test_only_the_points_that_the_conditions_name() -> None:
@@ -77,22 +86,11 @@ def test_only_the_points_that_the_conditions_name() -> None:
     assert found.why_altered({path: 5.0}), "where no point fits, all are behind it"
 
 
-def test_a_matrix_over_an_operating_path_alters_nothing() -> None:
-    path = "bench.gear.preload.torque"
-    trials = [trial(with_value(path, v), **{path: v}) for v in (33.0, 50.0)]
-    assert provenance_of(trials).why_altered({}) == ""
-
-
 def test_a_compensation_counts_where_it_runs() -> None:
     bench = with_value("compensation.lugre.gain", 0.5)
     found = provenance_of([trial(bench, name) for name in ("none", "static", "lugre")])
     assert found.why_altered({"compensation": "static"}) == ""
     assert "compensation 'lugre'" in found.why_altered({"compensation": "lugre"})
-
-
-def test_warm_ups_are_behind_nothing() -> None:
-    other = trial(with_value("axis.inertia", 60.0), role=Role.WARM_UP)
-    assert provenance_of([other, trial(described())]).why_altered({}) == ""
 
 
 @pytest.mark.parametrize("bench", [described(), with_value("known", {})])

@@ -27,11 +27,7 @@ class Drive:
         j1, j2, k, d = self.motor, self.load, self.stiffness, self.damping
         b1, b2 = self.motor_friction, self.load_friction
         return np.array(
-            [
-                [-(b1 + d) / j1, -k / j1, d / j1],
-                [1.0, 0.0, -1.0],
-                [d / j2, k / j2, -(b2 + d) / j2],
-            ]
+            [[-(b1 + d) / j1, -k / j1, d / j1], [1.0, 0.0, -1.0], [d / j2, k / j2, -(b2 + d) / j2]]
         )
 
     @property

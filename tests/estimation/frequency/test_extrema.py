@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
-from campaign.estimation.frequency.extrema import (
-    NO_EXTREMUM,
-    NO_SCATTER,
-    extrema,
-    relative_scatter,
-)
+from campaign.estimation.frequency.extrema import NO_EXTREMUM, NO_SCATTER, extrema, relative_scatter
 from campaign.estimation.frequency.modes import Mode
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
 from tests.estimation.coverage import holds, rejected
@@ -61,12 +56,7 @@ def modes(best: BestLinear) -> tuple[Mode, Mode]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("benches", "realisations", "friction"),
-    [
-        (40, 1, 0.0),
-        (40, 3, 0.0),
-        (40, 1, 0.03),
-    ],
+    ("benches", "realisations", "friction"), [(40, 1, 0.0), (40, 3, 0.0), (40, 1, 0.03)]
 )
 def test_intervals_hold_the_modes_of_two_mass_drives(
     benches: int, realisations: int, friction: float
@@ -89,10 +79,7 @@ def test_intervals_hold_the_modes_of_two_mass_drives(
     assert rejected(held, "less") == {}
 
 
-@pytest.mark.parametrize(
-    ("realisations", "friction"),
-    [(1, 0.0), (3, 0.0), (1, 0.3)],
-)
+@pytest.mark.parametrize(("realisations", "friction"), [(1, 0.0), (3, 0.0), (1, 0.3)])
 def test_a_free_inertia_has_no_extremum(realisations: int, friction: float) -> None:
     """Nor where friction makes its lines scatter."""
     drive = Drive(1.0, 1e-6, 0.01, 1e-5, 1.0)

@@ -79,27 +79,21 @@ def measured(drive: Drive, side: Side, seed: int, level: float = 0.01):  # type:
     return noisy(FREQUENCY, truth, level * np.median(np.abs(truth)), random)
 
 
+def repeated(side: Side, seed: int):  # type: ignore[no-untyped-def]
+    truth = DRIVE.response(FREQUENCY, side)
+    level = 0.02 * np.median(np.abs(truth))
+    return noisy(FREQUENCY, truth, level, np.random.default_rng(seed), of=30)
+
+
 @pytest.mark.slow
 def test_errors_are_the_scatter_of_repeated_measurements() -> None:
     """Each number's own: a wrong gradient shows here, where coverage of thirty hardly does."""
-    truth = DRIVE.response(FREQUENCY, "motor")
-    level = 0.02 * np.median(np.abs(truth))
-    found = [
-        two_mass_fit(
-            {"motor": noisy(FREQUENCY, truth, level, np.random.default_rng(seed), of=30)}, False
-        )
-        for seed in range(40)
-    ]
+    found = [two_mass_fit({"motor": repeated("motor", seed)}, False) for seed in range(40)]
     for name in truths(DRIVE):
         ratio = scatter_as_told([getattr(each, name) for each in found])
         # 40 tell a deviation within 11 %; the weights' own scatter is counted in full for all.
         assert ratio == pytest.approx(0.95, abs=0.3), name
-    truth = DRIVE.response(FREQUENCY, "load")
-    level = 0.02 * np.median(np.abs(truth))
-    found = [
-        two_mass({"load": noisy(FREQUENCY, truth, level, np.random.default_rng(seed), of=30)})
-        for seed in range(100)
-    ]
+    found = [two_mass({"load": repeated("load", seed)}) for seed in range(100)]
     for name in ("total_inertia", "resonance", "resonance_damping"):
         ratio = scatter_as_told([getattr(each, name) for each in found])
         assert ratio == pytest.approx(1, abs=0.2), name
@@ -107,14 +101,7 @@ def test_errors_are_the_scatter_of_repeated_measurements() -> None:
 
 @pytest.mark.slow
 def test_correlations_are_those_of_repeated_measurements() -> None:
-    truth = DRIVE.response(FREQUENCY, "motor")
-    level = 0.02 * np.median(np.abs(truth))
-    found = [
-        two_mass_fit(
-            {"motor": noisy(FREQUENCY, truth, level, np.random.default_rng(seed), of=30)}, False
-        )
-        for seed in range(60)
-    ]
+    found = [two_mass_fit({"motor": repeated("motor", seed)}, False) for seed in range(60)]
     names = list(truths(DRIVE))
     seen = np.corrcoef([[getattr(each, name).value for each in found] for name in names])
     told = found[0].correlations
@@ -156,7 +143,6 @@ def test_a_load_sensor_takes_no_delay_for_negative_damping(seed: int) -> None:
     delay = random.uniform(0, 0.003)
     truth = DRIVE.response(FREQUENCY, "load") * np.exp(-2j * np.pi * FREQUENCY * delay)
     found = two_mass({"load": noisy(FREQUENCY, truth, 3e-5 * np.median(np.abs(truth)), random)})
-    assert found.function is not None
     assert found.function.delay == pytest.approx(delay, abs=2e-4)
     assert found.total_inertia.value == pytest.approx(3.0, rel=1e-3)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from campaign.physics.friction import friction_models
 from campaign.signals import Polyline, Signal, Sine
 from tests.physics.benches import run, task
+from tests.physics.dry_cases import function
 from tests.physics.friction.cases import on, options
 from tests.physics.friction.switched import (
     Armstrong,
@@ -57,10 +57,6 @@ def test_switch_functions_are_the_events_of_the_second_implementation() -> None:
     made = {name: options(name, **CASES[name][2]) for name in events}
     stated = {name: friction_models()[name].switches for name in events}
     assert {name: state and state(made[name]) for name, state in stated.items()} == events
-
-
-def function(sine: Sine) -> Callable[[float], float]:
-    return lambda t: sine.amplitude * math.sin(2 * math.pi * sine.frequency * t + sine.phase)
 
 
 def engine(case: str, step: float, **fields: Any) -> dict[str, np.ndarray]:

@@ -13,7 +13,6 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import complete
 from campaign.physics.loop_margins import LoopMargins
 from campaign.physics.plan_loops import loops_of
-from campaign.physics.step_choice import OWN, longest_step
 from campaign.physics.variation import as_it_is
 from campaign.signals import Sine
 from tests.physics.benches import Tree, bench, run, task
@@ -58,15 +57,6 @@ def test_karnopp_cannot_compensate_and_says_why(capsys: pytest.CaptureFixture[st
     assert "It cannot compensate: within its band" in " ".join(capsys.readouterr().out.split())
     show_kind("gms")
     assert "cannot compensate" not in capsys.readouterr().out
-
-
-def test_a_model_states_its_own_fastest_time() -> None:
-    def chosen(lag: float) -> Any:
-        return longest_step(complete(on("armstrong", memory_lag=lag)), task())
-
-    assert chosen(1e-4).needed == pytest.approx(OWN * 1e-4)
-    assert "fastest time of friction.load" in chosen(1e-4).because
-    assert chosen(1e-4).step < chosen(0.0).step == chosen(0.05).step
 
 
 @pytest.mark.parametrize("name", MODELS)

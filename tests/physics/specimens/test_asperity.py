@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from campaign.physics.specimens import specimens
-from campaign.physics.specimens.asperity import (
-    PITCH,
-    SPOTS,
-    AsperityOptions,
-    length_of,
-    surface,
-)
+from campaign.physics.specimens.asperity import PITCH, SPOTS, AsperityOptions, length_of, surface
 
 SPECIMEN = specimens()["asperity"]
 KINETIC, STATIC, STIFFNESS, STRIBECK = 2.0, 3.0, 1500.0, 0.01
