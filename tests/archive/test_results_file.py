@@ -89,25 +89,13 @@ def table() -> Table:
         Column("mixed", "Mixed"),
         Column("row", "Row"),
     )
+    shares = (Systematic("gain", 0.1), Systematic("x"))
+    alone = estimate(6.0, None, reason=ALONE(count=1), systematic=shares)
+    not_determined = Estimate("c", math.nan, "N m", origin=Origin.NOT_DETERMINED)
     rows = (
         {"direction": "up", "speed": 1.0, "torque": estimate(5.0), "mixed": True, "row": 1},
-        {
-            "direction": "down ↘",
-            "speed": 2,
-            "torque": estimate(
-                6.0,
-                None,
-                reason=ALONE(count=1),
-                systematic=(Systematic("gain", 0.1), Systematic("x")),
-            ),
-            "mixed": "x",
-            "row": None,
-        },
-        {
-            "speed": math.inf,
-            "torque": Estimate("c", math.nan, "N m", origin=Origin.NOT_DETERMINED),
-            "mixed": -0.1,
-        },
+        {"direction": "down ↘", "speed": 2, "torque": alone, "mixed": "x", "row": None},
+        {"speed": math.inf, "torque": not_determined, "mixed": -0.1},
     )
     return Table("parameters", "Parameters", columns, rows, ("5.2",), "A note.")
 
@@ -124,17 +112,9 @@ def results(**fields: object) -> RunResults:
         ResultsOfTest("broken", "breakaway", "Broken", Result(), problem="it failed"),
     )
     found = RunResults(
-        NAME,
-        f"{NAME}.nxs",
-        ROOT,
-        "2026-11-21T09:40:00Z",
-        "0.1.0",
-        "cd" * 32,
-        tests,
-        damaged=("trial 3",),
-        published=table(),
-        telling=("map", "the-map"),
-    )
+        NAME, f"{NAME}.nxs", ROOT, "2026-11-21T09:40:00Z", "0.1.0", "cd" * 32, tests,
+        damaged=("trial 3",), published=table(), telling=("map", "the-map"),
+    )  # fmt: skip
     return replace(found, **fields)
 
 

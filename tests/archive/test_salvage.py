@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunReader, RunStatus, RunWriter, open_run
+from campaign.archive import RunReader, RunStatus, open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
@@ -27,12 +27,9 @@ NONE = "the protocol says keep = none"
 def sealed_once(tmp_path_factory: pytest.TempPathFactory, kit) -> Path:
     """Three trials with benches of their own, the second at its second attempt; to be copied."""
     trials = [kit.trial(n).model_copy(update={"bench": {"name": f"bench {n}"}}) for n in (1, 2, 3)]
-    writer = RunWriter.create(tmp_path_factory.mktemp("sealed"), kit.header(), trials)
-    kit.record(writer, trials[0], 20)
-    failed = writer.begin(trials[1])
-    failed.start(kit.CHANNELS)
-    failed.append(*kit.samples(30, 99))
-    failed.finish(Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE), kit.STARTED, kit.ENDED)
+    writer, _ = kit.begin(tmp_path_factory.mktemp("sealed"), trials, [20])
+    lost = Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE)
+    kit.recorded(writer, trials[1], kit.samples(30, 99), ending=lost)
     kit.record(writer, trials[1], 40)
     kit.record(writer, trials[2], 50)
     return writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
@@ -190,10 +187,7 @@ def test_a_seal_that_is_none_leaves_each_text_its_own_checksum(sealed, kit, text
 
 
 def test_a_lost_line_of_a_folders_journal_is_listed_and_the_rest_is_read(tmp_path, kit):
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    for trial in trials:
-        kit.record(writer, trial, 20)
+    writer, _ = kit.begin(tmp_path, 2, [20] * 2)
     writer.close()
     journal = writer.folder / "journal.jsonl"
     journal.write_text(journal.read_text().replace('"trial":1}', '"trial":x}'))
@@ -204,10 +198,7 @@ def test_a_lost_line_of_a_folders_journal_is_listed_and_the_rest_is_read(tmp_pat
 
 def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path, kit):
     """Each of them is whole; the journal names the record of each."""
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    for trial in trials:
-        kit.record(writer, trial, 20)
+    writer, _ = kit.begin(tmp_path, 2, [20] * 2)
     writer.close()
     first, second = (writer.folder / f"trial-0000{n}.trial" for n in (1, 2))
     first.unlink()
@@ -223,12 +214,8 @@ def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path
 
 def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit):
     """So a damaged index costs such a trial, and that is said."""
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], SampleRetention("none"))
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(20, 1))
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    writer, trials = kit.begin(tmp_path, 2)
+    kit.recorded(writer, trials[0], 20, kit.CHANNELS, SampleRetention("none"))
     kit.record(writer, trials[1], 20)
     path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     with h5py.File(path) as file:
