@@ -7,12 +7,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
 from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.reading.archived_metrics import Measure
+from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
+from campaign.execution.operator_prompts import Attendance, Operator, SimulatedOperator
+from campaign.execution.outcome import RunOutcome
+from campaign.execution.progress import Progress
+from campaign.execution.runner import run_plan
+from campaign.execution.stop import StopSwitch
+from campaign.policy import Policy
 from campaign.recording import (
     ChannelInfo,
     Ending,
@@ -186,3 +194,43 @@ class MemoryArchive:
         assert self.sealed is None, "sealed twice"
         self.sealed = (str(status), reason, safe_state)
         return Path("run.nxs")
+
+
+class Lab:
+    """A run of a few trials, with everything around it in memory; pauses are noted, not waited for.
+
+    What a trial does stands for a backend that does it.
+    """
+
+    def __init__(self, trials: int | list[Trial], backend: Any, **policy: object) -> None:
+        self.trials = make_trials(trials) if isinstance(trials, int) else trials
+        self.backend = FakeBackend(backend) if isinstance(backend, dict) else backend
+        self.archive = MemoryArchive()
+        self.stop = StopSwitch()
+        self.progress: list[Progress] = []
+        self.display: Callable[[Progress], object] = self.progress.append
+        self.pauses: list[float] = []
+        self.pause: Callable[[float], object] = self.pauses.append
+        self.operator: Operator = SimulatedOperator()
+        self.policy = Policy.model_validate(policy, context={"si": True})
+
+    def run(self, workers: int = 1, **more: Any) -> RunOutcome:
+        waits = Attendance(self.operator, lambda seconds, stop: self.pause(seconds) and None)
+        settings = {"policy": self.policy, "attendance": waits, **more}
+        return run_plan(
+            self.trials, self.backend, self.archive, workers=workers, display=self.display,
+            stop=self.stop, **settings,
+        )  # fmt: skip
+
+    @property
+    def remarks(self) -> list[str]:
+        return [progress.remark for progress in self.progress if progress.remark]
+
+    @property
+    def executed(self) -> list[str]:
+        return [name for name in self.backend.log if name != "made safe"]
+
+
+def no_space(*arguments: object) -> NoReturn:
+    """In place of something that writes to the archive."""
+    raise ArchiveError("no space left")

@@ -9,13 +9,9 @@ import pytest
 
 from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
-from campaign.execution.outcome import RunOutcome
-from campaign.execution.runner import run_plan
-from campaign.execution.stop import StopSwitch
-from campaign.policy import Policy
 from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import FakeBackend, MemoryArchive, make_trials
+from tests.execution.fakes import FakeBackend, Lab
 
 STOP = PanicStop(3, "ada")
 CUT = Ending(Outcome.INTERRUPTED, str(STOP))
@@ -42,23 +38,6 @@ class StoppableBackend(FakeBackend):
         self.log.append("cleared")
 
 
-def run(
-    backend: StoppableBackend, policy: Policy | None = None
-) -> tuple[RunOutcome, MemoryArchive]:
-    archive = MemoryArchive()
-    outcome = run_plan(
-        make_trials(3),
-        backend,
-        archive,
-        workers=1,
-        display=lambda progress: None,
-        stop=StopSwitch(),
-        policy=policy,
-        attendance=Attendance(SimulatedOperator(), wait_unless),
-    )
-    return outcome, archive
-
-
 def stopped_in(number: int, ending: Ending = CUT) -> StoppableBackend:
     backend = StoppableBackend()
 
@@ -71,7 +50,8 @@ def stopped_in(number: int, ending: Ending = CUT) -> StoppableBackend:
 
 
 def test_in_a_trial_it_ends_the_run_and_is_told() -> None:
-    outcome, archive = run(stopped_in(2))
+    lab = Lab(3, stopped_in(2))
+    outcome, archive = lab.run(), lab.archive
     assert (outcome.status, outcome.reason) == ("interrupted", "panic stop by ada")
     assert outcome.exit_code is ExitCode.INTERRUPTED
     assert archive.decisions == [("panic stop", None)]
@@ -82,14 +62,15 @@ def test_in_a_trial_it_ends_the_run_and_is_told() -> None:
 def test_a_bench_not_seen_at_rest_comes_first() -> None:
     backend = stopped_in(2)
     backend.rest = lambda: SafeState.NOT_CONFIRMED
-    outcome, _ = run(backend)
+    outcome = Lab(3, backend).run()
     assert outcome.exit_code is ExitCode.NOT_SAFE
     assert outcome.reason.startswith("panic stop by ada; ")
 
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_between_trials_and_after_the_last_one(number: int) -> None:
-    outcome, archive = run(stopped_in(number, Ending(Outcome.COMPLETED)))
+    lab = Lab(3, stopped_in(number, Ending(Outcome.COMPLETED)))
+    outcome, archive = lab.run(), lab.archive
     assert outcome.exit_code is ExitCode.INTERRUPTED
     assert outcome.reason == "panic stop by ada"
     done = [at for at, ending in archive.endings.items() if ending.outcome is Outcome.COMPLETED]
@@ -98,22 +79,22 @@ def test_between_trials_and_after_the_last_one(number: int) -> None:
 
 def test_no_retry_follows_it_however_the_trial_ended() -> None:
     hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE)
-    retry = Policy.model_validate(
-        {"faults": {"default": {"do": "retry", "times": 5, "pause": 1e9}}}, context={"si": True}
-    )
-    outcome, archive = run(stopped_in(1, hot), retry)
-    assert outcome.reason == "panic stop by ada"
-    assert [number for number, _ in archive.attempts] == [1]
+    retry = {"default": {"do": "retry", "times": 5, "pause": 1e9}}
+    lab = Lab(3, stopped_in(1, hot), faults=retry)
+    waits = Attendance(SimulatedOperator(), wait_unless)
+    assert lab.run(attendance=waits).reason == "panic stop by ada"
+    assert [number for number, _ in lab.archive.attempts] == [1]
 
 
 def test_the_run_never_clears_it() -> None:
     backend = stopped_in(1)
-    run(backend)
+    Lab(3, backend).run()
     assert "cleared" not in backend.log
 
 
 def test_a_bench_that_cannot_be_asked_ends_the_run_and_not_the_archive() -> None:
-    outcome, archive = run(StoppableBackend(broken=True))
+    lab = Lab(3, StoppableBackend(broken=True))
+    outcome = lab.run()
     assert outcome.status == "interrupted"
     assert "cannot be asked: panic_stop() failed in" in outcome.reason
-    assert archive.sealed is not None
+    assert lab.archive.sealed is not None
