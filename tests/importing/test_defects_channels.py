@@ -18,12 +18,8 @@ BOTH = pytest.mark.parametrize("motion", [f(s) for f in MOTIONS.values() for s i
 
 
 def found(motion: Motion, kind: str, *, gear: float | None = None, **changed) -> list[Defect]:
-    own = {
-        "relative_angle": motion.q,
-        "relative_rate": motion.v,
-        "drive_torque": motion.tau,
-        **changed,
-    }
+    own = {"relative_angle": motion.q, "relative_rate": motion.v, "drive_torque": motion.tau}
+    own |= changed
     return [each for each in find(motion.t, own, gear=gear) if each.kind == kind and not each.noted]
 
 
@@ -221,9 +217,8 @@ def behind(values: np.ndarray, samples: int) -> np.ndarray:
 @pytest.mark.parametrize("samples", [500, 800, -500])
 @pytest.mark.parametrize("name", ["drive_torque", "motor_current", "joint_torque"])
 def test_a_torque_that_is_late_against_the_motion_is_refused_by_name(motion, name, samples):
-    (late,) = found(
-        motion, "delay", **{"drive_torque": motion.tau, name: behind(motion.tau, samples)}
-    )
+    own = {"drive_torque": motion.tau, name: behind(motion.tau, samples)}
+    (late,) = found(motion, "delay", **own)
     assert late.channels == (name, "relative_rate")
     assert late.size == pytest.approx(samples * 1e-3, abs=0.01)
     assert "'delay'" in late.remedy

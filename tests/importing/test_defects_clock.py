@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.importing.defects.clock import EvenClock, even_clock, ticks
+from campaign.importing.defects.clock import ticks
 
 RATE = 1000.0
 EVEN = np.arange(5000) / RATE
 SEEDS = range(5)
-
-
-def clock_of(time: np.ndarray) -> EvenClock:
-    return even_clock(lambda first, stop: time[first:stop], 0, len(time))
-
-
-def test_an_even_clock_has_nothing_wrong():
-    for time in (EVEN, EVEN + 1.7e9, EVEN[:5], np.round(np.arange(3000) / 430.0, 3)):
-        assert clock_of(time).positions is None
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.02, 0.2])
@@ -68,18 +59,3 @@ def test_steps_that_are_drawn_by_lot_have_no_gaps(seed):
 def test_the_step_of_a_clock_is_what_most_samples_have():
     time = np.concatenate([EVEN, EVEN[-1] + 30 + np.arange(1, 100) / RATE])
     assert ticks(time).step == pytest.approx(1e-3)
-
-
-@pytest.mark.parametrize(
-    ("time", "what"),
-    [
-        (np.delete(EVEN, 1000), "1 samples are missing, before row 1001"),
-        (np.insert(EVEN, 100, EVEN[99]), "the time of row 101 is not after"),
-        (EVEN + 2e-3 * EVEN**2, "no even clock"),
-        ((EVEN + 1.7e9).astype(np.float32).astype(float), "its times do not go on"),
-        (np.where(EVEN == 0.007, np.nan, EVEN), "row 8 has no time"),
-    ],
-)
-def test_what_an_import_refuses_of_times_is_told(time, what):
-    with pytest.raises(ValueError, match=what):
-        clock_of(time)

@@ -233,21 +233,14 @@ def test_a_file_that_changes_after_it_was_mapped_is_a_fault(tmp_path: Path):
         ('file = "a.csv"', 'file = "a.csv"\ntrial = 1', "m.toml:14:", "nothing to plan"),
         ('file = "a.csv"', 'file = "a.csv"\ncolumns = "rgi"', "m.toml:20:", "did you mean 'rig'"),
         ('file = "a.csv"', 'file = "a.csv"\neach = "pso"', "m.toml:20:", "did you mean 'pos'"),
-        (
-            'file = "a.csv"',
-            'file = "a.csv"\nstart = "9 s"',
-            "m.toml:20:",
-            "its times are 0 to 0.399",
-        ),
+        ('"a.csv"', '"a.csv"\nstart = "9 s"', "m.toml:20:", "its times are 0 to 0.399"),
     ],
 )
 def test_mistakes_are_told_with_their_place(
     tmp_path: Path, was: str, now: str, where: str, what: str
 ):
-    text = (COLUMNS + TEST + ENTRY).replace(was, now)
-    told = refused(tmp_path, text)
+    told = refused(tmp_path, (COLUMNS + TEST + ENTRY).replace(was, now))
     assert where in told
-
     assert re.search(what, told), told
 
 
@@ -280,40 +273,30 @@ def test_a_test_without_recordings_is_told(tmp_path: Path):
     assert "has no recordings" in told or "it has no recordings" in told
 
 
-def test_a_slower_table_is_held(tmp_path: Path):
-    """Two files on one clock, one at a tenth of the other's rate: held, and told how often new."""
-    fast = "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
-    slow = "t,i\n" + "\n".join(f"{10 * k},{k}" for k in range(20))
-    (tmp_path / "slow.csv").write_text(slow)
+def slower(folder: Path, begin: int, step: int) -> tuple[str, str]:
+    """A mapping of two files on one clock, the second with a value of its own at each step (ms),
+    and the rows of the first."""
+    slow = "t,i\n" + "\n".join(f"{begin + step * k},{k}" for k in range(20))
+    (folder / "slow.csv").write_text(slow)
     text = COLUMNS.replace("offset = 0.5\nsign = -1\n", "") + TEST
     text += '[[test.recording]]\nfile = ["a.csv", "slow.csv"]\n'
-    (trial,) = planned(tmp_path, text, fast).trials
+    return text, "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
+
+
+@pytest.mark.parametrize("begin", [0, 5])
+def test_a_slower_table_is_held(tmp_path: Path, begin: int):
+    """It is told how often new; what it was before its first value nobody knows."""
+    (trial,) = planned(tmp_path, *slower(tmp_path, begin, 10)).trials
     recording, _ = served(trial)
-    np.testing.assert_allclose(recording["drive_torque"], 2.5 * (np.arange(200) // 10))
+    torque = recording["drive_torque"]
+    assert np.isnan(torque[:begin]).all()
+    np.testing.assert_allclose(torque[begin:], 2.5 * (np.arange(200 - begin) // 10))
     assert recording.channels["drive_torque"].own_rate == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize(("begin", "step"), [(1_000_000, 10), (0, 1), (-5000, 10)])
 def test_clocks_that_do_not_cover_each_other_are_refused(tmp_path: Path, begin: int, step: int):
     """A value that nobody measured is not held: neither before the first nor behind the last."""
-    fast = "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
-    slow = "t,i\n" + "\n".join(f"{begin + step * k},{k}" for k in range(20))
-    (tmp_path / "slow.csv").write_text(slow)
-    text = COLUMNS.replace("offset = 0.5\nsign = -1\n", "") + TEST
-    text += '[[test.recording]]\nfile = ["a.csv", "slow.csv"]\n'
-    told = refused(tmp_path, text, fast)
+    told = refused(tmp_path, *slower(tmp_path, begin, step))
     assert "slow.csv has times from" in told
     assert "and the trial is from 0 to 0.199 s" in told
-
-
-def test_before_its_first_value_a_slower_channel_is_lost(tmp_path: Path):
-    """It begins half of its own step late: what it was before nobody knows."""
-    fast = "t,pos\n" + "\n".join(f"{k},{k}" for k in range(200))
-    slow = "t,i\n" + "\n".join(f"{10 * k + 5},{k}" for k in range(20))
-    (tmp_path / "slow.csv").write_text(slow)
-    text = COLUMNS.replace("offset = 0.5\nsign = -1\n", "") + TEST
-    text += '[[test.recording]]\nfile = ["a.csv", "slow.csv"]\n'
-    (trial,) = planned(tmp_path, text, fast).trials
-    recording, _ = served(trial)
-    assert np.isnan(recording["drive_torque"][:5]).all()
-    np.testing.assert_allclose(recording["drive_torque"][5:], 2.5 * (np.arange(195) // 10))

@@ -10,20 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.formats import excel, mdf, open_recordings
-from campaign.importing.interface import RecordingError, Table
+from campaign.importing.formats import excel, mdf
+from campaign.importing.interface import RecordingError
 from tests.importing.files import RATE, TIME, TORQUE
-from tests.importing.whole import whole
-
-
-def opened(path: Path, format_name: str) -> list[Table]:
-    found, tables = open_recordings(path)
-    assert found.name == format_name
-    return list(tables)
-
-
-def headings(table: Table) -> list[tuple[str, str]]:
-    return [(column.name, column.unit) for column in table.columns]
+from tests.importing.whole import headings, opened, whole
 
 
 @pytest.mark.parametrize(

@@ -10,19 +10,13 @@ import pytest
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError, Table
 from tests.importing.files import CSV, GERMAN
-from tests.importing.whole import whole
+from tests.importing.whole import headings, opened, whole
 
 
 def table(path: Path, content: str | bytes) -> Table:
     path.write_bytes(content.encode() if isinstance(content, str) else content)
-    found, tables = open_recordings(path)
-    assert found.name == "text"
-    (only,) = tables
+    (only,) = opened(path, "text")
     return only
-
-
-def headings(found: Table) -> list[tuple[str, str]]:
-    return [(column.name, column.unit) for column in found.columns]
 
 
 @pytest.fixture
