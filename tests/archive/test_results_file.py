@@ -19,30 +19,14 @@ from nexusformat.nexus import nxload
 
 from campaign.archive import find_run, list_runs, open_run
 from campaign.archive.layout.files import sha256_of
-from campaign.archive.layout.results import (
-    ENTRY,
-    HASH,
-    ResultsOfTest,
-    RunResults,
-    results_path,
-)
+from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults, results_path
 from campaign.archive.layout.results_text import from_text, to_text
 from campaign.archive.reading.results_file import read_results
 from campaign.archive.writing.results_file import write_results
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
-from campaign.result import (
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Axis, Column, Curve, Figure, Finding, Mark, Panel, Result, Table
 from tests.archive.recorded_calls import recorded
 from tests.archive.test_nexus import nxcheck
 

@@ -121,14 +121,6 @@ def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path, kit, how):
     assert any(path.endswith("@DIMENSION_LIST") for path in expected)
 
 
-def test_a_run_that_is_gone_on_with_has_not_ended(tmp_path, kit):
-    path, _ = interrupted(tmp_path, kit)
-    writer = RunWriter.resume(path, **RESUMED)
-    assert open_run(writer.folder).status is RunStatus.INCOMPLETE
-    writer.close()
-    assert open_run(writer.folder).status is RunStatus.INCOMPLETE
-
-
 def test_earlier_attempts_are_kept_and_only_the_last_is_analysed(tmp_path, kit):
     path, trials = interrupted(tmp_path, kit)
     writer = RunWriter.resume(path, **RESUMED)

@@ -94,14 +94,6 @@ def test_a_lost_line_of_the_journal_is_made_up_for_by_the_index(sealed, kit, att
     told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
 
 
-@pytest.mark.parametrize("what", ["started", "finished"])
-def test_a_damaged_line_of_the_journal_costs_nothing_that_the_index_has(sealed, kit, what):
-    damage(sealed, "run/journal/data", what, "_" * len(what))
-    run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
-
-
 def test_without_journal_and_index_no_trial_is_known_and_that_is_said(sealed):
     """Nothing else vouches for a record."""
     damage(sealed, "run/journal/data", "started", "s_arted")
@@ -112,12 +104,43 @@ def test_without_journal_and_index_no_trial_is_known_and_that_is_said(sealed):
     assert (run.status, run.header.protocol_name) == (RunStatus.COMPLETE, "tiny")
 
 
-@pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_damaged_line_of_the_index_is_read_from_the_trials_own_group(sealed, kit, number):
-    damage(sealed, "run/index/data", f'"number":{number},', f'"number":{number + 5},')
+INDEX, TREES = "run/index/data", "run/trees/data"
+TREE_OF_GROUP = "/trial_00001/record/trees: line . does not match"
+
+
+def numbered(place: str, number: int = 1) -> tuple[str, str, str]:
+    return place, f'"number":{number},', f'"number":{number + 5},'
+
+
+@pytest.mark.parametrize(
+    ("damages", "left", "lines"),
+    [
+        *(
+            ([("run/journal/data", word, "_" * len(word))], (1, 2, 3),
+             [f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal"])
+            for word in ("started", "finished")
+        ),
+        # A line of the index is read from the trial's own group; both of them cost one trial.
+        *(([numbered(INDEX, n)], (1, 2, 3), [f"/run/index/data{MISMATCH}"]) for n in (1, 2, 3)),
+        ([numbered(INDEX), numbered("trial_00001/record/json")], (2, 3),
+         [f"/run/index/data{MISMATCH}", f"/trial_00001/record/json{MISMATCH}"]),
+        # And so is a tree, which costs its trials where it is damaged everywhere.
+        ([(TREES, "bench 1", "bench 9")], (1, 2, 3), [f"/run/trees/data{MISMATCH}"]),
+        ([(TREES, "bench 1", "bench 9"), ("trial_00001/record/trees", "bench 1", "bench 9")],
+         (2, 3), [f"/run/trees/data{MISMATCH}", TREE_OF_GROUP]),
+    ],
+)  # fmt: skip
+def test_what_a_damaged_text_costs(sealed, kit, damages, left, lines):
+    for each in damages:
+        damage(sealed, *each)
     run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/index/data{MISMATCH}")
+    check_all(run, kit, left)
+    told(run, *lines)
+    lost = {"trial-00001"} if len(left) == 2 else set()
+    assert {found.trial for found in run.damaged} - {""} == lost
+    if damages[0][0] == TREES:
+        with pytest.raises(ArchiveError, match=f"/run/trees/data{MISMATCH}"):
+            run.planned(1)
 
 
 def test_an_index_that_is_gone_is_read_from_the_trials_own_groups(sealed, kit):
@@ -128,15 +151,6 @@ def test_an_index_that_is_gone_is_read_from_the_trials_own_groups(sealed, kit):
     told(run, "/run/index: is missing")
 
 
-def test_a_line_of_the_index_and_the_record_in_the_group_cost_one_trial(sealed, kit):
-    for place in ("run/index/data", "trial_00001/record/json"):
-        damage(sealed, place, '"number":1,', '"number":7,')
-    run = open_run(sealed)
-    check_all(run, kit, (2, 3))
-    told(run, f"/run/index/data{MISMATCH}", f"/trial_00001/record/json{MISMATCH}")
-    assert [found.trial for found in run.damaged] == ["", "trial-00001"]
-
-
 def test_a_damaged_record_in_a_group_costs_nothing_and_verifying_names_it(sealed, kit):
     damage(sealed, "trial_00001/record/json", '"number":1,', '"number":7,')
     run = open_run(sealed)
@@ -144,23 +158,6 @@ def test_a_damaged_record_in_a_group_costs_nothing_and_verifying_names_it(sealed
     assert run.damaged == ()
     places = [found.place for found in verify_run(sealed).problems]
     assert "/trial_00001/record/json" in places
-
-
-def test_damaged_trees_are_read_from_the_trials_own_groups(sealed, kit):
-    damage(sealed, "run/trees/data", "bench 1", "bench 9")
-    run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/trees/data{MISMATCH}")
-    with pytest.raises(ArchiveError, match=f"/run/trees/data{MISMATCH}"):
-        run.planned(1)
-
-
-def test_a_tree_that_is_damaged_everywhere_costs_its_trials(sealed, kit):
-    for place in ("run/trees/data", "trial_00001/record/trees"):
-        damage(sealed, place, "bench 1", "bench 9")
-    run = open_run(sealed)
-    check_all(run, kit, (2, 3))
-    told(run, f"/run/trees/data{MISMATCH}", "/trial_00001/record/trees: line . does not match")
 
 
 def test_a_damaged_seal_leaves_each_text_its_own_checksum(sealed, kit):

@@ -86,13 +86,19 @@ class OwnBackend(FakeBackend):
 
 @dataclass
 class SwitchedBench(FakeBackend):
-    """A bench that others can switch off, as `stop` says; it may not be asked while it moves."""
+    """A bench that others can switch off, as `stop` says; it may not be asked while it moves.
+
+    Switched off it refuses to arm; `broken`: it cannot be asked.
+    """
 
     stop: PanicStop | None = None
+    broken: bool = False
     asked: int = 0
     moving: set[int] = field(default_factory=set)
 
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        if self.stop is not None:
+            return Ending(Outcome.INTERRUPTED, str(self.stop))
         self.moving.add(trial.number)
         try:
             return super().execute(trial, recorder, stopped)
@@ -104,9 +110,12 @@ class SwitchedBench(FakeBackend):
     def panic_stop(self) -> PanicStop | None:
         assert not self.moving
         self.asked += 1
+        if self.broken:
+            raise RuntimeError("a bug")
         return self.stop
 
-    def clear_stop(self, count: int) -> None: ...
+    def clear_stop(self, count: int) -> None:
+        self.log.append("cleared")
 
 
 class MemoryTrial(MemoryRecorder):

@@ -119,8 +119,7 @@ def test_so_few_that_it_is_not_worth_it_go_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("workers", "sizes"),
-    [(1, [4, 4]), (2, [4, 2, 1, 1]), (3, [3, 2, 1, 1, 1]), (8, [1] * 8)],
+    ("workers", "sizes"), [(1, [4, 4]), (2, [4, 2, 1, 1]), (3, [3, 2, 1, 1, 1]), (8, [1] * 8)]
 )
 def test_every_worker_gets_a_share(workers: int, sizes: list[int]) -> None:
     """Of what is left; where a share is so small that a batch is not worth it, they go alone."""

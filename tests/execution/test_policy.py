@@ -12,14 +12,9 @@ from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import wait_unless
 from campaign.execution.stop import StopSwitch
 from campaign.policy import Response, Rest
-from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
+from campaign.recording import Ending, Fault, Outcome
 from campaign.trial import Trial
-from tests.execution.fakes import (
-    COMPLETED,
-    Lab,
-    SwitchedBench,
-    make_trials,
-)
+from tests.execution.fakes import COMPLETED, Lab, make_trials
 
 LOST = Ending(Outcome.FAULT, "no word for 3 s", fault=Fault.LOST_CONNECTION)
 LIMIT = Ending(Outcome.LIMIT, "too fast")
@@ -138,52 +133,6 @@ def test_a_rest_asks_for_nothing_that_has_been_done():
     lab.run()
     assert lab.archive.steps == [(1, "preload to 1 N m", "simulated")]
     assert lab.pauses == [60.0] * 3
-
-
-BY_EVE = PanicStop(3, "eve", 1.5)
-
-
-def test_a_panic_stop_between_trials_ends_the_run_before_anything_moves_again(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    # These trials take no time.
-    monkeypatch.setattr("campaign.execution.external_stop.INTERVAL", 0.0)
-
-    def switched_off(stopped: Callable[[], bool]) -> Ending:
-        lab.backend.stop = BY_EVE
-        return COMPLETED
-
-    lab = Lab(3, SwitchedBench({1: switched_off}))
-    run = lab.run()
-    assert lab.executed == ["trial-00001"]
-    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "panic stop by eve")
-    assert lab.archive.decisions == [("panic stop", None)]
-    assert lab.archive.reasons == ["by eve, stop number 3"]
-    assert lab.remarks == ["PANIC STOP by eve: the bench stays off until that is cleared"]
-
-
-def test_a_panic_stop_in_a_trial_is_in_the_journal_before_the_bench_is_made_safe():
-    def switched_off(stopped: Callable[[], bool]) -> Ending:
-        lab.backend.stop = BY_EVE
-        return Ending(Outcome.INTERRUPTED, "switched off by SAFE")
-
-    def made_safe() -> SafeState:
-        assert lab.archive.decisions == [("panic stop", None)]
-        return SafeState.CONFIRMED
-
-    lab = Lab(3, SwitchedBench({1: switched_off}))
-    lab.backend.rest = made_safe
-    run = lab.run()
-    assert (run.exit_code, run.reason) == (ExitCode.INTERRUPTED, "panic stop by eve")
-
-
-def test_a_bench_is_asked_about_stops_only_while_nothing_moves_also_in_parallel():
-    moment = threading.Event()
-    behaviour = {n: lambda stopped: moment.wait(0.02) or COMPLETED for n in range(1, 7)}
-    lab = Lab(6, SwitchedBench(behaviour))
-    run = lab.run(workers=2)
-    assert run.outcomes == {Outcome.COMPLETED: 6}
-    assert lab.backend.asked >= 1
 
 
 def test_nothing_rests_for_a_trial_that_does_not_come():

@@ -17,14 +17,7 @@ from campaign.execution.progress import Progress
 from campaign.execution.safety import AbortedError, NotSafeError, describe
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import (
-    COMPLETED,
-    RATE,
-    FakeBackend,
-    Lab,
-    OwnBackend,
-    no_space,
-)
+from tests.execution.fakes import COMPLETED, RATE, FakeBackend, Lab, OwnBackend, no_space
 
 
 def raises(error: BaseException) -> Callable[[Callable[[], bool]], Ending]:

@@ -73,10 +73,7 @@ FAKE = "tests.execution.fakes.FakeBackend"
             raising(SystemExit(0)),
             f"making the bench safe failed: make_safe() failed in {FAKE}: SystemExit: 0",
         ),
-        (
-            lambda: "confirmed",
-            f"{FAILED}: make_safe() of {FAKE} answered with 'str', no SafeState",
-        ),
+        (lambda: "confirmed", f"{FAILED}: make_safe() of {FAKE} answered with 'str', no SafeState"),
     ],
 )
 def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState], why: str) -> None:

@@ -12,7 +12,6 @@ import pytest
 from campaign.importing.guess import Basis, TableGuess, guess, mapping_text
 from campaign.importing.guess.names import named
 from campaign.unit_grammar import parse_unit
-from tests.importing.files import LVM
 from tests.importing.wild import Wild
 from tests.importing.wild_binary import all_of_them
 
@@ -131,14 +130,6 @@ def test_channels_in_tables_of_their_own_are_one_recording(tmp_path):
         "drive_torque": {"column": "ActTorque", "table": "ActTorque", "unit": "percent"},
         "command": {"column": "SetVelo", "table": "SetVelo"},
     }
-
-
-def test_blocks_with_the_same_channels_are_recordings_of_their_own(tmp_path):
-    (tmp_path / "a.lvm").write_text(LVM)
-    told = tomllib.loads(mapping_text(guess([tmp_path / "a.lvm"]), tmp_path))
-    assert [each["table"] for each in told["test"][0]["recording"]] == ["block 1", "block 2"]
-    assert {each["columns"] for each in told["test"][0]["recording"]} == set(told["columns"])
-    assert set(told["columns"]) == {"a"}  # which both have alike
 
 
 def test_a_linear_axis_is_asked_for(tmp_path):

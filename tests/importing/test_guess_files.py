@@ -61,10 +61,7 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     run = imported(
         [tmp_path / "joint3.mat"],
         units={"relative_angle": "rad", "relative_rate": "rad/s"},
-        channels={
-            "data(:,5)": ("drive_torque", "N m"),
-            "data(:,7)": ("temperature", "degC"),
-        },
+        channels={"data(:,5)": ("drive_torque", "N m"), "data(:,7)": ("temperature", "degC")},
     )
     check_coulomb(run.results.findings)
 
@@ -115,7 +112,9 @@ def test_files_that_are_alike_share_their_columns(tmp_path: Path):
     assert [each["columns"] for each in test["recording"]] == ["run1", "run1", "run3"]
     units = {name: each["relative_angle"]["unit"] for name, each in told["columns"].items()}
     assert units == {"run1": "deg", "run3": "rad"}
-    assert "# Columns of run1.csv and of 1 more that are alike" in mapping_text(found)
+    mapping = mapping_text(found)
+    assert "# Columns of run1.csv and of 1 more that are alike" in mapping
+    assert mapping.count("read as text") == 1  # one remark for all that are alike
 
 
 def guessed(folder: Path, head: str, *columns: np.ndarray) -> list[ColumnGuess]:
@@ -344,17 +343,6 @@ def test_a_group_of_all_columns_says_nothing(tmp_path: Path):
     ):
         columns = guessed(tmp_path, ",".join(f"{group}/{name}" for name in names), m.t, m.q, m.v)
         assert [column.role for column in columns] == roles
-
-
-def test_files_that_are_alike_have_one_remark(tmp_path: Path):
-    m = rig.sines(16)
-    for number in (1, 2, 3):
-        text(together(m.t, m.q, m.tau), "time,angle [rad],torque [Nm]\n")(
-            tmp_path / f"{number}.csv"
-        )
-    mapping = mapping_text(guess([tmp_path / f"{number}.csv" for number in (1, 2, 3)]), tmp_path)
-    assert mapping.count("[[test.recording]]") == 3
-    assert mapping.count("read as text") == 1
 
 
 def test_all_that_a_mapping_lacks_is_told_at_once(tmp_path: Path):

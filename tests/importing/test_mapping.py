@@ -171,15 +171,6 @@ def test_a_pattern_does_not_lead_out_of_its_folder(
     assert Path("/") not in looked
 
 
-def test_a_delay_is_put_back_by_whole_samples(tmp_path: Path):
-    late = COLUMNS.replace('unit = "deg"', 'unit = "deg"\ndelay = "5 ms"')
-    (trial,) = planned(tmp_path, late + TEST + ENTRY).trials
-    recording, _ = served(trial)
-    assert len(recording.time) == 395
-    assert recording["relative_angle"][0] == pytest.approx(np.deg2rad(0.25))
-    assert recording["drive_torque"][0] == pytest.approx(-2.5 * 0.5)
-
-
 def test_a_filter_of_the_drive_is_told(tmp_path: Path):
     filtered = COLUMNS.replace("sign = -1", 'sign = -1\nfilter = "first order, 8 ms"')
     (trial,) = planned(tmp_path, filtered + TEST + ENTRY).trials
@@ -192,20 +183,6 @@ def test_conditions_are_numbers_with_units_or_words(tmp_path: Path):
     line = 'conditions = { load = "10 N", oil = "dry", speed = "90 deg/s" }'
     (trial,) = planned(tmp_path, COLUMNS + TEST + ENTRY + line).trials
     assert trial.point == {"load": 10.0, "oil": "dry", "speed": pytest.approx(np.pi / 2)}
-
-
-def test_gaps_that_are_marked_are_lost_samples(tmp_path: Path):
-    rows = "t,pos,i\n" + "\n".join(f"{k},{k},1" for k in range(200) if not 50 <= k < 60)
-    text = COLUMNS.replace('unit = "ms"', 'unit = "ms"\nrepair = ["mark gaps"]') + TEST + ENTRY
-    (trial,) = planned(tmp_path, text, rows).trials
-    recording, _ = served(trial)
-    assert len(recording.time) == 200
-    assert np.isnan(recording["drive_torque"][50:60]).all()
-    assert np.isfinite(recording["drive_torque"][60:]).all()
-    assert any("were lost" in event.text for event in recording.events)
-    assert "10 samples are missing, before row 51" in refused(
-        tmp_path, COLUMNS + TEST + ENTRY, rows
-    )
 
 
 def test_a_file_that_changes_after_it_was_mapped_is_a_fault(tmp_path: Path):
