@@ -228,26 +228,11 @@ def add_to_the_seal(file, rng, put, effort):
 
 
 ACTS = [
-    exchange_channels,
-    exchange_data,
-    exchange_trials,
-    edit_unit,
-    edit_label,
-    scale_samples,
-    stretch_time,
-    remove_trial,
-    add_channel,
-    remove_channel,
-    rename_channel,
-    edit_title,
-    edit_record,
-    edit_index,
-    exchange_records,
-    edit_journal,
-    exchange_digests,
-    edit_bench,
+    exchange_channels, exchange_data, exchange_trials, edit_unit, edit_label, scale_samples,
+    stretch_time, remove_trial, add_channel, remove_channel, rename_channel, edit_title,
+    edit_record, edit_index, exchange_records, edit_journal, exchange_digests, edit_bench,
     add_to_the_seal,
-]
+]  # fmt: skip
 
 
 def committed(path: Path, act: Callable[..., Traces], seed: int, effort: str) -> Traces:

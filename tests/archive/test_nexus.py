@@ -126,6 +126,7 @@ def without_units(name: str) -> Callable[[h5py.Group], None]:
 
 
 def shorter(entry: h5py.Group) -> None:
+    """One line for the fact, one for each of some sizes."""
     units = entry["data/motor_current"].attrs["units"]
     del entry["data/motor_current"]
     entry["data/motor_current"] = np.zeros(30)
@@ -140,19 +141,13 @@ def renamed(entry: h5py.Group) -> None:
 @pytest.mark.parametrize(
     ("damage", "expected"),
     [
-        (without("data/motor_current"), (1, 0)),
-        (without("data/time"), (1, 0)),
-        (without("start_time"), (1, 0)),
-        (without("instrument/gyro"), (1, 0)),
-        (without("record/json"), (1, 0)),
-        (without("record/trees"), (1, 0)),
-        (renamed, (1, 0)),
-        (shorter, (0, 3)),  # one line for the fact, one for each of some sizes
-        (without_units("data/gyro_rate"), (0, 1)),
-        (without_units("data/time"), (0, 1)),
-        (without_units("data/friction_torque"), (0, 1)),
+        (without("data/motor_current"), (1, 0)), (without("data/time"), (1, 0)),
+        (without("start_time"), (1, 0)), (without("instrument/gyro"), (1, 0)),
+        (without("record/json"), (1, 0)), (without("record/trees"), (1, 0)), (renamed, (1, 0)),
+        (shorter, (0, 3)), (without_units("data/gyro_rate"), (0, 1)),
+        (without_units("data/time"), (0, 1)), (without_units("data/friction_torque"), (0, 1)),
     ],
-)
+)  # fmt: skip
 def test_what_does_not_follow_it_is_found(tmp_path, kit, damage, expected):
     sealed = write_whole(kit, tmp_path)
     with h5py.File(sealed, "r+") as file:

@@ -237,25 +237,14 @@ class _Odd:
 @pytest.mark.parametrize(
     ("value", "told"),
     [
-        (None, None),
-        (True, True),
-        (np.bool_(True), True),
-        (3, 3),
-        (np.int32(3), 3),
-        (0.5, 0.5),
-        (np.float32(0.5), 0.5),
-        (float("inf"), "inf"),
-        (np.float64("-inf"), "-inf"),
-        ("text", "text"),
-        (np.str_("text"), "text"),
-        ((1, [2.0, None]), [1, [2.0, None]]),
+        (None, None), (True, True), (np.bool_(True), True), (3, 3), (np.int32(3), 3), (0.5, 0.5),
+        (np.float32(0.5), 0.5), (float("inf"), "inf"), (np.float64("-inf"), "-inf"),
+        ("text", "text"), (np.str_("text"), "text"), ((1, [2.0, None]), [1, [2.0, None]]),
         (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]]),
-        ({1: {"a": (np.nan,)}}, {"1": {"a": ["nan"]}}),
-        (_Odd(), "odd"),
-        (b"bytes", "b'bytes'"),
+        ({1: {"a": (np.nan,)}}, {"1": {"a": ["nan"]}}), (_Odd(), "odd"), (b"bytes", "b'bytes'"),
         ({"a"}, "{'a'}"),
     ],
-)
+)  # fmt: skip
 def test_whatever_a_backend_measured_of_itself_becomes_json(value, told):
     found = plain(value)
     assert found == told

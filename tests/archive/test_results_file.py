@@ -340,16 +340,11 @@ def test_a_link_in_place_of_an_array_is_not_followed(run, kind, tmp_path):
 @pytest.mark.parametrize(
     "text",
     [
-        '{"$is":"Path","args":["/etc/passwd"]}',
-        '{"$is":"TypeAdapter"}',
-        '{"$is":"Estimate","name":"x","value":"much","unit":"m"}',
-        '{"$is":"RunResults"}',
-        '{"$is":"Column","name":"x","label":"x"}',
-        "[]",
-        "{",
-        '{"$array":"a/b/c"}',
+        '{"$is":"Path","args":["/etc/passwd"]}', '{"$is":"TypeAdapter"}',
+        '{"$is":"Estimate","name":"x","value":"much","unit":"m"}', '{"$is":"RunResults"}',
+        '{"$is":"Column","name":"x","label":"x"}', "[]", "{", '{"$array":"a/b/c"}',
     ],
-)
+)  # fmt: skip
 def test_a_text_makes_results_and_nothing_else(text):
     def array(place: str) -> np.ndarray:
         raise LookupError(place)

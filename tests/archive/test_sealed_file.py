@@ -172,8 +172,8 @@ def test_a_viewer_opens_the_first_completed_measurement(tmp_path, kit):
     writer, _ = kit.begin(tmp_path, trials, [10])
     attempt(writer, kit, trials[1], Outcome.FAULT)
     kit.record(writer, trials[3], 10)
-    kit.record(writer, trials[2], 10)
-    assert shown(seal(writer)) == "trial_00003"
+    attempt(writer, kit, trials[2], Outcome.LIMIT)
+    assert shown(seal(writer)) == "trial_00004"
 
 
 def test_without_a_completed_measurement_it_opens_the_first_one_with_samples(tmp_path, kit):

@@ -72,14 +72,9 @@ def run(folder: Path, asked: Sequence[Trial], limit: float = LIMIT) -> RunReader
     """A sealed run, executed as the program does."""
     writer = RunWriter.create(folder, header_of(asked), asked)
     outcome = run_plan(
-        asked,
-        SimBackend(SimOptions()),
-        writer,
-        workers=1,
-        display=lambda progress: None,
-        stop=StopSwitch(),
-        measure=TrialMeasurement(experiments(), limit=limit),
-    )
+        asked, SimBackend(SimOptions()), writer, workers=1, display=lambda progress: None,
+        stop=StopSwitch(), measure=TrialMeasurement(experiments(), limit=limit),
+    )  # fmt: skip
     assert outcome.status is RunStatus.COMPLETE
     return open_run(outcome.archive)
 

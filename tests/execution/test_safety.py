@@ -270,10 +270,6 @@ def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Hanging]]
         each.let_go.set()
 
 
-def test_leaving_at_once_does_not_wait_for_ever(hanging: Callable[..., Hanging]) -> None:
-    assert safe_at_once(hanging("make safe")) is ExitCode.NOT_SAFE
-
-
 def test_a_bench_that_hangs_while_it_is_connected_is_made_safe(
     hanging: Callable[..., Hanging],
 ) -> None:

@@ -74,24 +74,41 @@ def test_no_unit_stands_that_is_not_the_columns(folder: Path, name: str):
 
 
 @pytest.mark.parametrize(
-    ("name", "role", "unit", "sure"),
+    ("name", "own", "role", "unit", "sure"),
     [
-        ("Torque_mNm", "drive_torque", "mN m", True), ("ZeitInNanoSec", "time", "ns", True),
-        ("Sollgeschwindigkeit in mm/s", "command", "mm/s", True),
-        ("Drehmoment / Nm", "drive_torque", "Nm", True),
-        ("VelRadPerSec", "relative_rate", "rad/s", True),
-        ("F_raw_loadcell_N", "joint_torque", "N", False), ("F_N", "normal_load", "", False),
-        ("current_a", "motor_current", "A", False), ("omega_m", "motor_rate", "", False),
-        ("current_position", "relative_angle", "", False), ("i_d", "unknown", "", False),
-        ("dTheta", "relative_rate", "", False), ("q_ddot", "unknown", "", False),
-        ("omega_rad_s2", "unknown", "", False), ("Reibungskoeffizient", "unknown", "", False),
-        ("T_motor", "drive_torque", "", False), ("T_m", "drive_torque", "", False),
-        ("T1", "temperature", "", False), ("pose.position.x", "unknown", "", False),
-        ("imu.angular_velocity.x", "gyro_rate", "", False), ("set point", "command", "", False),
+        ("Torque_mNm", "", "drive_torque", "mN m", True), ("ZeitInNanoSec", "", "time", "ns", True),
+        ("Sollgeschwindigkeit in mm/s", "", "command", "mm/s", True),
+        ("Drehmoment / Nm", "", "drive_torque", "Nm", True),
+        ("VelRadPerSec", "", "relative_rate", "rad/s", True),
+        ("F_raw_loadcell_N", "", "joint_torque", "N", False), ("F_N", "", "normal_load", "", False),
+        ("current_a", "", "motor_current", "A", False), ("omega_m", "", "motor_rate", "", False),
+        ("current_position", "", "relative_angle", "", False), ("i_d", "", "unknown", "", False),
+        ("dTheta", "", "relative_rate", "", False), ("q_ddot", "", "unknown", "", False),
+        ("omega_rad_s2", "", "unknown", "", False),
+        ("Reibungskoeffizient", "", "unknown", "", False),
+        ("T_motor", "", "drive_torque", "", False), ("T_m", "", "drive_torque", "", False),
+        ("T1", "", "temperature", "", False), ("pose.position.x", "", "unknown", "", False),
+        ("imu.angular_velocity.x", "", "gyro_rate", "", False),
+        ("set point", "", "command", "", False), ("state.tau_J[0]", "", "joint_torque", "", False),
+        ("cmd.tau_J_d[0]", "", "command", "", False), ("torque_enable", "", "unknown", "", False),
+        ("phi_m", "", "motor_angle", "", False), ("pos_deg", "", "relative_angle", "deg", True),
+        ("vel_deg_s", "", "relative_rate", "deg/s", True), ("t_ms", "", "time", "ms", True),
+        ("vel_ms", "", "relative_rate", "", False),
+        ("Servo motor speed", "", "motor_rate", "", False),
+        ("tau_nm", "", "drive_torque", "N m", True), ("gyro_z", "", "gyro_rate", "", False),
+        ("gyro_rate", "", "gyro_rate", "", False), ("base_rate", "", "base_rate", "", False),
+        ("", "", "unknown", "", False),
+        # Its own unit says what one letter does not.
+        ("T", "°C", "temperature", "°C", True), ("T", "s", "time", "s", True),
+        ("s", "mm", "relative_angle", "mm", True), ("s_soll", "mm", "reference", "mm", True),
+        ("v", "mm/s", "relative_rate", "mm/s", True), ("v", "V", "unknown", "V", True),
+        ("FN", "N", "normal_load", "N", True), ("FT", "N", "joint_torque", "N", True),
+        ("CH1", "V", "unknown", "V", True), ("Motorstrom", "", "motor_current", "", False),
+        ("Winkel Antrieb", "", "motor_angle", "", False),
     ],
 )  # fmt: skip
-def test_what_a_name_says(name: str, role: str, unit: str, sure: bool):
-    says = named(name)
+def test_what_a_name_says(name: str, own: str, role: str, unit: str, sure: bool):
+    says = named(name, own)
     assert (says.role, says.unit, says.basis is Basis.STATED) == (role, unit, sure)
 
 

@@ -156,15 +156,10 @@ def asammdf():
 
 @pytest.mark.slow
 def test_groups_are_tables_with_clocks_of_their_own(tmp_path, asammdf, monkeypatch):
+    told = {"name": "tau", "unit": "Nm", "conversion": {"a": 0.01, "b": 0.0}}
     fast = [
         asammdf.Signal(RATE, TIME, name="w", unit="rad/s"),
-        asammdf.Signal(
-            (TORQUE * 100).astype("i2"),
-            TIME,
-            name="tau",
-            unit="Nm",
-            conversion={"a": 0.01, "b": 0.0},
-        ),
+        asammdf.Signal((TORQUE * 100).astype("i2"), TIME, **told),
     ]
     states = np.array([b"on", b"off"] * 13)[: len(TIME[::2])]
     slow = [

@@ -125,10 +125,10 @@ def test_short_stretches_are_left_out_and_told(tmp_path: Path):
         ([0, *[2] * 30, *[0] * 5, *[2] * 80],
          'trigger = { column = "run", level = 1, duration = "50 ms" }',
          "again in row 37, 15 rows before the trial that is running there ends"),
-        ([0] * 20 + [1] * 40, 'trigger = { column = "run", level = 0.5, duration = "5 ms" }',
-         "its 'duration' holds 5 rows, and a recording needs 10"),
+        ([0] * 20 + [1] * 40, 'trigger = { column = "run", level = 0.5, duration = "9 ms" }',
+         "its 'duration' holds 9 rows, and a recording needs 10"),
         ([1] * 9, "", "a.csv: it has 9 rows, and a recording needs 10"),
-        ([1] * 40, 'stop = "3 ms"', "3 rows from its beginning to 0.003 s, and a recording"),
+        ([1] * 40, 'stop = "9 ms"', "9 rows from its beginning to 0.009 s, and a recording"),
     ],
 )  # fmt: skip
 def test_what_holds_no_trial_is_refused(tmp_path: Path, runs: list[object], line: str, what: str):
