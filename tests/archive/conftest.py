@@ -1,13 +1,19 @@
 """What the tests of the archive write."""
 
+import hashlib
+import os
 import shutil
-from collections.abc import Callable, Sequence
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
+from campaign.policy import SampleRetention
 from campaign.recording import ChannelInfo, Ending, Event, Outcome
 from campaign.trial import Task, Trial
 
@@ -20,6 +26,12 @@ CHANNELS = (
     ChannelInfo("gyro_rate", "rad/s", "Load rate", "deg/s"),
     ChannelInfo("friction_torque", "N m", "Friction torque", "N m", measured=False),
 )
+
+NORMALISED = {"tests": [{"name": "map", "numbers": [1, 1.0, 1e-300, None, True]}], "published": "x"}
+FINGERPRINT = hashlib.sha256(
+    b'{"tests":[{"name":"map","numbers":[1,1.0,1e-300,null,true]}]}'
+).hexdigest()
+RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {"name": "other"}, "versions": {}, "command": []}
 
 
 def make_trial(number: int, test: str = "map") -> Trial:
@@ -44,7 +56,7 @@ def make_header(name: str = "2026-11-21T09-36-58-tiny", **fields: object) -> Run
             "title": "A tiny run: 20 °/s",
             "protocol_name": "tiny",
             "sources": {"tiny.toml": 'title = "20 °/s"\n', "benches/tiny.toml": "# π\r\n"},
-            "normalised": {"title": "x", "numbers": [1, 1.0, 1e-300, None, True]},
+            "normalised": NORMALISED,
             "tests": [{"name": "map", "kind": "velocity_map", "options": {"speed": 0.1}}],
             "versions": {"campaign": "0.1.0", "numpy": "2.0"},
             "host": {"name": "lab"},
@@ -53,7 +65,7 @@ def make_header(name: str = "2026-11-21T09-36-58-tiny", **fields: object) -> Run
             "tags": ["first"],
             "backend": "sim",
             "overrides": {"bench.axis.inertia": "35 kg m^2"},
-            "fingerprint": "ab" * 32,
+            "fingerprint": FINGERPRINT,
             **fields,
         }
     )
@@ -68,12 +80,24 @@ def make_samples(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return time, block
 
 
+def begin(
+    results: Path, planned: int | list[Trial], counts: Sequence[int | None] = (), **fields: object
+) -> tuple[RunWriter, list[Trial]]:
+    """A run of trials (or so many), of which the first have recorded as many samples as `counts`
+    says; None for one that failed before any."""
+    if isinstance(planned, int):
+        planned = [make_trial(number) for number in range(1, planned + 1)]
+    writer = RunWriter.create(results, make_header(**fields), planned)
+    for trial, count in zip(planned, counts, strict=False):
+        write_trial(writer, trial, count)
+    return writer, planned
+
+
 def write_run(
     results: Path, counts: Sequence[int | None] = (50, 120), block: int = 1000, **fields: object
 ) -> Path:
     """Seal a run whose trials have `counts` samples; None for one that failed before any."""
-    trials = [make_trial(number) for number in range(1, len(counts) + 1)]
-    writer = RunWriter.create(results, make_header(**fields), trials)
+    writer, trials = begin(results, len(counts), **fields)
     for trial, count in zip(trials, counts, strict=True):
         write_trial(writer, trial, count, block)
     failed = None in counts
@@ -83,17 +107,56 @@ def write_run(
 
 def write_trial(writer: RunWriter, trial: Trial, count: int | None, block: int = 1000) -> None:
     """Record one trial in blocks of `block` samples."""
-    recorder = writer.begin(trial)
     if count is None:
-        recorder.finish(Ending(Outcome.FAULT, "no power"), STARTED, ENDED)
+        writer.begin(trial).finish(Ending(Outcome.FAULT, "no power"), STARTED, ENDED)
         return
-    recorder.start(CHANNELS)
+    recorder = begin_trial(writer, trial, ())
     time, samples = make_samples(count, trial.number)
     for start in range(0, count, block):
         cut = slice(start, start + block)
         recorder.append(time[cut], samples[:, cut])
     recorder.event(Event(0.25, "the load breaks away ↗"))
     recorder.finish(Ending(Outcome.COMPLETED), STARTED, ENDED)
+
+
+Samples = int | tuple[np.ndarray, np.ndarray]
+
+
+def begin_trial(
+    writer: Any,
+    trial: Trial,
+    samples: Samples | tuple[()],
+    channels: Sequence[ChannelInfo] = CHANNELS,
+    *keeping: SampleRetention,
+) -> Any:
+    """A trial under way: its recorder, which has these samples, or so many."""
+    recorder = writer.begin(trial, *keeping)
+    recorder.start(tuple(channels))
+    if samples != ():
+        recorder.append(*(make_samples(samples) if isinstance(samples, int) else samples))
+    return recorder
+
+
+def record_trial(
+    writer: Any, trial: Trial, samples: Any, *how: Any, ending: Ending | None = None, **more: Any
+) -> Any:
+    """A trial that has ended, as `begin_trial` begins it: its recorder."""
+    recorder = begin_trial(writer, trial, samples, *how)
+    recorder.finish(ending or Ending(Outcome.COMPLETED), STARTED, ENDED, **more)
+    return recorder
+
+
+def python(program: str, *arguments: object, **options: Any) -> subprocess.Popen[str]:
+    """A process that runs a program, which has the makers above as `kit`."""
+    root = str(Path(__file__).parents[2])
+    command = [sys.executable, "-c", f"from tests.archive import conftest as kit\n{program}"]
+    return subprocess.Popen(
+        [*command, *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": root},
+        stdout=subprocess.PIPE,
+        text=True,
+        **options,
+    )
 
 
 @pytest.fixture(scope="session")
@@ -109,6 +172,18 @@ def sealed(sealed_once: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(sealed_once, tmp_path / "results"))
 
 
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 2 MB, where the machine lets us have one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "none", str(disk)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no file system of our own can be mounted")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
 @pytest.fixture(scope="session")
 def kit() -> "type[Kit]":
     """The makers above, for tests: pytest imports no test module by name."""
@@ -118,10 +193,14 @@ def kit() -> "type[Kit]":
 class Kit:
     """Everything a test of the archive builds with."""
 
-    CHANNELS = CHANNELS
+    CHANNELS, RESUMED = CHANNELS, RESUMED
     CREATED, STARTED, ENDED = CREATED, STARTED, ENDED
     trial: Callable[..., Trial] = staticmethod(make_trial)
     header: Callable[..., RunHeader] = staticmethod(make_header)
     samples = staticmethod(make_samples)
+    begin = staticmethod(begin)
     run = staticmethod(write_run)
     record = staticmethod(write_trial)
+    started = staticmethod(begin_trial)
+    recorded = staticmethod(record_trial)
+    python = staticmethod(python)

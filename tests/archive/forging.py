@@ -102,9 +102,8 @@ def change_record(file: h5py.File, entry: str, change: Callable[[dict[str, Any]]
     reseal(file)
 
 
-def put_samples(file: h5py.File, place: str, samples: np.ndarray, **options: Any) -> None:
-    """Put another series where one is, with its attributes, as any program would store it."""
+def put_samples(file: h5py.File, place: str, **made: Any) -> None:
+    """Put a series made some other way where one is, with its attributes."""
     attributes = {k: v for k, v in file[place].attrs.items() if k != "DIMENSION_LIST"}
     del file[place]
-    options = {"chunks": (max(1, len(samples)),), "shuffle": True, "compression": "gzip"} | options
-    file.create_dataset(place, data=samples, **options).attrs.update(attributes)
+    file.create_dataset(place, **made).attrs.update(attributes)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import struct
 
 import h5py
 import numpy as np
@@ -17,16 +15,10 @@ from campaign.archive.layout.checksums import BLOCK, SeriesDigest, series_digest
 from campaign.archive.layout.packed_trial import PackedTrial
 from campaign.archive.reading.series import file_series
 from campaign.archive.writing.packed_file import PackedFile, SampleColumns
+from tests.archive.forging import canonical, sha256
+from tests.archive.forging import series_digest as described
 
 EDGES = [0, 1, 7, 32_767, 32_768, 32_769, 65_536, 100_003]
-
-
-def described(samples: np.ndarray) -> str:
-    """SHA-256 over the SHA-256 of each block of 32 768 little-endian 64-bit floats."""
-    raw = struct.pack(f"<{len(samples)}d", *samples)
-    size = 32_768 * 8
-    blocks = [hashlib.sha256(raw[at : at + size]).digest() for at in range(0, len(raw), size)]
-    return hashlib.sha256(b"".join(blocks)).hexdigest()
 
 
 def noise(count: int) -> np.ndarray:
@@ -99,10 +91,6 @@ def test_columns_tell_the_digest_of_what_was_appended(tmp_path, chunk, count):
 
 def test_a_sealed_run_has_the_digests_that_are_described(tmp_path, kit):
     """From the leaves to the root, with nothing but h5py, hashlib and json."""
-
-    def sha256(text):
-        return hashlib.sha256(text.encode()).hexdigest()
-
     path = kit.run(tmp_path, [50, None, 40_000])
     with h5py.File(path) as file:
         run = file["run"]
@@ -123,8 +111,7 @@ def test_a_sealed_run_has_the_digests_that_are_described(tmp_path, kit):
         assert [entry["record"] for entry in finished] == [sha256(line) for line in lines]
         trees = {}
         for line in map(json.loads, text["trees/data"].splitlines()):
-            canonical = json.dumps(line["tree"], sort_keys=True, separators=(",", ":"))
-            assert line["sha256"] == sha256(canonical)
+            assert line["sha256"] == sha256(canonical(line["tree"]))
             trees[line["sha256"]] = line["tree"]
         for number, record in enumerate(map(json.loads, lines), start=1):
             group = file[f"trial_{number:05d}"]

@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive import RunStatus, open_run
 from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.sound_samples import whole_recording
 from campaign.archive.verification.statement import run_statement
@@ -46,14 +46,9 @@ EFFORTS = ("none", "checksums", "seal")
 @pytest.fixture(scope="module")
 def sealed_once(tmp_path_factory: pytest.TempPathFactory, kit) -> Path:
     """Three trials of 50 samples, the third one at its second attempt; sound; to be copied."""
-    protocol = {"tests": [{"name": "map"}]}
-    header = kit.header(normalised=protocol, fingerprint=sha256(canonical(protocol)))
-    trials = [kit.trial(number) for number in (1, 2, 3)]
-    writer = RunWriter.create(tmp_path_factory.mktemp("sealed"), header, trials)
-    failed = writer.begin(trials[2])
-    failed.start(kit.CHANNELS)
-    failed.append(*kit.samples(50, 99))
-    failed.finish(Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE), kit.STARTED, kit.ENDED)
+    writer, trials = kit.begin(tmp_path_factory.mktemp("sealed"), 3)
+    lost = Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE)
+    kit.recorded(writer, trials[2], kit.samples(50, 99), ending=lost)
     for trial in trials:
         kit.record(writer, trial, 50)
     path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
@@ -233,26 +228,11 @@ def add_to_the_seal(file, rng, put, effort):
 
 
 ACTS = [
-    exchange_channels,
-    exchange_data,
-    exchange_trials,
-    edit_unit,
-    edit_label,
-    scale_samples,
-    stretch_time,
-    remove_trial,
-    add_channel,
-    remove_channel,
-    rename_channel,
-    edit_title,
-    edit_record,
-    edit_index,
-    exchange_records,
-    edit_journal,
-    exchange_digests,
-    edit_bench,
+    exchange_channels, exchange_data, exchange_trials, edit_unit, edit_label, scale_samples,
+    stretch_time, remove_trial, add_channel, remove_channel, rename_channel, edit_title,
+    edit_record, edit_index, exchange_records, edit_journal, exchange_digests, edit_bench,
     add_to_the_seal,
-]
+]  # fmt: skip
 
 
 def committed(path: Path, act: Callable[..., Traces], seed: int, effort: str) -> Traces:

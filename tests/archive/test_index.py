@@ -15,9 +15,7 @@ def results(tmp_path, kit):
     """A sealed run and one in progress."""
     header = {"tests": [{"name": "a", "bench": "tiny"}, {"name": "b", "bench": "tiny"}]}
     kit.run(tmp_path, [10, None], name="2026-11-21T09-00-00-map", **header)
-    trials = [kit.trial(1), kit.trial(2)]
-    writer = RunWriter.create(tmp_path, kit.header("2026-11-22T09-00-00-map"), trials)
-    kit.record(writer, trials[0], 10)
+    writer, _ = kit.begin(tmp_path, 2, [10], name="2026-11-22T09-00-00-map")
     yield tmp_path
     writer.close()
 

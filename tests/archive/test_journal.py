@@ -105,7 +105,9 @@ def test_every_entry_comes_back_with_the_size_of_all() -> None:
 # What a crash leaves
 
 
-@pytest.mark.parametrize("torn", [b'{"event": "trial fin', b"\0\0\0", b"x" * 5000, b"\xff\xfe"])
+@pytest.mark.parametrize(
+    "torn", [b'{"event": "trial fin', b"\0\0\0", b"\xff\xfe", text(ENDED)[:-1]]
+)
 def test_what_follows_the_last_whole_line_was_never_reported(torn: bytes) -> None:
     story = told(STARTED, finished(1), after=torn)
     assert story.entries == (STARTED, finished(1))

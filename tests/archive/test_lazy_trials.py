@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import campaign
-from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive import RunStatus, open_run
 from campaign.archive.layout import journal_summary
 from campaign.archive.reading import sealed_run
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
@@ -25,17 +25,12 @@ FOUND = ArchivedMetrics((Estimate("peak", 0.25, "rad/s", 0.2, 0.3, 0.95, "m"),),
 @pytest.fixture
 def path(tmp_path: Path, kit) -> Path:
     """A run of trials without samples, each measured, one failed."""
-    trials = [kit.trial(number) for number in range(1, TRIALS + 1)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
+    writer, trials = kit.begin(tmp_path, TRIALS)
     for trial in trials:
-        recorder = writer.begin(trial, SampleRetention("none"))
-        recorder.start(kit.CHANNELS)
-        recorder.append(*kit.samples(10, trial.number))
-        ending = Ending(Outcome.COMPLETED)
-        if trial.number == FAILED:
-            ending = Ending(Outcome.LIMIT, "too fast", SafeState.CONFIRMED)
-        recorder.finish(ending, kit.STARTED, kit.ENDED)
-        recorder.measure(lambda archived: FOUND)
+        limit = Ending(Outcome.LIMIT, "too fast", SafeState.CONFIRMED)
+        how = kit.CHANNELS, SampleRetention("none")
+        ending = limit if trial.number == FAILED else None
+        kit.recorded(writer, trial, 10, *how, ending=ending).measure(lambda archived: FOUND)
     return writer.seal(RunStatus.FAILED_TRIALS, ended=kit.ENDED)
 
 

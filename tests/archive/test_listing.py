@@ -16,8 +16,7 @@ from campaign.archive import (
     new_run_name,
     open_run,
 )
-from campaign.archive.layout.journal import read_journal
-from campaign.errors import ArchiveError, UsageError
+from campaign.errors import UsageError
 from campaign.trial import Ending, Outcome
 
 NOW = datetime(2026, 11, 21, 9, 36, 58, tzinfo=UTC)
@@ -53,16 +52,11 @@ def results(tmp_path, kit):
 
 
 def test_a_list_tells_how_each_run_went(results, kit):
-    writer = RunWriter.create(results, kit.header("2026-11-23T09-00-00-map"), [kit.trial(1)])
-    kit.record(writer, kit.trial(1), 10)
+    kit.begin(results, 1, [10], name="2026-11-23T09-00-00-map")
     (results / "2026-11-22T09-00-00-map-report").mkdir()
     listed = list_runs(results)
-    assert [run.name for run in listed] == [
-        "mine",
-        "2026-11-21T09-00-00-map",
-        "2026-11-22T09-00-00-map",
-        "2026-11-23T09-00-00-map",
-    ]
+    days = [f"2026-11-2{day}T09-00-00-map" for day in (1, 2, 3)]
+    assert [run.name for run in listed] == ["mine", *days]
     assert (listed[1].status, listed[1].trials, listed[1].failed) == ("failed trials", 2, 1)
     assert (listed[3].status, listed[3].trials, listed[3].planned) == (RunStatus.INCOMPLETE, 1, 1)
     assert listed[1].bytes == listed[1].path.stat().st_size
@@ -71,10 +65,7 @@ def test_a_list_tells_how_each_run_went(results, kit):
 
 def test_a_trial_that_somebody_stopped_has_not_failed(tmp_path, kit):
     """In the folder of a run as well as in its sealed file."""
-    trials = [kit.trial(number) for number in (1, 2, 3)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    kit.record(writer, trials[0], 10)
-    kit.record(writer, trials[1], None)
+    writer, trials = kit.begin(tmp_path, 3, [10, None])
     writer.begin(trials[2]).finish(Ending(Outcome.INTERRUPTED, "Ctrl-C"), kit.STARTED, kit.ENDED)
 
     def counted():
@@ -116,24 +107,6 @@ def test_what_another_program_recorded_is_to_be_imported(tmp_path, content):
         find_run(tmp_path, str(recorded))
     (tmp_path / "cut.nxs").write_bytes(content)
     assert find_run(tmp_path, str(tmp_path / "cut.nxs")) == tmp_path / "cut.nxs"
-
-
-def test_a_torn_last_line_was_never_reported(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    kit.record(writer, kit.trial(1), 10)
-    path = writer.folder / "journal.jsonl"
-    whole = path.read_bytes()
-    for tail in (b'{"event":"run en', b'{"event":"trial fin\n', b"\0" * 40, b"\0\0\n"):
-        path.write_bytes(whole + tail)
-        story = read_journal(path)
-        assert (list(story.finished), story.ended) == ([1], None)
-        assert story.size == len(whole)
-    path.write_bytes(whole.replace(b"run started", b"run sta?ted"))
-    with pytest.raises(ArchiveError, match=r"journal\.jsonl:1: is not a line"):
-        read_journal(path)
-    path.write_bytes(b"")
-    with pytest.raises(ArchiveError, match="does not begin"):
-        read_journal(path)
 
 
 def test_importing_the_archive_does_not_import_hdf5():

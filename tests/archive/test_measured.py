@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,33 +29,18 @@ FOUND = ArchivedMetrics((TOP, LAST), "campaign 0.1.0")
 CRASH = """
 import os, signal, sys
 from pathlib import Path
-import importlib.util
-spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
-kit = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(kit)
-from campaign.archive import RunWriter
-from campaign.trial import Ending, Outcome
-trials = [kit.make_trial(1), kit.make_trial(2)]
-writer = RunWriter.create(Path(sys.argv[2]), kit.make_header(fingerprint="", normalised={}), trials)
-recorder = writer.begin(trials[0])
-recorder.start(kit.CHANNELS)
-recorder.append(*kit.make_samples(500))
-recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+writer, trials = kit.begin(Path(sys.argv[1]), 2)
+recorder = kit.record_trial(writer, trials[0], 500)
 recorder.measure(lambda archived: os.kill(os.getpid(), signal.SIGKILL))
 """
 
 
-def begun(folder: Path, kit, count: int = 2) -> RunWriter:
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    return RunWriter.create(folder, kit.header(fingerprint="", normalised={}), trials)
+def begun(folder: Path, kit) -> RunWriter:
+    return kit.begin(folder, 2)[0]
 
 
 def finish(writer: RunWriter, kit, number: int = 1):
-    recorder = writer.begin(kit.trial(number))
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(500))
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    return recorder
+    return kit.recorded(writer, kit.trial(number), 500)
 
 
 def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None:
@@ -83,13 +66,12 @@ def test_whoever_measures_reads_what_is_on_the_disk(tmp_path: Path, kit) -> None
 
 @pytest.mark.slow
 def test_a_program_that_dies_while_it_measures_has_lost_no_recording(tmp_path: Path, kit) -> None:
-    script = str(Path(__file__).with_name("conftest.py"))
-    ended = subprocess.run([sys.executable, "-c", CRASH, script, str(tmp_path)], check=False)
-    assert ended.returncode == -signal.SIGKILL
+    child = kit.python(CRASH, tmp_path)
+    child.communicate()
+    assert child.returncode == -signal.SIGKILL
     (folder,) = tmp_path.glob("*.partial")
     assert verify_run(folder).sound
-    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": ()}
-    writer = RunWriter.resume(folder, **told)
+    writer = RunWriter.resume(folder, **kit.RESUMED)
     assert writer.finished == {1: Outcome.COMPLETED}  # so it is not executed again
     (trial,) = open_run(writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)).trials
     assert trial.recording()["gyro_rate"].tobytes() == kit.samples(500)[1][1].tobytes()
@@ -123,8 +105,7 @@ def test_metrics_are_the_same_in_folder_file_and_resumed_run(tmp_path: Path, kit
     check(run.trials[0])
     assert run.earlier_attempts[1][0].estimates == FOUND.estimates
     assert verify_run(sealed).sound
-    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": ()}
-    resumed = RunWriter.resume(sealed, **told)
+    resumed = RunWriter.resume(sealed, **kit.RESUMED)
     check(resumed.archived(1))
     again = resumed.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     check(open_run(again).trials[0])
@@ -137,11 +118,8 @@ def test_a_reason_that_an_older_journal_has_in_words_is_read(tmp_path: Path, kit
     journal = writer.folder / JOURNAL
     *first, line = journal.read_text(encoding="utf-8").splitlines()
     measured = json.loads(line)
-    now = {
-        "code": "few samples",
-        "text": "1 samples in 2 s",
-        "values": [["samples", 1], ["time", 2.0], ["all_of_it", True]],
-    }
+    values = [["samples", 1], ["time", 2.0], ["all_of_it", True]]
+    now = {"code": "few samples", "text": "1 samples in 2 s", "values": values}
     assert measured["estimates"][1].pop("reason") == now
     measured["estimates"][1]["reason"] = "one sample"
     journal.write_text("\n".join((*first, json.dumps(measured), "")), encoding="utf-8")
@@ -225,8 +203,7 @@ def test_samples_that_are_not_kept_are_measured_before_they_go(tmp_path: Path, k
         return FOUND
 
     writer = begun(tmp_path, kit)
-    dropped = writer.begin(kit.trial(1), SampleRetention("none"))
-    dropped.start(kit.CHANNELS)
+    dropped = kit.started(writer, kit.trial(1), (), kit.CHANNELS, SampleRetention("none"))
     for part in (slice(0, 4000), slice(4000, 9000)):
         dropped.append(time[part], block[:, part])
     dropped.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)

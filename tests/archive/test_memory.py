@@ -17,9 +17,7 @@ from campaign.archive.writing.long_text import SHORT
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
 from campaign.recording import Ending, Event, Outcome
-from tests.archive.forging import canonical, sha256
 
-PROTOCOL = {"tests": [{"name": "map"}]}
 FEW = 40
 LONG = 40_000
 """Characters of a record; the journal's lines have none of them."""
@@ -27,13 +25,10 @@ LONG = 40_000
 
 def begun(folder: Path, kit, count: int) -> RunWriter:
     """A run in which so many trials without samples were recorded."""
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
-    writer = RunWriter.create(folder, header, trials)
+    writer, trials = kit.begin(folder, count)
     for trial in trials:
-        recorder = writer.begin(trial, SampleRetention("none"))
-        recorder.start(kit.CHANNELS)
-        recorder.append(*kit.samples(10, trial.number))
+        samples = kit.samples(10, trial.number)
+        recorder = kit.started(writer, trial, samples, kit.CHANNELS, SampleRetention("none"))
         recorder.event(Event(0.0, "x" * LONG))
         recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
     return writer

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from campaign.archive import RunWriter
-
 pytest.importorskip("resource", reason="limits the child's memory, which only Unix can")
 
 
@@ -15,21 +13,14 @@ pytest.importorskip("resource", reason="limits the child's memory, which only Un
 def archives(tmp_path, kit):
     """A sealed run and a killed one."""
     kit.run(tmp_path, [50, None, 300], name="run")
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header("killed"), trials)
-    for trial in trials:
-        kit.record(writer, trial, 40)
+    kit.begin(tmp_path, 2, [40] * 2, name="killed")
     return tmp_path
 
 
 def mutations(folder: Path, count: int, seed: int) -> dict[str, int]:
     script = Path(__file__).with_name("mutations.py")
-    done = subprocess.run(
-        [sys.executable, str(script), str(folder), str(count), str(seed)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, str(script), str(folder), str(count), str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"exit {done.returncode}: {done.stderr[-2000:]}"
     return {kind: int(n) for kind, n in (pair.split("=") for pair in done.stdout.split())}
 

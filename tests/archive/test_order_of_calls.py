@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +21,9 @@ from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.estimate import Estimate
 from campaign.reason import Reason
-from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
+from campaign.recording import ChannelInfo
 from campaign.trial import Trial
+from tests.archive.conftest import record_trial
 from tests.archive.recorded_calls import Call, Calls, recorded
 from tests.archives import _header, plan_of
 
@@ -45,15 +47,10 @@ def end_of(calls: Calls) -> int:
     return len(calls.listed)
 
 
-def finish_one(writer: RunWriter, trial: Trial) -> Calls:
-    """Record a short trial; the calls from its beginning until `finish` has returned."""
-    with recorded() as calls:
-        recorder = writer.begin(trial)
-        recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
-        recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
-        ending = Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED)
-        recorder.finish(ending, AT, AT)
-    return calls
+def finish(writer: RunWriter | FolderWriter, trial: Trial) -> Any:
+    """Record a short trial, from its beginning until `finish` has returned: its recorder."""
+    rate = ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s")
+    return record_trial(writer, trial, (np.arange(10) / 10.0, np.zeros((1, 10))), [rate])
 
 
 def test_a_trial_is_on_the_disk_before_the_journal_says_so(
@@ -62,7 +59,8 @@ def test_a_trial_is_on_the_disk_before_the_journal_says_so(
     """Content, then the name, then the folder, then the line, synced before `finish` ends."""
     writer = begun(tmp_path, trials)
     folder, journal = writer.folder, writer.folder / JOURNAL
-    calls = finish_one(writer, trials[0])
+    with recorded() as calls:
+        finish(writer, trials[0])
     writer.close()
     final = folder / "trial-00001.trial"
     part = final.with_name(final.name + PART)
@@ -84,10 +82,7 @@ def test_trials_of_a_batch_are_on_the_disk_before_their_lines_are_handed_over(
     writer = FolderWriter(tmp_path, {trial.number: 1 for trial in trials[:2]})
     with recorded() as calls:
         for trial in trials[:2]:
-            recorder = writer.begin(trial)
-            recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
-            recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
-            recorder.finish(Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED), AT, AT)
+            finish(writer, trial)
         before = end_of(calls)
         writer.publish()
     assert [call.name for call in calls.listed[:before] if call.name != "write"] == []
@@ -113,10 +108,7 @@ def test_a_trial_is_reported_before_it_is_measured(
     )
     before: list[int] = []
     with recorded() as calls:
-        recorder = writer.begin(trials[0])
-        recorder.start((ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s"),))
-        recorder.append(np.arange(10) / 10.0, np.zeros((1, 10)))
-        recorder.finish(Ending(Outcome.COMPLETED, "", SafeState.CONFIRMED), AT, AT)
+        recorder = finish(writer, trials[0])
 
         def measure(archived: ArchivedTrial) -> ArchivedMetrics:
             before.append(end_of(calls))

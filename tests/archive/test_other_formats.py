@@ -12,11 +12,10 @@ from campaign.archive.reading.summary import summarise
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError, ExitCode
+from tests.archive.conftest import RESUMED
 from tests.archive.forging import put_integer
 from tests.archive.test_kept import KEPT
 from tests.system.user import campaign
-
-RESUMED = {"at": "2026-11-23T08:00:00+00:00", "host": {}, "versions": {}, "command": ()}
 
 
 def made(folder: Path, name: str, version: int) -> Path:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.archive import ArchivedTrial, RunWriter, open_run
+from campaign.archive import ArchivedTrial, open_run
 from campaign.archive.layout.journal import read_journal
 from campaign.archive.reading.folder import read_trial_file
 from campaign.archive.reading.packed_trial_reader import read_packed
@@ -19,16 +19,13 @@ from campaign.archive.writing.packed_file import copy_packed
 from campaign.archive.writing.sealed_file import SealedFile
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.errors import ArchiveError
-from campaign.recording import Ending, Outcome
 
 COUNT = 70_000  # two chunks and a part of one, and a preview
 
 
 @pytest.fixture
 def writer(tmp_path, kit):
-    trial = kit.trial(1)
-    writer = RunWriter.create(tmp_path, kit.header(), [trial])
-    kit.record(writer, trial, COUNT)
+    writer, _ = kit.begin(tmp_path, 1, [COUNT])
     yield writer
     writer.close()
 
@@ -220,10 +217,7 @@ def test_a_trial_without_one_of_its_parts_is_not_sealed(tmp_path, writer, path, 
 def test_a_batch_that_cannot_be_published_leaves_no_file(tmp_path, kit, monkeypatch):
     writer = FolderWriter(tmp_path, {1: 1, 2: 1})
     for number in (1, 2):
-        recorder = writer.begin(kit.trial(number))
-        recorder.start(kit.CHANNELS)
-        recorder.append(*kit.samples(10))
-        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+        kit.recorded(writer, kit.trial(number), 10)
 
     def full(files):
         raise OSError(28, "No space left on device")

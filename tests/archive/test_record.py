@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive import RunStatus, open_run
 from campaign.archive.layout.record import (
     PreviewRecord,
     SeriesRecord,
@@ -50,19 +50,12 @@ def record(kit) -> TrialRecord:
         SeriesRecord.of(ChannelInfo("gyro_rate", "rad/s", "Rate", "deg/s", True, 8000.0), "1" * 64),
         SeriesRecord.of(ChannelInfo("torque", "N m", "Torque", "N m", False), "2" * 64),
     ]
+    preview = PreviewRecord(channel="gyro_rate", samples=20_000, time="3" * 64, values="4" * 64)
     return make_record(
-        described,
-        kit.trial(7).label,
-        kit.trial(7).fingerprint,
-        3,
-        ENDING,
-        (kit.STARTED, kit.ENDED),
-        [Event(np.float64(0.25), "the load breaks away ↗")],
-        series=(40_000, "0" * 64, channels),
-        preview=PreviewRecord(channel="gyro_rate", samples=20_000, time="3" * 64, values="4" * 64),
-        windows=WINDOWS,
-        estimates=ESTIMATES,
-    )
+        described, kit.trial(7).label, kit.trial(7).fingerprint, 3, ENDING,
+        (kit.STARTED, kit.ENDED), [Event(np.float64(0.25), "the load breaks away ↗")],
+        series=(40_000, "0" * 64, channels), preview=preview, windows=WINDOWS, estimates=ESTIMATES,
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -73,12 +66,6 @@ def least(kit) -> TrialRecord:
     ending = Ending(Outcome.COMPLETED)
     times = (kit.STARTED, kit.ENDED)
     return make_record(described, trial.label, trial.fingerprint, 1, ending, times, [], series=None)
-
-
-def test_a_reason_keeps_its_code_and_values(record):
-    again = TrialRecord.model_validate_json(record.text).estimates[1].reason
-    assert again in FEW
-    assert dict(again.values) == {"runs": 1, "within": 2.0}
 
 
 def test_a_reason_of_an_older_archive_is_its_text(record):
@@ -152,13 +139,8 @@ def test_a_record_of_a_later_program_is_read(record):
 
 
 def test_windows_and_estimates_come_back_from_a_folder_and_from_a_sealed_run(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    recorder = writer.begin(kit.trial(1))
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(100))
-    recorder.finish(
-        Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED, windows=WINDOWS, estimates=ESTIMATES
-    )
+    writer, trials = kit.begin(tmp_path, 1)
+    kit.recorded(writer, trials[0], 100, windows=WINDOWS, estimates=ESTIMATES)
     for look in (lambda: writer.folder, lambda: writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)):
         (archived,) = open_run(look()).trials
         assert archived.windows == WINDOWS
@@ -166,14 +148,9 @@ def test_windows_and_estimates_come_back_from_a_folder_and_from_a_sealed_run(tmp
 
 
 def test_samples_that_were_not_kept_have_their_digests_and_say_why(tmp_path, kit):
-    trials = [kit.trial(1), kit.trial(2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], SampleRetention("none"))
-    recorder.start(kit.CHANNELS)
-    time, block = kit.samples(100)
-    recorder.append(time, block)
-    recorder.event(Event(0.05, "contact"))
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED, estimates=ESTIMATES)
+    writer, trials = kit.begin(tmp_path, 2)
+    how = kit.CHANNELS, SampleRetention("none")
+    kit.recorded(writer, trials[0], 100, *how, estimates=ESTIMATES)
     kit.record(writer, trials[1], 10)
     for look in (lambda: writer.folder, lambda: writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)):
         run = open_run(look())
@@ -210,53 +187,23 @@ def test_a_record_is_written_as_the_format_says(record, kit):
         "samples": 40_000,
         "time": "0" * 64,
         "channels": [
-            {
-                "name": "gyro_rate",
-                "unit": "rad/s",
-                "label": "Rate",
-                "display_unit": "deg/s",
-                "own_rate": 8000.0,
-                "sha256": "1" * 64,
-            },
-            {
-                "name": "torque",
-                "unit": "N m",
-                "label": "Torque",
-                "display_unit": "N m",
-                "measured": False,
-                "sha256": "2" * 64,
-            },
+            {"name": "gyro_rate", "unit": "rad/s", "label": "Rate", "display_unit": "deg/s",
+             "own_rate": 8000.0, "sha256": "1" * 64},
+            {"name": "torque", "unit": "N m", "label": "Torque", "display_unit": "N m",
+             "measured": False, "sha256": "2" * 64},
         ],
-        "preview": {
-            "channel": "gyro_rate",
-            "samples": 20_000,
-            "time": "3" * 64,
-            "values": "4" * 64,
-        },
+        "preview": {"channel": "gyro_rate", "samples": 20_000, "time": "3" * 64,
+                    "values": "4" * 64},
         "events": [{"time": 0.25, "text": "the load breaks away ↗"}],
         "windows": [{"name": "steady", "start": 0.5, "stop": 1.75}],
         "estimates": [
-            {
-                "name": "coulomb_torque",
-                "value": 0.25,
-                "unit": "N m",
-                "low": 0.2,
-                "high": 0.3,
-                "level": 0.95,
-                "method": "bootstrap",
-            },
-            {
-                "name": "stribeck_rate",
-                "value": 5e-324,
-                "unit": "rad/s",
-                "reason": {
-                    "code": "too few runs",
-                    "text": "1 run in 2 s",
-                    "values": [["runs", 1], ["within", 2.0]],
-                },
-            },
+            {"name": "coulomb_torque", "value": 0.25, "unit": "N m", "low": 0.2, "high": 0.3,
+             "level": 0.95, "method": "bootstrap"},
+            {"name": "stribeck_rate", "value": 5e-324, "unit": "rad/s",
+             "reason": {"code": "too few runs", "text": "1 run in 2 s",
+                        "values": [["runs", 1], ["within", 2.0]]}},
         ],
-    }
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -290,25 +237,14 @@ class _Odd:
 @pytest.mark.parametrize(
     ("value", "told"),
     [
-        (None, None),
-        (True, True),
-        (np.bool_(True), True),
-        (3, 3),
-        (np.int32(3), 3),
-        (0.5, 0.5),
-        (np.float32(0.5), 0.5),
-        (float("inf"), "inf"),
-        (np.float64("-inf"), "-inf"),
-        ("text", "text"),
-        (np.str_("text"), "text"),
-        ((1, [2.0, None]), [1, [2.0, None]]),
+        (None, None), (True, True), (np.bool_(True), True), (3, 3), (np.int32(3), 3), (0.5, 0.5),
+        (np.float32(0.5), 0.5), (float("inf"), "inf"), (np.float64("-inf"), "-inf"),
+        ("text", "text"), (np.str_("text"), "text"), ((1, [2.0, None]), [1, [2.0, None]]),
         (np.array([[1, 2], [3, 4]]), [[1, 2], [3, 4]]),
-        ({1: {"a": (np.nan,)}}, {"1": {"a": ["nan"]}}),
-        (_Odd(), "odd"),
-        (b"bytes", "b'bytes'"),
+        ({1: {"a": (np.nan,)}}, {"1": {"a": ["nan"]}}), (_Odd(), "odd"), (b"bytes", "b'bytes'"),
         ({"a"}, "{'a'}"),
     ],
-)
+)  # fmt: skip
 def test_whatever_a_backend_measured_of_itself_becomes_json(value, told):
     found = plain(value)
     assert found == told

@@ -19,30 +19,14 @@ from nexusformat.nexus import nxload
 
 from campaign.archive import find_run, list_runs, open_run
 from campaign.archive.layout.files import sha256_of
-from campaign.archive.layout.results import (
-    ENTRY,
-    HASH,
-    ResultsOfTest,
-    RunResults,
-    results_path,
-)
+from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults, results_path
 from campaign.archive.layout.results_text import from_text, to_text
 from campaign.archive.reading.results_file import read_results
 from campaign.archive.writing.results_file import write_results
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
-from campaign.result import (
-    Axis,
-    Column,
-    Curve,
-    Figure,
-    Finding,
-    Mark,
-    Panel,
-    Result,
-    Table,
-)
+from campaign.result import Axis, Column, Curve, Figure, Finding, Mark, Panel, Result, Table
 from tests.archive.recorded_calls import recorded
 from tests.archive.test_nexus import nxcheck
 
@@ -89,25 +73,13 @@ def table() -> Table:
         Column("mixed", "Mixed"),
         Column("row", "Row"),
     )
+    shares = (Systematic("gain", 0.1), Systematic("x"))
+    alone = estimate(6.0, None, reason=ALONE(count=1), systematic=shares)
+    not_determined = Estimate("c", math.nan, "N m", origin=Origin.NOT_DETERMINED)
     rows = (
         {"direction": "up", "speed": 1.0, "torque": estimate(5.0), "mixed": True, "row": 1},
-        {
-            "direction": "down ↘",
-            "speed": 2,
-            "torque": estimate(
-                6.0,
-                None,
-                reason=ALONE(count=1),
-                systematic=(Systematic("gain", 0.1), Systematic("x")),
-            ),
-            "mixed": "x",
-            "row": None,
-        },
-        {
-            "speed": math.inf,
-            "torque": Estimate("c", math.nan, "N m", origin=Origin.NOT_DETERMINED),
-            "mixed": -0.1,
-        },
+        {"direction": "down ↘", "speed": 2, "torque": alone, "mixed": "x", "row": None},
+        {"speed": math.inf, "torque": not_determined, "mixed": -0.1},
     )
     return Table("parameters", "Parameters", columns, rows, ("5.2",), "A note.")
 
@@ -124,17 +96,9 @@ def results(**fields: object) -> RunResults:
         ResultsOfTest("broken", "breakaway", "Broken", Result(), problem="it failed"),
     )
     found = RunResults(
-        NAME,
-        f"{NAME}.nxs",
-        ROOT,
-        "2026-11-21T09:40:00Z",
-        "0.1.0",
-        "cd" * 32,
-        tests,
-        damaged=("trial 3",),
-        published=table(),
-        telling=("map", "the-map"),
-    )
+        NAME, f"{NAME}.nxs", ROOT, "2026-11-21T09:40:00Z", "0.1.0", "cd" * 32, tests,
+        damaged=("trial 3",), published=table(), telling=("map", "the-map"),
+    )  # fmt: skip
     return replace(found, **fields)
 
 
@@ -376,16 +340,11 @@ def test_a_link_in_place_of_an_array_is_not_followed(run, kind, tmp_path):
 @pytest.mark.parametrize(
     "text",
     [
-        '{"$is":"Path","args":["/etc/passwd"]}',
-        '{"$is":"TypeAdapter"}',
-        '{"$is":"Estimate","name":"x","value":"much","unit":"m"}',
-        '{"$is":"RunResults"}',
-        '{"$is":"Column","name":"x","label":"x"}',
-        "[]",
-        "{",
-        '{"$array":"a/b/c"}',
+        '{"$is":"Path","args":["/etc/passwd"]}', '{"$is":"TypeAdapter"}',
+        '{"$is":"Estimate","name":"x","value":"much","unit":"m"}', '{"$is":"RunResults"}',
+        '{"$is":"Column","name":"x","label":"x"}', "[]", "{", '{"$array":"a/b/c"}',
     ],
-)
+)  # fmt: skip
 def test_a_text_makes_results_and_nothing_else(text):
     def array(place: str) -> np.ndarray:
         raise LookupError(place)

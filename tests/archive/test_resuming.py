@@ -24,9 +24,9 @@ from campaign.archive.layout.journal import (
 )
 from campaign.errors import ArchiveError, UsageError
 from campaign.recording import Ending, Fault, Outcome, SafeState
+from tests.archive.conftest import RESUMED
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "developers" / "archive-format.md"
-RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {"name": "other"}, "versions": {}, "command": []}
 
 
 def content(path):
@@ -71,13 +71,9 @@ def documented_differences():
 
 def begin(results, kit, count=5, **fields):
     """A run and its trials; the first one is finished, the second was interrupted."""
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    writer = RunWriter.create(results, kit.header(**fields), trials)
-    kit.record(writer, trials[0], 300)
-    recorder = writer.begin(trials[1])
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(40, 2))
-    recorder.finish(Ending(Outcome.INTERRUPTED, "Ctrl-C"), kit.STARTED, kit.ENDED)
+    writer, trials = kit.begin(results, count, [300], **fields)
+    stopped = Ending(Outcome.INTERRUPTED, "Ctrl-C")
+    kit.recorded(writer, trials[1], kit.samples(40, 2), ending=stopped)
     return writer, trials
 
 
@@ -95,9 +91,7 @@ def finish(writer, trials, kit, status=RunStatus.COMPLETE):
 
 
 def uninterrupted(results, kit, count=5, **fields):
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    writer = RunWriter.create(results, kit.header(**fields), trials)
-    return finish(writer, trials, kit)
+    return finish(*kit.begin(results, count, **fields), kit)
 
 
 @pytest.mark.parametrize("how", ["sealed", "killed", "twice"])
@@ -127,14 +121,6 @@ def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path, kit, how):
     assert any(path.endswith("@DIMENSION_LIST") for path in expected)
 
 
-def test_a_run_that_is_gone_on_with_has_not_ended(tmp_path, kit):
-    path, _ = interrupted(tmp_path, kit)
-    writer = RunWriter.resume(path, **RESUMED)
-    assert open_run(writer.folder).status is RunStatus.INCOMPLETE
-    writer.close()
-    assert open_run(writer.folder).status is RunStatus.INCOMPLETE
-
-
 def test_earlier_attempts_are_kept_and_only_the_last_is_analysed(tmp_path, kit):
     path, trials = interrupted(tmp_path, kit)
     writer = RunWriter.resume(path, **RESUMED)
@@ -157,10 +143,8 @@ def test_earlier_attempts_are_kept_and_only_the_last_is_analysed(tmp_path, kit):
         assert first.ending == Ending(Outcome.INTERRUPTED, "Ctrl-C")
         assert len(first.recording().time) == 40
         assert second.ending.fault is Fault.LOST_CONNECTION
-        assert second.ending.telemetry == {
-            "latency_ms": {"most": 4.5, "mean": "nan"},
-            "resends": 3,
-        }
+        latency = {"most": 4.5, "mean": "nan"}
+        assert second.ending.telemetry == {"latency_ms": latency, "resends": 3}
         assert run.problems() == []
     assert [archived.trial.number for archived in run.trials] == [1, 2, 3, 4, 5]
     with h5py.File(run.path) as file:
@@ -172,8 +156,7 @@ def test_every_planned_trial_can_be_executed_from_the_archive(tmp_path, kit):
     bench = {"name": "other", "list": [1, 1.0, None, True], "deep": {"x": 5e-324}}
     trials = [kit.trial(1), kit.trial(2), kit.trial(3).model_copy(update={"bench": bench})]
     trials[1] = trials[1].model_copy(update={"options": {"speed": 0.1}, "setup": ("Preload",)})
-    writer = RunWriter.create(tmp_path, kit.header(seed=7, protocol_path="/lab/x.toml"), trials)
-    kit.record(writer, trials[0], 10)
+    writer, _ = kit.begin(tmp_path, trials, [10], seed=7, protocol_path="/lab/x.toml")
     trees = (writer.folder / "plan-trees.jsonl").read_text().splitlines()
     assert len(trees) == 4  # two benches, and options with and without something in them
 
@@ -207,10 +190,8 @@ def test_the_journal_tells_of_decisions_steps_and_the_resume(tmp_path, kit):
     kinds = [type(entry).__name__ for entry in read_journal(writer.folder / JOURNAL).entries]
     assert kinds[-4:] == ["Decision", "OperatorStep", "RunEnded", "RunResumed"]
     run = open_run(writer.folder)
-    assert (run.status, run.reason) == (
-        RunStatus.INCOMPLETE,
-        "the run is in progress or was killed",
-    )
+    reason = "the run is in progress or was killed"
+    assert (run.status, run.reason) == (RunStatus.INCOMPLETE, reason)
     entries = read_journal(writer.folder / JOURNAL).entries
     assert entries[-1] == RunResumed(**RESUMED, changes=("versions.numpy: 2.0 → 2.1",))
     assert Decision(at=kit.ENDED, trial=2, decision="skip", reason="the limit switch") in entries
@@ -296,18 +277,14 @@ def test_one_process_at_a_time_writes_a_run(tmp_path, kit):
 
 # Resumes and seals a run again and again, a few trials at a time, until it is killed.
 WEAR = """
-import importlib.util, sys
+import sys
 from pathlib import Path
-spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
-kit = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(kit)
 from campaign.archive import RunStatus, RunWriter, find_run
-results = Path(sys.argv[2])
+results = Path(sys.argv[1])
 trials = [kit.make_trial(number) for number in range(1, 1001)]
-told = dict(at=kit.ENDED, host={}, versions={}, command=())
 print("ready", flush=True)
 while True:
-    writer = RunWriter.resume(find_run(results), **told)
+    writer = RunWriter.resume(find_run(results), **kit.RESUMED)
     for number in range(len(writer.finished) + 1, len(writer.finished) + 4):
         kit.write_trial(writer, trials[number - 1], 37 * number)
         print("finished", number, flush=True)
@@ -317,13 +294,10 @@ while True:
 
 def kill_again_and_again(results, kit, kills, seed):
     """Kill a program that resumes and seals, `kills` times; nothing reported is ever missing."""
-    trials = [kit.trial(number) for number in range(1, 1001)]
-    RunWriter.create(results, kit.header(), trials).close()
-    kit_path = str(Path(__file__).with_name("conftest.py"))
-    command = [sys.executable, "-c", WEAR, kit_path, str(results)]
+    kit.begin(results, 1000)[0].close()
     reported, moments = set(), random.Random(seed)
     for _ in range(kills):
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        child = kit.python(WEAR, results)
         assert child.stdout.readline() == "ready\n"
         time.sleep(moments.uniform(0, 0.4))
         child.kill()
@@ -353,16 +327,12 @@ def test_two_hundred_kills_while_resuming_or_sealing_lose_nothing(tmp_path, kit)
 
 # Ends itself, as a kill does, before its n-th operation on a file, for every n there is.
 STEPS = """
-import importlib.util, json, os, shutil, sys
+import json, os, shutil, sys
 from pathlib import Path
-spec = importlib.util.spec_from_file_location("kit", sys.argv[1])
-kit = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(kit)
 from campaign.archive import RunStatus, RunWriter, find_run, list_runs, open_run
 from campaign.archive.writing import seal_run
 from campaign.archive.writing import unseal_run
-template, results = Path(sys.argv[2]), Path(sys.argv[3])
-told = dict(at=kit.ENDED, host={}, versions={}, command=())
+template, results = Path(sys.argv[1]), Path(sys.argv[2])
 seen, limit = 0, 0
 
 def hook(event, arguments):
@@ -374,7 +344,7 @@ def hook(event, arguments):
                 os._exit(9)
 
 def go_on(path):
-    writer = RunWriter.resume(path, **told)
+    writer = RunWriter.resume(path, **kit.RESUMED)
     if 2 not in writer.finished:
         kit.write_trial(writer, kit.make_trial(2), 90)
         os.write(1, b"")
@@ -408,32 +378,13 @@ print(limit)
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_kill_before_any_single_step_loses_nothing(tmp_path, kit):
-    trials = [kit.trial(1), kit.trial(2)]
-    writer = RunWriter.create(tmp_path / "template", kit.header(), trials)
-    kit.record(writer, trials[0], 50)
+    writer, _ = kit.begin(tmp_path / "template", 2, [50])
     writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
-    kit_path = str(Path(__file__).with_name("conftest.py"))
-    places = [str(tmp_path / "template"), str(tmp_path / "results")]
-    done = subprocess.run(
-        [sys.executable, "-c", STEPS, kit_path, *places],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 40
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 2 MB, where the machine lets us have one."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "none", str(disk)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip("no file system of our own can be mounted")
-    yield disk
-    subprocess.run(["umount", str(disk)], check=True)
+    places = tmp_path / "template", tmp_path / "results"
+    child = kit.python(STEPS, *places, stderr=subprocess.PIPE)
+    out, errors = child.communicate()
+    assert child.returncode == 0, errors
+    assert int(out) > 40
 
 
 def fill_up(path, trials, kit):
@@ -516,9 +467,7 @@ def test_twenty_minutes_take_no_more_memory_than_two(tmp_path):
 def test_a_folder_beside_a_damaged_sealed_file_is_left_alone(tmp_path, kit):
     """Killed between the two, the program leaves both; should the file be damaged since, the folder
     has the run."""
-    trials = [kit.trial(1), kit.trial(2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    kit.record(writer, trials[0], 50)
+    writer, _ = kit.begin(tmp_path, 2, [50])
     folder = writer.folder
     shutil.copytree(folder, tmp_path / "copy")
     sealed = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)

@@ -3,13 +3,12 @@
 import shutil
 import subprocess
 import time
-import zlib
 
 import h5py
 import numpy as np
 import pytest
 
-from campaign.archive import RunStatus, RunWriter, open_run
+from campaign.archive import RunStatus, open_run
 from campaign.archive.layout.storage import CHUNK
 from campaign.archive.writing.preview import PREVIEW_POINTS
 from campaign.recording import Ending, Outcome, SafeState
@@ -63,9 +62,8 @@ def test_nothing_but_the_file_is_left_when_it_is_sealed(tmp_path, kit):
 
 
 def test_an_unfinished_run_opens_with_what_was_finished(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1), kit.trial(2)])
-    kit.record(writer, kit.trial(1), 40)
-    writer.begin(kit.trial(2)).start(kit.CHANNELS)
+    writer, trials = kit.begin(tmp_path, 2, [40])
+    writer.begin(trials[1]).start(kit.CHANNELS)
     run = open_run(writer.folder)
     assert run.status is RunStatus.INCOMPLETE
     assert run.safe_state is SafeState.NOT_CONFIRMED
@@ -75,12 +73,9 @@ def test_an_unfinished_run_opens_with_what_was_finished(tmp_path, kit):
 
 
 def test_an_interrupted_run_is_sealed_without_its_open_trial(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1), kit.trial(2)])
-    kit.record(writer, kit.trial(1), 40)
-    writer.begin(kit.trial(2)).start(kit.CHANNELS)
-    path = writer.seal(
-        RunStatus.INTERRUPTED, "Ctrl-C", SafeState.NOT_CONFIRMED, ended="2026-11-21T09:40:00Z"
-    )
+    writer, trials = kit.begin(tmp_path, 2, [40])
+    writer.begin(trials[1]).start(kit.CHANNELS)
+    path = writer.seal(RunStatus.INTERRUPTED, "Ctrl-C", SafeState.NOT_CONFIRMED, ended=kit.ENDED)
     run = open_run(path)
     assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "Ctrl-C")
     assert run.safe_state is SafeState.NOT_CONFIRMED
@@ -124,11 +119,6 @@ def test_the_default_plot_is_found_by_following_the_file(sealed):
             assert data[name].shape == axis.shape
 
 
-def test_the_root_opens_on_the_first_completed_trial(tmp_path, kit):
-    with h5py.File(kit.run(tmp_path, [None, 30, 40])) as file:
-        assert file.attrs["default"] == "trial_00002"
-
-
 def test_sources_lie_in_the_file_verbatim(sealed, kit):
     with h5py.File(sealed) as file:
         notes = [file["run"][name] for name in file["run"] if name.startswith("source")]
@@ -137,61 +127,38 @@ def test_sources_lie_in_the_file_verbatim(sealed, kit):
         assert {note["type"][()] for note in notes} == {b"application/toml"}
 
 
-def test_chunks_are_what_zlib_and_a_shuffle_undo(tmp_path, kit):
-    """Read the raw chunks without HDF5's filters, as the format's description says."""
-    path = kit.run(tmp_path, [CHUNK + 5])
-    with h5py.File(path) as file:
-        dataset = file["trial_00001/data/gyro_rate"]
-        parts = []
-        for start in (0, CHUNK):
-            mask, packed = dataset.id.read_direct_chunk((start,))
-            assert mask == 0
-            plain = np.frombuffer(zlib.decompress(packed), np.uint8)
-            parts.append(plain.reshape(8, -1).T.tobytes())
-        samples = np.frombuffer(b"".join(parts), "<f8")[: CHUNK + 5]
-    assert equal_bits(samples, kit.samples(CHUNK + 5)[1][1])
+def sealed_samples(results, kit, times, block):
+    writer, trials = kit.begin(results, 1)
+    kit.recorded(writer, trials[0], (times, np.stack(block)))
+    return writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
 
 
 def test_values_of_a_converter_are_stored_whole_and_others_shuffled(tmp_path, kit):
     """Few values that come again and again are smaller unshuffled; noise and waves are not."""
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    recorder = writer.begin(kit.trial(1))
-    recorder.start(kit.CHANNELS)
     times = np.arange(6000) / 1000.0
     noise = np.random.default_rng(3).normal(size=6000)
     counts = np.round(300 * noise) * (np.pi / 2**23)
-    recorder.append(times, np.stack((np.sin(times), counts, noise)))
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
-    with h5py.File(path) as file:
+    with h5py.File(sealed_samples(tmp_path, kit, times, (np.sin(times), counts, noise))) as file:
         data = file["trial_00001/data"]
-        assert [data[name].shuffle for name in ("command", "gyro_rate", "friction_torque")] == [
-            True,
-            False,
-            True,
-        ]
+        shuffled = [data[name].shuffle for name in ("command", "gyro_rate", "friction_torque")]
+        assert shuffled == [True, False, True]
         assert data["gyro_rate"].id.get_storage_size() < 6000 * 4
         assert equal_bits(data["gyro_rate"][:], counts)
 
 
 def test_a_long_recording_opens_on_a_preview_that_misses_no_peak(tmp_path, kit):
     count = 5 * CHUNK
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    recorder = writer.begin(kit.trial(1))
-    recorder.start(kit.CHANNELS)
-    times = np.arange(count) / 1000.0
     block = np.zeros((3, count))
     block[1, [12_345, 70_001]] = [9.0, -7.0]
-    recorder.append(times, block)
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
-    with h5py.File(path) as file:
-        entry = file["trial_00001"]
+    with h5py.File(sealed_samples(tmp_path, kit, np.arange(count) / 1000.0, block)) as file:
+        entry = file[file.attrs["default"]]
+        plotted = entry[entry.attrs["default"]]
+        assert (plotted.attrs["signal"], *plotted.attrs["axes"]) == ("gyro_rate", "time")
         assert entry.attrs["default"] == "preview"
         shown, at = entry["preview/gyro_rate"][:], entry["preview/time"][:]
         assert entry["preview/gyro_rate"].dims[0][0] == entry["preview/time"]
         assert len(entry["data/gyro_rate"]) == count
-    assert 2 < len(at) <= PREVIEW_POINTS
+    assert 10_000 <= len(at) == len(shown) <= PREVIEW_POINTS
     assert np.all(np.diff(at) >= 0)
     assert (shown.max(), at[shown.argmax()]) == (9.0, 12.345)
     assert (shown.min(), at[shown.argmin()]) == (-7.0, 70.001)

@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from campaign.archive import RunReader, RunStatus, RunWriter, open_run
+from campaign.archive import RunReader, RunStatus, open_run
 from campaign.archive.verification.verify_run import verify_run
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
@@ -27,12 +27,9 @@ NONE = "the protocol says keep = none"
 def sealed_once(tmp_path_factory: pytest.TempPathFactory, kit) -> Path:
     """Three trials with benches of their own, the second at its second attempt; to be copied."""
     trials = [kit.trial(n).model_copy(update={"bench": {"name": f"bench {n}"}}) for n in (1, 2, 3)]
-    writer = RunWriter.create(tmp_path_factory.mktemp("sealed"), kit.header(), trials)
-    kit.record(writer, trials[0], 20)
-    failed = writer.begin(trials[1])
-    failed.start(kit.CHANNELS)
-    failed.append(*kit.samples(30, 99))
-    failed.finish(Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE), kit.STARTED, kit.ENDED)
+    writer, _ = kit.begin(tmp_path_factory.mktemp("sealed"), trials, [20])
+    lost = Ending(Outcome.FAULT, "lost", fault=Fault.DRIVE)
+    kit.recorded(writer, trials[1], kit.samples(30, 99), ending=lost)
     kit.record(writer, trials[1], 40)
     kit.record(writer, trials[2], 50)
     return writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
@@ -97,14 +94,6 @@ def test_a_lost_line_of_the_journal_is_made_up_for_by_the_index(sealed, kit, att
     told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
 
 
-@pytest.mark.parametrize("what", ["started", "finished"])
-def test_a_damaged_line_of_the_journal_costs_nothing_that_the_index_has(sealed, kit, what):
-    damage(sealed, "run/journal/data", what, "_" * len(what))
-    run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal")
-
-
 def test_without_journal_and_index_no_trial_is_known_and_that_is_said(sealed):
     """Nothing else vouches for a record."""
     damage(sealed, "run/journal/data", "started", "s_arted")
@@ -115,12 +104,43 @@ def test_without_journal_and_index_no_trial_is_known_and_that_is_said(sealed):
     assert (run.status, run.header.protocol_name) == (RunStatus.COMPLETE, "tiny")
 
 
-@pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_damaged_line_of_the_index_is_read_from_the_trials_own_group(sealed, kit, number):
-    damage(sealed, "run/index/data", f'"number":{number},', f'"number":{number + 5},')
+INDEX, TREES = "run/index/data", "run/trees/data"
+TREE_OF_GROUP = "/trial_00001/record/trees: line . does not match"
+
+
+def numbered(place: str, number: int = 1) -> tuple[str, str, str]:
+    return place, f'"number":{number},', f'"number":{number + 5},'
+
+
+@pytest.mark.parametrize(
+    ("damages", "left", "lines"),
+    [
+        *(
+            ([("run/journal/data", word, "_" * len(word))], (1, 2, 3),
+             [f"/run/journal/data{MISMATCH}", "/run/journal: is not a whole journal"])
+            for word in ("started", "finished")
+        ),
+        # A line of the index is read from the trial's own group; both of them cost one trial.
+        *(([numbered(INDEX, n)], (1, 2, 3), [f"/run/index/data{MISMATCH}"]) for n in (1, 2, 3)),
+        ([numbered(INDEX), numbered("trial_00001/record/json")], (2, 3),
+         [f"/run/index/data{MISMATCH}", f"/trial_00001/record/json{MISMATCH}"]),
+        # And so is a tree, which costs its trials where it is damaged everywhere.
+        ([(TREES, "bench 1", "bench 9")], (1, 2, 3), [f"/run/trees/data{MISMATCH}"]),
+        ([(TREES, "bench 1", "bench 9"), ("trial_00001/record/trees", "bench 1", "bench 9")],
+         (2, 3), [f"/run/trees/data{MISMATCH}", TREE_OF_GROUP]),
+    ],
+)  # fmt: skip
+def test_what_a_damaged_text_costs(sealed, kit, damages, left, lines):
+    for each in damages:
+        damage(sealed, *each)
     run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/index/data{MISMATCH}")
+    check_all(run, kit, left)
+    told(run, *lines)
+    lost = {"trial-00001"} if len(left) == 2 else set()
+    assert {found.trial for found in run.damaged} - {""} == lost
+    if damages[0][0] == TREES:
+        with pytest.raises(ArchiveError, match=f"/run/trees/data{MISMATCH}"):
+            run.planned(1)
 
 
 def test_an_index_that_is_gone_is_read_from_the_trials_own_groups(sealed, kit):
@@ -131,15 +151,6 @@ def test_an_index_that_is_gone_is_read_from_the_trials_own_groups(sealed, kit):
     told(run, "/run/index: is missing")
 
 
-def test_a_line_of_the_index_and_the_record_in_the_group_cost_one_trial(sealed, kit):
-    for place in ("run/index/data", "trial_00001/record/json"):
-        damage(sealed, place, '"number":1,', '"number":7,')
-    run = open_run(sealed)
-    check_all(run, kit, (2, 3))
-    told(run, f"/run/index/data{MISMATCH}", f"/trial_00001/record/json{MISMATCH}")
-    assert [found.trial for found in run.damaged] == ["", "trial-00001"]
-
-
 def test_a_damaged_record_in_a_group_costs_nothing_and_verifying_names_it(sealed, kit):
     damage(sealed, "trial_00001/record/json", '"number":1,', '"number":7,')
     run = open_run(sealed)
@@ -147,23 +158,6 @@ def test_a_damaged_record_in_a_group_costs_nothing_and_verifying_names_it(sealed
     assert run.damaged == ()
     places = [found.place for found in verify_run(sealed).problems]
     assert "/trial_00001/record/json" in places
-
-
-def test_damaged_trees_are_read_from_the_trials_own_groups(sealed, kit):
-    damage(sealed, "run/trees/data", "bench 1", "bench 9")
-    run = open_run(sealed)
-    check_all(run, kit)
-    told(run, f"/run/trees/data{MISMATCH}")
-    with pytest.raises(ArchiveError, match=f"/run/trees/data{MISMATCH}"):
-        run.planned(1)
-
-
-def test_a_tree_that_is_damaged_everywhere_costs_its_trials(sealed, kit):
-    for place in ("run/trees/data", "trial_00001/record/trees"):
-        damage(sealed, place, "bench 1", "bench 9")
-    run = open_run(sealed)
-    check_all(run, kit, (2, 3))
-    told(run, f"/run/trees/data{MISMATCH}", "/trial_00001/record/trees: line . does not match")
 
 
 def test_a_damaged_seal_leaves_each_text_its_own_checksum(sealed, kit):
@@ -190,10 +184,7 @@ def test_a_seal_that_is_none_leaves_each_text_its_own_checksum(sealed, kit, text
 
 
 def test_a_lost_line_of_a_folders_journal_is_listed_and_the_rest_is_read(tmp_path, kit):
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    for trial in trials:
-        kit.record(writer, trial, 20)
+    writer, _ = kit.begin(tmp_path, 2, [20] * 2)
     writer.close()
     journal = writer.folder / "journal.jsonl"
     journal.write_text(journal.read_text().replace('"trial":1}', '"trial":x}'))
@@ -204,10 +195,7 @@ def test_a_lost_line_of_a_folders_journal_is_listed_and_the_rest_is_read(tmp_pat
 
 def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path, kit):
     """Each of them is whole; the journal names the record of each."""
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    for trial in trials:
-        kit.record(writer, trial, 20)
+    writer, _ = kit.begin(tmp_path, 2, [20] * 2)
     writer.close()
     first, second = (writer.folder / f"trial-0000{n}.trial" for n in (1, 2))
     first.unlink()
@@ -223,12 +211,8 @@ def test_a_trial_file_that_was_exchanged_for_another_is_not_read_for_it(tmp_path
 
 def test_records_are_only_in_the_index_when_samples_were_not_kept(tmp_path, kit):
     """So a damaged index costs such a trial, and that is said."""
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    recorder = writer.begin(trials[0], SampleRetention("none"))
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(20, 1))
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+    writer, trials = kit.begin(tmp_path, 2)
+    kit.recorded(writer, trials[0], 20, kit.CHANNELS, SampleRetention("none"))
     kit.record(writer, trials[1], 20)
     path = writer.seal(RunStatus.COMPLETE, ended=kit.ENDED)
     with h5py.File(path) as file:

@@ -13,22 +13,18 @@ import pytest
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import JOURNAL, read_journal
 from campaign.archive.verification.verify_run import verify_run
-from campaign.archive.writing.nexus import REQUIRED
 from campaign.archive.writing.sealed_file import SealedFile
+from campaign.backends.sim import CHANNELS
 from campaign.errors import ArchiveError
 from campaign.policy import SampleRetention
-from campaign.recording import ChannelInfo, Ending, Outcome, SafeState
+from campaign.recording import Ending, Outcome, SafeState
 from campaign.trial import Role
 from tests.archive.forging import sha256, text_of
+from tests.archive.test_nexus import nxvalidate
 
 ENDED = "2026-11-21T09:40:00Z"
 
 NONE = "the protocol says keep = none"
-
-
-def begin(results: Path, kit, count: int = 3, **fields: object) -> tuple[RunWriter, list]:
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    return RunWriter.create(results, kit.header(**fields), trials), trials
 
 
 def seal(writer: RunWriter, reason: str = "") -> Path:
@@ -36,10 +32,7 @@ def seal(writer: RunWriter, reason: str = "") -> Path:
 
 
 def attempt(writer: RunWriter, kit, trial, outcome: Outcome, count: int = 10) -> None:
-    recorder = writer.begin(trial)
-    recorder.start(kit.CHANNELS)
-    recorder.append(*kit.samples(count, count))
-    recorder.finish(Ending(outcome, "because"), kit.STARTED, kit.ENDED)
+    kit.recorded(writer, trial, kit.samples(count, count), ending=Ending(outcome, "because"))
 
 
 def texts_of(path: Path) -> dict[str, str | int]:
@@ -56,8 +49,7 @@ def texts_of(path: Path) -> dict[str, str | int]:
 
 
 def test_the_texts_of_a_run_are_all_that_was_known_of_it(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 20)
+    writer, trials = kit.begin(tmp_path, 3, [20])
     attempt(writer, kit, trials[1], Outcome.FAULT)
     own = {path.name: path.read_text("utf-8") for path in writer.folder.glob("*.jsonl")}
     path = writer.seal(RunStatus.FAULT, "no power", ended=ENDED, safe_state=SafeState.NOT_CONFIRMED)
@@ -77,8 +69,8 @@ def test_the_texts_of_a_run_are_all_that_was_known_of_it(tmp_path, kit):
         "outcome/trials_failed": 1,
     }
     for name, value in header.model_dump(mode="json", exclude={"sources"}).items():
-        canonical = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-        expected[f"provenance/{name}"] = value if isinstance(value, str) else canonical
+        told = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+        expected[f"provenance/{name}"] = value if isinstance(value, str) else told
     with h5py.File(path) as file:
         records = [text_of(file, f"trial_0000{number}/record/json") for number in (1, 2)]
     journal = found["journal/data"]
@@ -94,17 +86,11 @@ def test_the_texts_of_a_run_are_all_that_was_known_of_it(tmp_path, kit):
         "index": ("jsonl", "index.jsonl", "".join(f"{record}\n" for record in records)),
     }
     for note, (kind, name, data) in notes.items():
-        expected |= {
-            f"{note}/type": f"application/{kind}",
-            f"{note}/file_name": name,
-            f"{note}/data": data,
-        }
+        told = {"type": f"application/{kind}", "file_name": name, "data": data}
+        expected |= {f"{note}/{place}": text for place, text in told.items()}
+    texts = {place: sha256(str(text)) for place, text in expected.items()}
     seal = json.loads(str(found.pop("outcome/seal")))
-    assert seal == {
-        "format": 3,
-        "run": header.name,
-        "texts": {place: sha256(str(text)) for place, text in expected.items()},
-    }
+    assert seal == {"format": 3, "run": header.name, "texts": texts}
     whole, digest = path.read_bytes(), str(found.pop("outcome/file_sha256"))
     assert whole.count(digest.encode()) == 1
     blank = whole.replace(digest.encode(), b"0" * 64)
@@ -146,7 +132,7 @@ def test_a_run_without_a_title_has_its_protocols_name_or_its_own(tmp_path, kit, 
 
 def test_attempts_stand_in_the_index_in_the_order_in_which_they_were_made(tmp_path, kit):
     """Ten attempts, of which texts would put the tenth behind the first."""
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     kit.record(writer, trials[2], 5)
     for count in range(1, 12):
         attempt(writer, kit, trials[1], Outcome.FAULT, count)
@@ -161,7 +147,7 @@ def test_attempts_stand_in_the_index_in_the_order_in_which_they_were_made(tmp_pa
 
 
 def test_a_bench_that_was_changed_after_planning_stands_with_the_planned_one(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     changed = trials[1].model_copy(update={"bench": {"name": "tiny", "axis": {"inertia": 36.0}}})
     attempt(writer, kit, changed, Outcome.COMPLETED)
     path = seal(writer)
@@ -183,16 +169,15 @@ def test_a_viewer_opens_the_first_completed_measurement(tmp_path, kit):
     """Not the warming up before it, nor one that failed."""
     trials = [kit.trial(number) for number in (1, 2, 3, 4)]
     trials[0] = trials[0].model_copy(update={"role": Role.WARM_UP})
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    kit.record(writer, trials[0], 10)
+    writer, _ = kit.begin(tmp_path, trials, [10])
     attempt(writer, kit, trials[1], Outcome.FAULT)
     kit.record(writer, trials[3], 10)
-    kit.record(writer, trials[2], 10)
-    assert shown(seal(writer)) == "trial_00003"
+    attempt(writer, kit, trials[2], Outcome.LIMIT)
+    assert shown(seal(writer)) == "trial_00004"
 
 
 def test_without_a_completed_measurement_it_opens_the_first_one_with_samples(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     writer.begin(trials[0]).finish(Ending(Outcome.FAULT), kit.STARTED, kit.ENDED)
     kit.record(writer, trials[0], None)
     for trial in trials[1:]:
@@ -207,12 +192,9 @@ def test_without_any_samples_it_opens_nothing(tmp_path, kit):
 
 
 def test_of_samples_that_are_not_kept_the_run_says_why(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     for trial in trials[:2]:
-        recorder = writer.begin(trial, SampleRetention("none"))
-        recorder.start(kit.CHANNELS)
-        recorder.append(*kit.samples(20))
-        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+        kit.recorded(writer, trial, 20, kit.CHANNELS, SampleRetention("none"))
     kit.record(writer, trials[2], 10)
     path = seal(writer)
     found = texts_of(path)
@@ -229,16 +211,13 @@ def test_of_samples_that_are_not_kept_the_run_says_why(tmp_path, kit):
 
 
 def test_each_bench_is_described_once_and_a_trial_without_the_channels_not_at_all(tmp_path, kit):
-    channels = tuple(ChannelInfo(name, "rad", name, "rad") for name in REQUIRED)
-    writer, trials = begin(tmp_path, kit, 4)
+    writer, trials = kit.begin(tmp_path, 4, [10])
     trials[2] = trials[2].model_copy(update={"bench": {"name": "another"}})
     for trial in trials[1:]:
-        recorder = writer.begin(trial)
-        recorder.start(channels)
-        recorder.append(np.arange(9.0), np.zeros((len(channels), 9)))
-        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    kit.record(writer, trials[0], 10)
-    with h5py.File(seal(writer)) as file:
+        kit.recorded(writer, trial, (np.arange(9.0), np.zeros((len(CHANNELS), 9))), CHANNELS)
+    path = seal(writer)
+    assert [nxvalidate(path, number)[:2] for number in (2, 3, 4)] == [(0, 0)] * 3
+    with h5py.File(path) as file:
         assert not {"definition", "instrument"} & set(file["trial_00001"])
         for name in ("definition", "instrument"):
             second, third, fourth = (file[f"trial_0000{number}/{name}"] for number in (2, 3, 4))
@@ -250,9 +229,7 @@ def test_each_bench_is_described_once_and_a_trial_without_the_channels_not_at_al
 @pytest.fixture
 def one(tmp_path, kit) -> tuple[Path, SealedFile, list]:
     """A folder of two finished trials, and a sealed file that was begun beside it."""
-    writer, trials = begin(tmp_path, kit, 2)
-    for trial in trials:
-        kit.record(writer, trial, 40)
+    writer, _ = kit.begin(tmp_path, 2, [40] * 2)
     writer.close()
     attempts = list(read_journal(writer.folder / JOURNAL).files)
     return writer.folder, SealedFile(tmp_path / "new.part"), attempts
@@ -297,21 +274,14 @@ def test_whoever_discards_it_leaves_no_file_and_may_do_it_again(one, tmp_path):
     file.discard()
 
 
-def test_a_file_that_is_not_what_the_journal_says_is_not_copied(one):
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [("sha256", "is not what the journal says"), ("record", "/trial_00001/record/json: does not")],
+)
+def test_a_file_or_record_that_is_not_that_of_the_journal_is_not_copied(one, key, said):
     folder, file, (first, _) = one
-    other = first.model_copy(update={"sha256": "0" * 64})
-    with pytest.raises(ArchiveError, match=r"trial-00001\.trial: is not what the journal says"):
-        file.copy(folder, other, "trial_00001")
-    assert file.copied == {}
-    file.discard()
-
-
-def test_a_record_that_is_not_the_one_of_the_journal_is_not_copied(one):
-    folder, file, (first, _) = one
-    other = first.model_copy(update={"record": "0" * 64})
-    with pytest.raises(
-        ArchiveError, match=r"trial-00001\.trial: /trial_00001/record/json: does not"
-    ):
+    other = first.model_copy(update={key: "0" * 64})
+    with pytest.raises(ArchiveError, match=rf"trial-00001\.trial: {said}"):
         file.copy(folder, other, "trial_00001")
     assert (file.copied, list(file._file)) == ({}, [])
     file.discard()

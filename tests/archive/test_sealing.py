@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import threading
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -15,7 +14,7 @@ import pytest
 
 from campaign.archive import RunStatus, RunWriter, open_run
 from campaign.archive.layout.header import PARTIAL
-from campaign.archive.layout.journal import JOURNAL, TrialFinished, read_journal
+from campaign.archive.layout.journal import JOURNAL, read_journal
 from campaign.archive.layout.run_folder import SEALING
 from campaign.archive.reading.series import Series
 from campaign.archive.verification.verify_run import verify_run
@@ -23,16 +22,9 @@ from campaign.archive.writing import packed_file, seal_run, sealed_entry, sealed
 from campaign.archive.writing.sealed_entry import EntryWriter
 from campaign.errors import ArchiveError
 from campaign.recording import ChannelInfo, Ending, Outcome
-from tests.archive.forging import canonical, put_integer, put_text, sha256, text_of
+from tests.archive.forging import put_integer, put_text, text_of
 
 WAIT = 60.0  # s; long past what a busy machine takes, and never waited for when all is well
-PROTOCOL = {"tests": [{"name": "map"}]}
-
-
-def begin(results: Path, kit, count: int = 3) -> tuple[RunWriter, list]:
-    trials = [kit.trial(number) for number in range(1, count + 1)]
-    header = kit.header(normalised=PROTOCOL, fingerprint=sha256(canonical(PROTOCOL)))
-    return RunWriter.create(results, header, trials), trials
 
 
 def seal(writer: RunWriter) -> Path:
@@ -113,21 +105,16 @@ def test_a_copy_that_is_not_what_was_recorded_is_not_sealed(
 ):
     if not beside:
         monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: None)
-    writer, trials = begin(tmp_path, kit)
     corrupt_copy(monkeypatch, change)
-    for trial in trials:
-        kit.record(writer, trial, 20_001)
+    writer, _ = kit.begin(tmp_path, 3, [20_001] * 3)
     refused(writer, "could not be sealed: .*trial_00002")
 
 
 def test_without_reading_back_a_wrong_chunk_would_be_sealed(tmp_path, kit, monkeypatch):
     """The test above would pass for another reason if this one did not: reading back finds it."""
     monkeypatch.setattr(Series, "check", lambda self, digest: None)
-    writer, trials = begin(tmp_path, kit)
     corrupt_copy(monkeypatch, flip_chunk)
-    for trial in trials:
-        kit.record(writer, trial, 50)
-    path = seal(writer)
+    path = seal(kit.begin(tmp_path, 3, [50] * 3)[0])
     monkeypatch.undo()
     assert "trial_00002/data/friction_torque" in "".join(open_run(path).problems())
 
@@ -135,14 +122,13 @@ def test_without_reading_back_a_wrong_chunk_would_be_sealed(tmp_path, kit, monke
 def test_trials_of_many_forms_are_sealed_each_with_its_own(tmp_path, kit, monkeypatch):
     """Of more lengths and units than groups are kept for copying, and back again."""
     monkeypatch.setattr(sealed_entry, "_MOST_FORMS", 2)
-    writer, trials = begin(tmp_path, kit, 8)
+    writer, trials = kit.begin(tmp_path, 8)
     for trial in trials:
         number = trial.number % 4
         unit = ("rad/s", "rad", "N m", "A")[number]
-        recorder = writer.begin(trial)
-        recorder.start((ChannelInfo("x", unit, "X", unit), ChannelInfo("y", "s", "Y", "s")))
-        recorder.append(np.arange(10.0 + number), np.full((2, 10 + number), float(number)))
-        recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
+        channels = (ChannelInfo("x", unit, "X", unit), ChannelInfo("y", "s", "Y", "s"))
+        samples = np.arange(10.0 + number), np.full((2, 10 + number), float(number))
+        kit.recorded(writer, trial, samples, channels)
     path = seal(writer)
     assert verify_run(path).sound
     with h5py.File(path) as file:
@@ -160,36 +146,13 @@ def test_a_chunk_that_was_stored_wrong_in_the_first_place_is_not_sealed(tmp_path
             wrong[20] += 1.0
         return real(wrong, shuffled)
 
-    writer, trials = begin(tmp_path, kit)
     monkeypatch.setattr(packed_file, "pack", pack)
-    for trial, count in zip(trials, (50, 77, 50), strict=True):
-        kit.record(writer, trial, count)
+    writer, _ = kit.begin(tmp_path, 3, [50, 77, 50])
     with pytest.raises(ArchiveError, match=r"trial_00002/data/.* does not match its checksum"):
         seal(writer)
     run = open_run(writer.folder)
     assert not list(tmp_path.glob("*.nxs*"))
     assert [len(list(trial.problems())) for trial in run.trials] == [0, 4, 0]
-
-
-@pytest.mark.parametrize(
-    "place", ["run/journal/data", "run/title", "run/outcome/status", "trial_00001/record/json"]
-)
-def test_a_text_that_changed_between_writing_and_checking_is_found(
-    tmp_path, kit, monkeypatch, place
-):
-    """With a checksum of its own that fits."""
-    real = sealed_file.check_sealed
-
-    def check(part, file):
-        with h5py.File(part, "r+") as opened:
-            put_text(opened, place, text_of(opened, place) + " ")
-        real(part, file)
-
-    monkeypatch.setattr(seal_run, "check_sealed", check)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
-    refused(writer, f"/{place}: does not match its checksum")
 
 
 def put_seal(opened: h5py.File) -> None:
@@ -208,43 +171,42 @@ def put_unit(opened: h5py.File) -> None:
     opened["trial_00003/data/command"].attrs["units"] = "deg/s"
 
 
+def move_samples(opened: h5py.File) -> None:
+    """After they were read back."""
+    exchange(opened["trial_00001"])
+
+
+TEXTS = ("run/journal/data", "run/title", "run/outcome/status", "trial_00001/record/json")
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
+        *((place, f"/{place}: does not match its checksum") for place in TEXTS),
         (put_seal, "/run/outcome/seal: does not match its checksum"),
         (put_count, "/run/outcome/trials_finished: does not match its checksum"),
         (lose_trial, "/trial_00002"),
         (put_unit, "/trial_00003/data/command@units: is 'deg/s', and 'rad/s' was recorded"),
+        (move_samples, "/trial_00001/data/command: does not lie where it was written"),
     ],
 )
-def test_whatever_is_not_as_it_was_written_is_not_sealed(tmp_path, kit, monkeypatch, change, told):
+def test_what_changed_between_writing_and_checking_is_found(
+    tmp_path, kit, monkeypatch, change, told
+):
+    """A text with a checksum of its own that fits."""
     real = sealed_file.check_sealed
 
     def check(part, file):
         with h5py.File(part, "r+") as opened:
-            change(opened)
+            if isinstance(change, str):
+                put_text(opened, change, text_of(opened, change) + " ")
+            else:
+                change(opened)
         real(part, file)
 
     monkeypatch.setattr(seal_run, "check_sealed", check)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
+    writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     refused(writer, told)
-
-
-def test_samples_that_moved_after_they_were_read_back_are_found(tmp_path, kit, monkeypatch):
-    real = sealed_file.check_sealed
-
-    def check(part, file):
-        with h5py.File(part, "r+") as opened:
-            exchange(opened["trial_00001"])
-        real(part, file)
-
-    monkeypatch.setattr(seal_run, "check_sealed", check)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
-    refused(writer, "/trial_00001/data/command: does not lie where it was written")
 
 
 class Watched:
@@ -285,7 +247,7 @@ ALL = ["trial_00001", "trial_00002", "trial_00003"]
 
 def test_trials_are_copied_while_others_are_executed(tmp_path, kit, monkeypatch):
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     for number, trial in enumerate(trials, start=1):
         kit.record(writer, trial, 50)
         assert watched.beside == ALL[:number]
@@ -298,7 +260,7 @@ def test_trials_are_copied_while_others_are_executed(tmp_path, kit, monkeypatch)
 def test_a_trial_waits_for_those_before_it_in_the_plan(tmp_path, kit, monkeypatch):
     """Whoever finishes one catches up with one that waited, and no more: others wait for him."""
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit, 5)
+    writer, trials = kit.begin(tmp_path, 5)
     for number in (4, 3, 2):
         kit.record(writer, trials[number - 1], 50)
         assert watched.beside == []
@@ -312,7 +274,7 @@ def test_a_trial_waits_for_those_before_it_in_the_plan(tmp_path, kit, monkeypatc
 
 def test_who_finishes_a_trial_while_another_is_copied_does_not_wait(tmp_path, kit, monkeypatch):
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     copying, may_go = threading.Event(), threading.Event()
     copy = sealed_file.SealedFile.copy
 
@@ -336,7 +298,7 @@ def test_who_finishes_a_trial_while_another_is_copied_does_not_wait(tmp_path, ki
 
 
 def written(results: Path, kit, order: list[int]) -> bytes:
-    writer, trials = begin(results, kit)
+    writer, trials = kit.begin(results, 3)
     for number in order:
         kit.record(writer, trials[number - 1], 50)
     return seal(writer).read_bytes()
@@ -368,9 +330,7 @@ def test_equal_runs_make_equal_files_whatever_was_copied_when(tmp_path, kit, mon
 )
 def test_a_copy_that_fails_costs_nothing_but_time(tmp_path, kit, monkeypatch, failure):
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit, 4)
-    kit.record(writer, trials[0], 50)
-    kit.record(writer, trials[1], 50)
+    writer, trials = kit.begin(tmp_path, 4, [50, 50])
     watched.failures.append(failure)
     kit.record(writer, trials[2], 50)
     assert watched.failures == []
@@ -385,7 +345,7 @@ def test_a_copy_that_fails_costs_nothing_but_time(tmp_path, kit, monkeypatch, fa
 def test_who_interrupts_a_copy_is_heard_and_the_run_can_be_sealed(tmp_path, kit, monkeypatch):
     """The trial is in the journal by then."""
     real = Series.check
-    writer, trials = begin(tmp_path, kit)
+    writer, trials = kit.begin(tmp_path, 3)
     with monkeypatch.context() as interrupted:
 
         def interrupt(*arguments):
@@ -400,35 +360,13 @@ def test_who_interrupts_a_copy_is_heard_and_the_run_can_be_sealed(tmp_path, kit,
     assert len(open_run(path).trials) == 2
 
 
-def test_on_a_disk_that_is_nearly_full_nothing_is_copied_before_the_end(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
-    with monkeypatch.context() as nearly_full:
-        usage = SimpleNamespace(total=1 << 40, used=1 << 40, free=1 << 20)
-        nearly_full.setattr(seal_run.shutil, "disk_usage", lambda path: usage)
-        for trial in trials:
-            kit.record(writer, trial, 50)
-    assert watched.beside == []
-    assert not (writer.folder / SEALING).exists()
-    path = seal(writer)
-    assert (watched.beside, watched.at_the_end) == ([], ALL)
-    assert verify_run(path).sound
-
-
 def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypatch):
     """A first attempt that failed may be repeated, so it waits for the end."""
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
-
-    def fail(trial, count):
-        recorder = writer.begin(trial)
-        recorder.start(kit.CHANNELS)
-        recorder.append(*kit.samples(count, 9))
-        recorder.finish(Ending(Outcome.FAULT, f"after {count}"), kit.STARTED, kit.ENDED)
-
-    kit.record(writer, trials[0], 50)
-    fail(trials[1], 10)
-    fail(trials[1], 20)
+    writer, trials = kit.begin(tmp_path, 3, [50])
+    for count in (10, 20):
+        fault = Ending(Outcome.FAULT, f"after {count}")
+        kit.recorded(writer, trials[1], count, ending=fault)
     kit.record(writer, trials[1], 30)
     kit.record(writer, trials[2], 50)
     run = open_run(seal(writer))
@@ -446,8 +384,7 @@ def test_attempts_have_the_right_names_however_they_came(tmp_path, kit, monkeypa
 def test_a_trial_that_completed_and_is_repeated_is_copied_anew(tmp_path, kit, monkeypatch):
     """It was copied as the trial, and turns out to be its first attempt."""
     watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
+    writer, trials = kit.begin(tmp_path, 3, [50])
     assert watched.beside == ["trial_00001"]
     kit.record(writer, trials[0], 60)
     run = open_run(seal(writer))
@@ -457,8 +394,7 @@ def test_a_trial_that_completed_and_is_repeated_is_copied_anew(tmp_path, kit, mo
 
 
 def test_whoever_lets_go_of_a_run_leaves_no_copy(tmp_path, kit, monkeypatch):
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
+    writer, _ = kit.begin(tmp_path, 3, [50])
     assert (writer.folder / SEALING).is_file()
     writer.close()
     assert not (writer.folder / SEALING).exists()
@@ -467,16 +403,10 @@ def test_whoever_lets_go_of_a_run_leaves_no_copy(tmp_path, kit, monkeypatch):
 @pytest.mark.parametrize("how", ["file", "folder"])
 def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
     """Through sealing, resuming, unsealing and sealing again."""
-
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
+    writer, trials = kit.begin(tmp_path, 3, [50])
     notes = {"notes.txt": b"the fan was on"}
     if how == "folder":
-        notes = {
-            "photos/1.jpg": b"\xff\xd8",
-            "photos/trial-00001.trial": b"mine",
-            "a.part": b"?",
-        }
+        notes = {"photos/1.jpg": b"\xff\xd8", "photos/trial-00001.trial": b"mine", "a.part": b"?"}
     for name, content in notes.items():
         path = writer.folder / name
         path.parent.mkdir(exist_ok=True)
@@ -486,14 +416,15 @@ def test_what_a_user_put_into_the_folder_stays(tmp_path, kit, how):
         found = [path for path in writer.folder.rglob("*") if path.is_file()]
         return {str(path.relative_to(writer.folder)): path.read_bytes() for path in found}
 
-    told = {"at": kit.ENDED, "host": {}, "versions": {}, "command": []}
     writer.close()
-    RunWriter.resume(writer.folder, **told).close()
+    RunWriter.resume(writer.folder, **kit.RESUMED).close()
     assert notes.items() <= there().items()
-    path = RunWriter.resume(writer.folder, **told).seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
+    path = RunWriter.resume(writer.folder, **kit.RESUMED).seal(
+        RunStatus.INTERRUPTED, ended=kit.ENDED
+    )
     assert there() == notes
     assert verify_run(path).sound
-    resumed = RunWriter.resume(path, **told)
+    resumed = RunWriter.resume(path, **kit.RESUMED)
     assert notes.items() <= there().items()
     assert not list(tmp_path.glob(f"*{PARTIAL}.part"))
     for trial in trials[1:]:
@@ -512,90 +443,23 @@ def open_files(folder: Path) -> list[str]:
     return [name for name in found if name.startswith(str(folder))]
 
 
-def finished_in(writer: RunWriter) -> list[TrialFinished]:
-    return list(read_journal(writer.folder / JOURNAL).files)
-
-
-@pytest.mark.parametrize(("short", "copied"), [(0, ALL[:1]), (1, [])])
-def test_beside_the_trials_is_copied_as_long_as_room_is_left_for_them(
-    tmp_path, kit, monkeypatch, short, copied
-):
-    """A trial and its copy, and what stays free: to the byte."""
-    writer, (trial, *_) = begin(tmp_path, kit)
-    kit.record(writer, trial, 50)
-    writer._sealer.discard()
-    (finished,) = finished_in(writer)
-    free = seal_run._FREE + 2 * finished.bytes - short
-    monkeypatch.setattr(seal_run.shutil, "disk_usage", lambda path: SimpleNamespace(free=free))
-    watched = Watched(monkeypatch)
-    sealer = seal_run.Sealer(writer.folder)
-    sealer.add(finished)
-    sealer.advance()
-    assert watched.beside == copied
-    sealer.discard()
-    writer.close()
-
-
 def test_a_sealer_may_be_discarded_and_begun_again(tmp_path, kit, monkeypatch):
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
+    writer, _ = kit.begin(tmp_path, 3, [50])
     writer._sealer.discard()
     writer._sealer.discard()
     assert not (writer.folder / SEALING).exists()
     assert not [name for name in open_files(writer.folder) if SEALING in name]
     sealer = seal_run.Sealer(writer.folder)
     watched = Watched(monkeypatch)
-    sealer.add(*finished_in(writer))
+    sealer.add(*read_journal(writer.folder / JOURNAL).files)
     sealer.advance()
     sealer.discard()
     assert watched.beside == ALL[:1]
     writer.close()
 
 
-def test_after_a_failure_nothing_more_is_copied_beside(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch)
-    watched.failures.append(OSError(28, "No space left on device"))
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
-    for trial in trials[1:]:
-        kit.record(writer, trial, 50)
-    assert not (writer.folder / SEALING).exists()
-    path = seal(writer)
-    assert (watched.beside, watched.at_the_end) == ([], ALL)
-    assert verify_run(path).sound
-
-
-def test_what_did_not_complete_waits_for_the_end_and_holds_nobody_up(tmp_path, kit, monkeypatch):
-    watched = Watched(monkeypatch)
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], 50)
-    kit.record(writer, trials[1], None)
-    kit.record(writer, trials[2], 50)
-    assert watched.beside == ["trial_00001", "trial_00003"]
-    path = seal(writer)
-    assert watched.at_the_end == ["trial_00002"]
-    assert verify_run(path).sound
-
-
-def test_a_later_attempt_that_completed_waits_for_the_end(tmp_path, kit, monkeypatch):
-    """Another one may follow; and copies stand in the order of the plan."""
-    writer, trials = begin(tmp_path, kit)
-    kit.record(writer, trials[0], None)
-    kit.record(writer, trials[0], 50)
-    writer._sealer.discard()
-    first, second = finished_in(writer)
-    watched = Watched(monkeypatch)
-    sealer = seal_run.Sealer(writer.folder)
-    sealer.add(second)  # as if the journal had lost the first one
-    sealer.advance()
-    assert (watched.beside, first.attempt, second.attempt) == ([], 1, 2)
-    writer.close()
-
-
 def test_a_run_that_has_not_ended_is_not_sealed(tmp_path, kit):
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
+    writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     writer.close()
     with pytest.raises(ArchiveError) as caught:
         seal_run.seal_folder(writer.folder)
@@ -604,38 +468,28 @@ def test_a_run_that_has_not_ended_is_not_sealed(tmp_path, kit):
     assert len(open_run(writer.folder).trials) == 3
 
 
-@pytest.mark.parametrize("step", ["copy", "finish", "put_hash"])
-def test_a_refusal_leaves_no_file_open(tmp_path, kit, monkeypatch, step):
+FULL = OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("step", "error"),
+    [("copy", FULL), ("finish", FULL), ("put_hash", FULL), ("finish", KeyboardInterrupt())],
+)
+def test_who_is_refused_or_interrupted_leaves_no_file_open(tmp_path, kit, monkeypatch, step, error):
     def fail(*arguments):
-        raise OSError(28, "No space left on device")
+        raise error
 
     monkeypatch.setattr(seal_run.Sealer, "advance", lambda self: None)
     monkeypatch.setattr(sealed_file.SealedFile, step, fail)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
+    writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     before = open_files(tmp_path)
-    with pytest.raises(ArchiveError) as caught:
+    with pytest.raises(ArchiveError if error is FULL else KeyboardInterrupt) as caught:
         seal(writer)
     told = f"could not be sealed: No space left on device; every finished trial is in {tmp_path}"
-    assert told in str(caught.value)
+    assert (told in str(caught.value)) is (error is FULL)
     assert not [name for name in open_files(tmp_path) if SEALING in name], before
     assert not list(writer.folder.glob("*.part"))
     assert len(open_run(writer.folder).trials) == 3
-
-
-def test_who_interrupts_sealing_leaves_no_file_open(tmp_path, kit, monkeypatch):
-    def interrupt(*arguments):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sealed_file.SealedFile, "finish", interrupt)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
-    with pytest.raises(KeyboardInterrupt):
-        seal(writer)
-    assert not [name for name in open_files(tmp_path) if SEALING in name]
-    assert not (writer.folder / SEALING).exists()
 
 
 def test_a_folder_that_cannot_be_removed_harms_nobody(tmp_path, kit, monkeypatch):
@@ -643,9 +497,7 @@ def test_a_folder_that_cannot_be_removed_harms_nobody(tmp_path, kit, monkeypatch
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(seal_run, "remove_folder", fail)
-    writer, trials = begin(tmp_path, kit)
-    for trial in trials:
-        kit.record(writer, trial, 50)
+    writer, _ = kit.begin(tmp_path, 3, [50] * 3)
     path = seal(writer)
     assert path == tmp_path / f"{kit.header().name}.nxs"
     assert verify_run(path).sound

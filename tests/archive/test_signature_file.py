@@ -19,17 +19,15 @@ from campaign.archive.layout.signature_file import (
 from campaign.archive.verification.statement import run_statement
 from campaign.archive.writing import resume_run as resuming_module
 from campaign.errors import ArchiveError, UsageError
+from tests.archive.conftest import RESUMED
 
 KEPT = Path(__file__).parent / "kept"
-RESUMED = {"at": "2026-11-22T08:00:00Z", "host": {}, "versions": {}, "command": []}
 
 
 @pytest.fixture
 def interrupted(tmp_path: Path, kit) -> Path:
     """A sealed run whose second trial is still to be done, with a signature beside it."""
-    trials = [kit.trial(number) for number in (1, 2)]
-    writer = RunWriter.create(tmp_path, kit.header(), trials)
-    kit.record(writer, trials[0], 20)
+    writer, _ = kit.begin(tmp_path, 2, [20])
     sealed = writer.seal(RunStatus.INTERRUPTED, "stopped", ended="2026-11-21T09:40:00Z")
     write_signature(sealed, "the first\n")
     return sealed

@@ -12,12 +12,7 @@ from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 
 AT = "2026-11-21T09:37:02Z"
-STAGED = {
-    "tests": [{"name": "map", "kind": "velocity_map", "stages": [{"number": 2}]}],
-    "normalised": {},
-    "fingerprint": "",
-}
-RESUMED = {"at": AT, "host": {}, "versions": {}, "command": ()}
+STAGED = [{"name": "map", "kind": "velocity_map", "stages": [{"number": 2}]}]
 
 
 def follow(trials, stage=2, **more) -> TrialsFollowed:
@@ -26,9 +21,7 @@ def follow(trials, stage=2, **more) -> TrialsFollowed:
 
 def begun(tmp_path, kit):
     """Two planned trials that have finished, and a stage of two, of which one has."""
-    writer = RunWriter.create(tmp_path, kit.header(**STAGED), [kit.trial(1), kit.trial(2)])
-    kit.record(writer, kit.trial(1), 50)
-    kit.record(writer, kit.trial(2), 60)
+    writer, _ = kit.begin(tmp_path, 2, [50, 60], tests=STAGED)
     other = kit.trial(4).model_copy(update={"bench": {"name": "its own", "x": 5e-324}})
     further = [kit.trial(3), other]
     writer.trials_followed(follow(further, refused=[("map [speed=9]", "too fast")]))
@@ -51,9 +44,8 @@ def test_they_are_trials_of_the_run_for_every_reader(tmp_path, kit):
         assert [run.planned(3), run.planned(4)] == further
         assert [trial.number for trial in run.full_plan.trials()] == [1, 2, 3, 4]
         assert [trial.trial.number for trial in run.trials_of("map")] == [1, 2, 3]
-        assert [(s.stage, s.name, s.refused[0].why) for s in run.stages] == [
-            (2, "refinement", "too fast")
-        ]
+        (stage,) = run.stages
+        assert (stage.stage, stage.name, stage.refused[0].why) == (2, "refinement", "too fast")
         verified = verify_run(run.path)
         assert (verified.problems, verified.trials) == ((), 3)
         (listed,) = list_runs(tmp_path)
@@ -65,7 +57,7 @@ def test_they_are_trials_of_the_run_for_every_reader(tmp_path, kit):
 def test_a_sealed_run_is_gone_on_with_and_has_them_again(tmp_path, kit):
     writer, further = begun(tmp_path, kit)
     path = writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
-    writer = RunWriter.resume(path, **RESUMED)
+    writer = RunWriter.resume(path, **kit.RESUMED)
     assert list(trials_in(stages_in(read_journal(writer.folder / JOURNAL).entries))) == further
     assert writer.archived(3).trial == further[0]
     assert writer.archived(3).ending.outcome is Outcome.COMPLETED

@@ -14,7 +14,7 @@ from campaign.archive.writing.packed_file import PackedFile, SampleColumns
 from campaign.archive.writing.preview import Preview
 from campaign.archive.writing.trial_writer import FolderWriter
 from campaign.errors import BackendError
-from campaign.recording import ChannelInfo, Ending, Outcome
+from campaign.recording import ChannelInfo
 
 
 def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
@@ -32,53 +32,35 @@ def test_memory_is_one_chunk_whatever_is_appended(tmp_path):
     file.close()
 
 
+def series_of(recording, kit):
+    return [recording.time.tobytes(), *(recording[each.name].tobytes() for each in kit.CHANNELS)]
+
+
 @pytest.mark.parametrize("count", [1, CHUNK - 1, CHUNK, CHUNK + 50, 2 * CHUNK])
-def test_metrics_see_every_sample_of_a_recording(kit, tmp_path, count):
+@pytest.mark.parametrize("worker", [False, True])
+def test_metrics_see_every_sample_of_a_recording(kit, tmp_path, count, worker):
+    """In a worker process before the batch is published."""
     trial, (time, block) = kit.trial(1), kit.samples(count)
-    writer = RunWriter.create(tmp_path, kit.header(), [trial])
-    recorder = writer.begin(trial)
-    recorder.start(kit.CHANNELS)
-    recorder.append(time, block)
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    seen = []
+    alone, _ = kit.begin(tmp_path / "run", [trial])
+    (tmp_path / "batch").mkdir()
+    writer = FolderWriter(tmp_path / "batch", {1: 1}) if worker else alone
+    recorder, seen = kit.recorded(writer, trial, count), []
 
     def measure(data):
-        seen.append(data.recording())
-        return ArchivedMetrics()
-
-    recorder.measure(measure)
-    for recording in (*seen, writer.archived(1).recording()):
-        assert recording.time.tobytes() == time.tobytes()
-        channels = zip(kit.CHANNELS, block, strict=True)
-        assert all(recording[each.name].tobytes() == row.tobytes() for each, row in channels)
-    assert len(seen) == 1
-    writer.close()
-
-
-@pytest.mark.parametrize("count", [1, CHUNK, CHUNK + 50])
-def test_metrics_of_a_worker_process_see_every_sample_before_the_batch_is_published(
-    kit, tmp_path, count
-):
-    trial, (time, block) = kit.trial(1), kit.samples(count)
-    writer = FolderWriter(tmp_path, {1: 1})
-    recorder = writer.begin(trial)
-    recorder.start(kit.CHANNELS)
-    recorder.append(time, block)
-    recorder.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)
-    seen = []
-
-    def measure(data):
-        recording = data.recording()
-        seen.append([recording.time, *(recording[each.name] for each in kit.CHANNELS)])
+        seen.append(series_of(data.recording(), kit))
         return ArchivedMetrics()
 
     assert recorder.measure(measure) == ""
-    assert [row.tobytes() for row in seen[0]] == [row.tobytes() for row in (time, *block)]
-    assert [path.name for path in tmp_path.iterdir()] == ["trial-00001.trial.part"]
-    writer.publish()
-    assert [path.name for path in tmp_path.iterdir()] == ["trial-00001.trial"]
-    ((finished,), files) = writer.take_entries(), list(tmp_path.iterdir())
-    assert finished.file == files[0].name
+    assert seen == [[row.tobytes() for row in (time, *block)]]
+    if worker:
+        files = (tmp_path / "batch").iterdir
+        assert [path.name for path in files()] == ["trial-00001.trial.part"]
+        writer.publish()
+        ((finished,), (file,)) = writer.take_entries(), files()
+        assert finished.file == file.name == "trial-00001.trial"
+    else:
+        assert [series_of(writer.archived(1).recording(), kit)] == seen
+    alone.close()
 
 
 def test_the_preview_keeps_within_its_points_however_long_the_recording():
@@ -139,8 +121,7 @@ def test_every_dataset_but_samples_carries_its_checksum(tmp_path, kit):
 
 
 def test_sealing_copies_chunks_as_they_are(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    kit.record(writer, kit.trial(1), CHUNK + 10)
+    writer, _ = kit.begin(tmp_path, 1, [CHUNK + 10])
     name = "trial_00001/data/gyro_rate"
     content = (writer.folder / "trial-00001.trial").read_bytes()
     packed = read_packed(writer.folder / "trial-00001.trial", "trial_00001")
@@ -175,9 +156,8 @@ def test_channels_need_names_that_nexus_allows(recorder, names):
 
 
 def test_an_abandoned_trial_leaves_a_line_and_no_file(tmp_path, kit):
-    writer = RunWriter.create(tmp_path, kit.header(), [kit.trial(1)])
-    recorder = writer.begin(kit.trial(1))
-    recorder.start(kit.CHANNELS)
+    writer, trials = kit.begin(tmp_path, 1)
+    recorder = kit.started(writer, trials[0], ())
     recorder.abandon(kit.ENDED, "the cable came off")
     assert not list(writer.folder.glob("trial-*"))
     assert "the cable came off" in (writer.folder / "journal.jsonl").read_text()

@@ -7,12 +7,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 
 from campaign.archive.layout.journal import TrialsFollowed
 from campaign.archive.reading.archived_metrics import Measure
+from campaign.errors import ArchiveError
 from campaign.estimate import Estimate
+from campaign.execution.operator_prompts import Attendance, Operator, SimulatedOperator
+from campaign.execution.outcome import RunOutcome
+from campaign.execution.progress import Progress
+from campaign.execution.runner import run_plan
+from campaign.execution.stop import StopSwitch
+from campaign.policy import Policy
 from campaign.recording import (
     ChannelInfo,
     Ending,
@@ -78,13 +86,19 @@ class OwnBackend(FakeBackend):
 
 @dataclass
 class SwitchedBench(FakeBackend):
-    """A bench that others can switch off, as `stop` says; it may not be asked while it moves."""
+    """A bench that others can switch off, as `stop` says; it may not be asked while it moves.
+
+    Switched off it refuses to arm; `broken`: it cannot be asked.
+    """
 
     stop: PanicStop | None = None
+    broken: bool = False
     asked: int = 0
     moving: set[int] = field(default_factory=set)
 
     def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
+        if self.stop is not None:
+            return Ending(Outcome.INTERRUPTED, str(self.stop))
         self.moving.add(trial.number)
         try:
             return super().execute(trial, recorder, stopped)
@@ -96,9 +110,12 @@ class SwitchedBench(FakeBackend):
     def panic_stop(self) -> PanicStop | None:
         assert not self.moving
         self.asked += 1
+        if self.broken:
+            raise RuntimeError("a bug")
         return self.stop
 
-    def clear_stop(self, count: int) -> None: ...
+    def clear_stop(self, count: int) -> None:
+        self.log.append("cleared")
 
 
 class MemoryTrial(MemoryRecorder):
@@ -186,3 +203,43 @@ class MemoryArchive:
         assert self.sealed is None, "sealed twice"
         self.sealed = (str(status), reason, safe_state)
         return Path("run.nxs")
+
+
+class Lab:
+    """A run of a few trials, with everything around it in memory; pauses are noted, not waited for.
+
+    What a trial does stands for a backend that does it.
+    """
+
+    def __init__(self, trials: int | list[Trial], backend: Any, **policy: object) -> None:
+        self.trials = make_trials(trials) if isinstance(trials, int) else trials
+        self.backend = FakeBackend(backend) if isinstance(backend, dict) else backend
+        self.archive = MemoryArchive()
+        self.stop = StopSwitch()
+        self.progress: list[Progress] = []
+        self.display: Callable[[Progress], object] = self.progress.append
+        self.pauses: list[float] = []
+        self.pause: Callable[[float], object] = self.pauses.append
+        self.operator: Operator = SimulatedOperator()
+        self.policy = Policy.model_validate(policy, context={"si": True})
+
+    def run(self, workers: int = 1, **more: Any) -> RunOutcome:
+        waits = Attendance(self.operator, lambda seconds, stop: self.pause(seconds) and None)
+        settings = {"policy": self.policy, "attendance": waits, **more}
+        return run_plan(
+            self.trials, self.backend, self.archive, workers=workers, display=self.display,
+            stop=self.stop, **settings,
+        )  # fmt: skip
+
+    @property
+    def remarks(self) -> list[str]:
+        return [progress.remark for progress in self.progress if progress.remark]
+
+    @property
+    def executed(self) -> list[str]:
+        return [name for name in self.backend.log if name != "made safe"]
+
+
+def no_space(*arguments: object) -> NoReturn:
+    """In place of something that writes to the archive."""
+    raise ArchiveError("no space left")

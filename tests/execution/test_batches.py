@@ -12,15 +12,9 @@ import pytest
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.batches import LOOK_AHEAD, Batches
-from campaign.execution.operator_prompts import Attendance, SimulatedOperator
-from campaign.execution.outcome import RunOutcome
-from campaign.execution.progress import Progress
-from campaign.execution.runner import run_plan
-from campaign.execution.stop import StopSwitch
-from campaign.policy import Policy
 from campaign.recording import Ending, Outcome, Recorder, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import COMPLETED, RATE, FakeBackend, MemoryArchive, make_trials
+from tests.execution.fakes import COMPLETED, RATE, FakeBackend, Lab, MemoryArchive, make_trials
 
 PIECE = 5
 """samples between two turns of a trial."""
@@ -75,23 +69,6 @@ class Together(FakeBackend):
             turn += 1
 
 
-class Run:
-    def __init__(self, trials: list[Trial], backend: FakeBackend, **policy: object) -> None:
-        self.trials, self.backend = trials, backend
-        self.archive = MemoryArchive()
-        self.stop = StopSwitch()
-        self.progress: list[Progress] = []
-        self.policy = Policy.model_validate(policy, context={"si": True})
-        self.pauses: list[float] = []
-
-    def __call__(self, workers: int = 1) -> RunOutcome:
-        waits = Attendance(SimulatedOperator(), lambda seconds, stop: self.pauses.append(seconds))
-        return run_plan(
-            self.trials, self.backend, self.archive, workers=workers, display=self.progress.append,
-            stop=self.stop, policy=self.policy, attendance=waits,
-        )  # fmt: skip
-
-
 def by_parity(trial: Trial) -> int:
     return trial.number % 2
 
@@ -121,29 +98,28 @@ def waits_for_stop(turn: int, recorder: Recorder, stop: Callable[[], bool]) -> E
 
 
 def test_trials_of_a_group_go_together_and_all_are_archived_whole() -> None:
-    run = Run(make_trials(7), Together(groups=by_parity))
-    outcome = run()
-    assert run.backend.batches == [[1, 3, 5, 7], [2, 4, 6]]
+    lab = Lab(make_trials(7), Together(groups=by_parity))
+    outcome = lab.run()
+    assert lab.backend.batches == [[1, 3, 5, 7], [2, 4, 6]]
     assert outcome.status is RunStatus.COMPLETE
     assert outcome.outcomes == {Outcome.COMPLETED: 7}
-    assert run.archive.samples == dict.fromkeys(range(1, 8), 20)
+    assert lab.archive.samples == dict.fromkeys(range(1, 8), 20)
 
 
 def test_a_backend_that_cannot_is_given_one_trial_at_a_time() -> None:
-    run = Run(make_trials(3), FakeBackend())
-    run()
-    assert run.backend.log == ["trial-00001", "trial-00002", "trial-00003", "made safe"]
+    lab = Lab(make_trials(3), FakeBackend())
+    lab.run()
+    assert lab.backend.log == ["trial-00001", "trial-00002", "trial-00003", "made safe"]
 
 
 def test_so_few_that_it_is_not_worth_it_go_alone() -> None:
-    run = Run(make_trials(5), Together(groups=by_parity, fewest_together=3))
-    run()
-    assert run.backend.batches == [[1, 3, 5], [2], [4]]
+    lab = Lab(make_trials(5), Together(groups=by_parity, fewest_together=3))
+    lab.run()
+    assert lab.backend.batches == [[1, 3, 5], [2], [4]]
 
 
 @pytest.mark.parametrize(
-    ("workers", "sizes"),
-    [(1, [4, 4]), (2, [4, 2, 1, 1]), (3, [3, 2, 1, 1, 1]), (8, [1] * 8)],
+    ("workers", "sizes"), [(1, [4, 4]), (2, [4, 2, 1, 1]), (3, [3, 2, 1, 1, 1]), (8, [1] * 8)]
 )
 def test_every_worker_gets_a_share(workers: int, sizes: list[int]) -> None:
     """Of what is left; where a share is so small that a batch is not worth it, they go alone."""
@@ -163,18 +139,18 @@ def test_companions_are_looked_for_only_so_far_ahead() -> None:
 def test_no_trial_comes_before_hands_that_prepare_another() -> None:
     trials = make_trials(6)
     trials[3] = trials[3].model_copy(update={"setup": ("turn the bench round",)})
-    run = Run(trials, Together())
-    run()
-    assert run.backend.batches == [[1, 2, 3], [4, 5, 6]]
-    assert run.archive.steps == [(4, "turn the bench round", "simulated")]
+    lab = Lab(trials, Together())
+    lab.run()
+    assert lab.backend.batches == [[1, 2, 3], [4, 5, 6]]
+    assert lab.archive.steps == [(4, "turn the bench round", "simulated")]
 
 
 def test_a_batch_ends_where_the_bench_has_to_rest() -> None:
     """Trials of 2 s, a rest after each 5 s: due after the third, in batches or not."""
-    run = Run(make_trials(8), Together(), rest={"every": 6.0, "pause": 1.0})
-    run()
-    assert run.backend.batches == [[1, 2, 3], [4, 5, 6], [7, 8]]
-    assert len(run.pauses) == 2
+    lab = Lab(make_trials(8), Together(), rest={"every": 6.0, "pause": 1.0})
+    lab.run()
+    assert lab.backend.batches == [[1, 2, 3], [4, 5, 6], [7, 8]]
+    assert len(lab.pauses) == 2
 
 
 # How each ends
@@ -184,15 +160,15 @@ def test_one_that_ends_is_archived_and_counted_while_the_others_go_on() -> None:
     seen: list[int] = []
 
     def looks(turn: int, recorder: Recorder, stop: Callable[[], bool]) -> None:
-        seen.append(len(run.archive.endings))
+        seen.append(len(lab.archive.endings))
 
     short = make_trials(3)
     short[0] = make_trials(1, duration=0.5)[0]
-    run = Run(short, Together(turns={3: looks}))
-    run()
+    lab = Lab(short, Together(turns={3: looks}))
+    lab.run()
     assert seen == [0, 1, 1, 1]
-    assert run.archive.samples == {1: 5, 2: 20, 3: 20}
-    assert run.backend.log[0] == "trial-00001 ended"
+    assert lab.archive.samples == {1: 5, 2: 20, 3: 20}
+    assert lab.backend.log[0] == "trial-00001 ended"
 
 
 def test_a_verdict_ends_its_own_trial_and_no_other() -> None:
@@ -201,83 +177,80 @@ def test_a_verdict_ends_its_own_trial_and_no_other() -> None:
             recorder.append(np.arange(10, 15) / 10, np.full((1, 5), np.nan))
             assert stop()
 
-    run = Run(make_trials(3), Together(turns={2: breaks}))
-    outcome = run()
+    lab = Lab(make_trials(3), Together(turns={2: breaks}))
+    outcome = lab.run()
     assert outcome.outcomes == {Outcome.COMPLETED: 2, Outcome.DIVERGED: 1}
-    assert run.archive.samples == {1: 20, 2: 11, 3: 20}
-    assert "gyro_rate is nan" in run.archive.endings[2].reason
+    assert lab.archive.samples == {1: 20, 2: 11, 3: 20}
+    assert "gyro_rate is nan" in lab.archive.endings[2].reason
 
 
 def test_a_stop_interrupts_them_all() -> None:
     def asks(turn: int, recorder: Recorder, stop: Callable[[], bool]) -> None:
         if turn == 1:
-            run.stop.request("the test")
+            lab.stop.request("the test")
 
-    run = Run(make_trials(6), Together(turns={1: asks}))
-    outcome = run()
+    lab = Lab(make_trials(6), Together(turns={1: asks}))
+    outcome = lab.run()
     assert outcome.status is RunStatus.INTERRUPTED
     assert outcome.outcomes == {Outcome.INTERRUPTED: 4}
-    assert set(run.archive.samples) == {1, 2, 3, 4}
-    assert max(run.archive.samples.values()) <= 15
+    assert set(lab.archive.samples) == {1, 2, 3, 4}
+    assert max(lab.archive.samples.values()) <= 15
 
 
 def test_a_failure_that_aborts_the_run_stops_its_companions_at_once() -> None:
     fails = end_at(1, Ending(Outcome.LIMIT, "too fast"))
-    run = Run(
+    lab = Lab(
         make_trials(6),
         Together(turns={1: fails, 2: waits_for_stop}),
         faults={"default": {"do": "abort"}},
     )
-    outcome = run()
+    outcome = lab.run()
     assert outcome.status is RunStatus.FAULT
-    assert run.archive.endings[1].outcome is Outcome.LIMIT
-    assert run.archive.endings[2].outcome is Outcome.INTERRUPTED
-    assert set(run.archive.endings) == {1, 2, 3, 4}
+    assert lab.archive.endings[1].outcome is Outcome.LIMIT
+    assert lab.archive.endings[2].outcome is Outcome.INTERRUPTED
+    assert set(lab.archive.endings) == {1, 2, 3, 4}
 
 
 def test_one_that_is_tried_again_is_the_next() -> None:
     times = iter([Ending(Outcome.LIMIT, "too fast"), None, None, None, None])
-    run = Run(
+    lab = Lab(
         make_trials(6),
         Together(turns={2: lambda turn, recorder, stop: next(times)}),
         faults={"default": {"do": "retry"}},
     )
-    run()
-    assert run.backend.batches == [[1, 2, 3, 4], [2, 5, 6]]
-    assert [number for number, _ in run.archive.attempts].count(2) == 2
-    assert run.archive.endings[2].outcome is Outcome.COMPLETED
+    lab.run()
+    assert lab.backend.batches == [[1, 2, 3, 4], [2, 5, 6]]
+    assert [number for number, _ in lab.archive.attempts].count(2) == 2
+    assert lab.archive.endings[2].outcome is Outcome.COMPLETED
 
 
 def test_a_backend_that_cannot_go_on_has_ended_what_it_ended() -> None:
-    run = Run(
+    lab = Lab(
         make_trials(4),
         Together(turns={1: end_at(0, COMPLETED), 3: raise_at(2, BackendError("no more"))}),
     )
-    run.trials[0] = make_trials(1, duration=0.5)[0]
-    outcome = run()
+    lab.trials[0] = make_trials(1, duration=0.5)[0]
+    outcome = lab.run()
     assert outcome.status is RunStatus.FAULT
-    assert run.archive.endings[1].outcome is Outcome.COMPLETED
+    assert lab.archive.endings[1].outcome is Outcome.COMPLETED
     for number in (2, 3, 4):
-        ending = run.archive.endings[number]
+        ending = lab.archive.endings[number]
         assert (ending.outcome, ending.reason) == (Outcome.FAULT, "no more")
         assert ending.safe_state is SafeState.NOT_CONFIRMED
-
-
-OWN = "campaign.backends.own"
 
 
 class OwnTogether(Together):
     """As one of the program's own: what it raises is a bug."""
 
-    __module__ = OWN
+    __module__ = "campaign.backends.own"
 
 
 def test_a_bug_in_a_backend_costs_no_archive_and_is_not_swallowed() -> None:
-    run = Run(make_trials(3), OwnTogether(turns={2: raise_at(1, ZeroDivisionError("oh"))}))
+    lab = Lab(make_trials(3), OwnTogether(turns={2: raise_at(1, ZeroDivisionError("oh"))}))
     with pytest.raises(ZeroDivisionError):
-        run()
-    assert run.archive.sealed is not None
-    assert {ending.reason for ending in run.archive.endings.values()} == {
+        lab.run()
+    assert lab.archive.sealed is not None
+    assert {ending.reason for ending in lab.archive.endings.values()} == {
         "internal error: ZeroDivisionError: oh"
     }
 
@@ -287,48 +260,42 @@ def test_a_backend_that_tells_of_no_ending_has_none() -> None:
         def execute_together(self, *args: object) -> Iterator[tuple[int, Ending]]:
             yield from ()
 
-    run = Run(make_trials(3), Silent())
-    outcome = run()
+    lab = Lab(make_trials(3), Silent())
+    outcome = lab.run()
     assert outcome.status is RunStatus.FAULT
     assert outcome.exit_code is ExitCode.LIMIT_OR_FAULT
-    assert "did not say how it ended" in run.archive.endings[3].reason
+    assert "did not say how it ended" in lab.archive.endings[3].reason
 
 
-class TwiceTold(Together):
-    __module__ = OWN
-
-    def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
-        yield 1, COMPLETED
-        yield 1, COMPLETED
-
-
-class Nowhere(Together):
-    __module__ = OWN
-
-    def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
-        yield 17, COMPLETED
-
-
-class NoGenerator(Together):
-    __module__ = OWN
-
-    def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
+def telling(*endings: tuple[int, Ending]) -> Iterator[tuple[int, Ending]]:
+    yield from endings
+    if not endings:
         raise OverflowError("oh")
 
 
 @pytest.mark.parametrize(
-    ("backend", "error"),
-    [(TwiceTold, LookupError), (Nowhere, LookupError), (NoGenerator, OverflowError)],
+    ("told", "error"),
+    [
+        (((1, COMPLETED), (1, COMPLETED)), LookupError),
+        (((17, COMPLETED),), LookupError),
+        ((), OverflowError),
+    ],
 )
 def test_no_bug_of_a_backend_costs_the_archive(
-    backend: type[Together], error: type[Exception]
+    told: tuple[tuple[int, Ending], ...], error: type[Exception]
 ) -> None:
-    run = Run(make_trials(3), backend())
+    class Wrong(Together):
+        __module__ = OwnTogether.__module__
+
+        def execute_together(self, *what: object) -> Iterator[tuple[int, Ending]]:
+            return telling(*told)
+
+    lab = Lab(make_trials(3), Wrong())
     with pytest.raises(error):
-        run()
-    assert run.archive.sealed is not None
-    faults = [each for each in run.archive.endings.values() if each.outcome is Outcome.FAULT]
-    assert (len(run.archive.endings), len(faults)) == (3, 3)  # one for want of samples
+        lab.run()
+    assert lab.archive.sealed is not None
+    faults = [each for each in lab.archive.endings.values() if each.outcome is Outcome.FAULT]
+    assert (len(lab.archive.endings), len(faults)) == (3, 3)  # one for want of samples
 
 
 def test_a_trial_that_the_backend_cannot_place_goes_alone() -> None:
@@ -337,9 +304,9 @@ def test_a_trial_that_the_backend_cannot_place_goes_alone() -> None:
             raise OverflowError("oh")
         return 0
 
-    run = Run(make_trials(4), Together(groups=groups))
-    assert run().status is RunStatus.COMPLETE
-    assert run.backend.batches == [[1, 3, 4], [2]]
+    lab = Lab(make_trials(4), Together(groups=groups))
+    assert lab.run().status is RunStatus.COMPLETE
+    assert lab.backend.batches == [[1, 3, 4], [2]]
 
 
 def test_what_moves_is_watched_alone() -> None:
@@ -349,10 +316,10 @@ def test_what_moves_is_watched_alone() -> None:
 
 def test_workers_share_the_bench_time_until_a_rest() -> None:
     """Trials of 2 s, a rest after each 8 s: due after four, however many workers there are."""
-    run = Run(make_trials(8), Together(), rest={"every": 8.0, "pause": 1.0})
-    run(workers=2)
-    assert len(run.pauses) == 1
-    first = sorted(number for batch in run.backend.batches[:-1] for number in batch)
+    lab = Lab(make_trials(8), Together(), rest={"every": 8.0, "pause": 1.0})
+    lab.run(workers=2)
+    assert len(lab.pauses) == 1
+    first = sorted(number for batch in lab.backend.batches[:-1] for number in batch)
     assert first[:4] == [1, 2, 3, 4]
 
 
@@ -368,29 +335,29 @@ def test_an_archive_that_fails_in_one_of_them_ends_the_run() -> None:
                 file.append = refuse  # type: ignore[method-assign]
             return file
 
-    run = Run(make_trials(4), Together())
-    run.archive = Full()
+    lab = Lab(make_trials(4), Together())
+    lab.archive = Full()
     with pytest.raises(ArchiveError, match="disk full"):
-        run()
-    assert run.archive.sealed is None
+        lab.run()
+    assert lab.archive.sealed is None
 
 
 def test_progress_tells_of_each() -> None:
-    run = Run(make_trials(4), Together())
-    run()
-    assert max(len(progress.running) for progress in run.progress) == 4
-    ended = [progress.ended[0].number for progress in run.progress if progress.ended]
+    lab = Lab(make_trials(4), Together())
+    lab.run()
+    assert max(len(progress.running) for progress in lab.progress) == 4
+    ended = [progress.ended[0].number for progress in lab.progress if progress.ended]
     assert sorted(ended) == [1, 2, 3, 4]
-    assert run.progress[-1].done == 4
+    assert lab.progress[-1].done == 4
 
 
 def test_channels_are_each_ones_own() -> None:
     """A trial whose backend announces nothing it needs is ended; its companions are not."""
     trials = make_trials(3)
     trials[1] = trials[1].model_copy(update={"requires": ("motor_current",)})
-    run = Run(trials, Together())
-    run()
-    assert [run.archive.endings[number].outcome for number in (1, 2, 3)] == [
+    lab = Lab(trials, Together())
+    lab.run()
+    assert [lab.archive.endings[number].outcome for number in (1, 2, 3)] == [
         Outcome.COMPLETED,
         Outcome.FAULT,
         Outcome.COMPLETED,

@@ -8,13 +8,7 @@ import pytest
 from rich.console import Console
 
 from campaign.archive import RunHeader, RunWriter, list_runs
-from campaign.execution.display import (
-    PlainDisplay,
-    clock,
-    counts,
-    live_display,
-    progress_display,
-)
+from campaign.execution.display import PlainDisplay, clock, counts, live_display, progress_display
 from campaign.execution.progress import Ledger, Progress
 from campaign.recording import Ending, Outcome
 from tests.execution.fakes import COMPLETED, make_trials

@@ -63,17 +63,12 @@ def run(
     writer = writer or RunWriter.create(folder, header, plan.trials)
     with closing(writer), SimBackend(SimOptions()) as backend:
         return run_plan(
-            plan.trials,
-            backend,
-            writer,
-            workers=2,
-            display=display,
-            stop=stop or StopSwitch(),
+            plan.trials, backend, writer, workers=2, display=display, stop=stop or StopSwitch(),
             measure=TrialMeasurement(experiments()),
             finished={n: o for n, o in writer.finished.items() if o is Outcome.COMPLETED},
             supervision=Supervision(timing=timing),
             executor=partial(process_executor, count=2) if in_processes else None,
-        )
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -2,65 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import threading
 
 import pytest
 
 from campaign.errors import ExitCode
 from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
-from campaign.execution.outcome import RunOutcome
-from campaign.execution.runner import run_plan
-from campaign.execution.stop import StopSwitch
-from campaign.policy import Policy
-from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, SafeState
-from campaign.trial import Trial
-from tests.execution.fakes import FakeBackend, MemoryArchive, make_trials
+from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
+from tests.execution.fakes import COMPLETED, Lab, SwitchedBench
 
 STOP = PanicStop(3, "ada")
 CUT = Ending(Outcome.INTERRUPTED, str(STOP))
 
 
-@dataclass
-class StoppableBackend(FakeBackend):
-    stop: PanicStop | None = None
-    broken: bool = False
-
-    def introduce(self, run: str) -> None: ...
-
-    def execute(self, trial: Trial, recorder: Recorder, stopped: Callable[[], bool]) -> Ending:
-        if self.stop is not None:  # as a controller that refuses to arm
-            return CUT
-        return super().execute(trial, recorder, stopped)
-
-    def panic_stop(self) -> PanicStop | None:
-        if self.broken:
-            raise RuntimeError("a bug")
-        return self.stop
-
-    def clear_stop(self, count: int) -> None:
-        self.log.append("cleared")
-
-
-def run(
-    backend: StoppableBackend, policy: Policy | None = None
-) -> tuple[RunOutcome, MemoryArchive]:
-    archive = MemoryArchive()
-    outcome = run_plan(
-        make_trials(3),
-        backend,
-        archive,
-        workers=1,
-        display=lambda progress: None,
-        stop=StopSwitch(),
-        policy=policy,
-        attendance=Attendance(SimulatedOperator(), wait_unless),
-    )
-    return outcome, archive
-
-
-def stopped_in(number: int, ending: Ending = CUT) -> StoppableBackend:
-    backend = StoppableBackend()
+def stopped_in(number: int, ending: Ending = CUT) -> SwitchedBench:
+    backend = SwitchedBench()
 
     def behave(stopped: object) -> Ending:
         backend.stop = STOP
@@ -70,50 +26,74 @@ def stopped_in(number: int, ending: Ending = CUT) -> StoppableBackend:
     return backend
 
 
-def test_in_a_trial_it_ends_the_run_and_is_told() -> None:
-    outcome, archive = run(stopped_in(2))
+def test_in_a_trial_it_ends_the_run_and_is_told_before_the_bench_is_made_safe() -> None:
+    lab = Lab(3, stopped_in(2))
+
+    def made_safe() -> SafeState:
+        assert lab.archive.decisions == [("panic stop", None)]
+        return SafeState.CONFIRMED
+
+    lab.backend.rest = made_safe
+    outcome = lab.run()
     assert (outcome.status, outcome.reason) == ("interrupted", "panic stop by ada")
     assert outcome.exit_code is ExitCode.INTERRUPTED
-    assert archive.decisions == [("panic stop", None)]
-    assert archive.reasons == ["by ada, stop number 3"]
-    assert list(archive.endings) == [1, 2]
+    assert lab.archive.decisions == [("panic stop", None)]
+    assert lab.archive.reasons == ["by ada, stop number 3"]
+    assert lab.remarks == ["PANIC STOP by ada: the bench stays off until that is cleared"]
+    assert list(lab.archive.endings) == [1, 2]
 
 
 def test_a_bench_not_seen_at_rest_comes_first() -> None:
     backend = stopped_in(2)
     backend.rest = lambda: SafeState.NOT_CONFIRMED
-    outcome, _ = run(backend)
+    outcome = Lab(3, backend).run()
     assert outcome.exit_code is ExitCode.NOT_SAFE
     assert outcome.reason.startswith("panic stop by ada; ")
 
 
 @pytest.mark.parametrize("number", [1, 3])
-def test_between_trials_and_after_the_last_one(number: int) -> None:
-    outcome, archive = run(stopped_in(number, Ending(Outcome.COMPLETED)))
-    assert outcome.exit_code is ExitCode.INTERRUPTED
-    assert outcome.reason == "panic stop by ada"
-    done = [at for at, ending in archive.endings.items() if ending.outcome is Outcome.COMPLETED]
-    assert done == list(range(1, number + 1))
+@pytest.mark.parametrize("asked_at_once", [False, True])
+def test_between_trials_and_after_the_last_one(
+    number: int, asked_at_once: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked at once nothing moves again; else the next trial is refused by the bench."""
+    if asked_at_once:  # these trials take no time
+        monkeypatch.setattr("campaign.execution.external_stop.INTERVAL", 0.0)
+    lab = Lab(3, stopped_in(number, COMPLETED))
+    outcome = lab.run()
+    assert (outcome.exit_code, outcome.reason) == (ExitCode.INTERRUPTED, "panic stop by ada")
+    assert lab.executed == [f"trial-0000{done}" for done in range(1, number + 1)]
+    ends = {at for at, ending in lab.archive.endings.items() if ending == COMPLETED}
+    assert ends == set(range(1, number + 1))
+    assert len(lab.archive.endings) == number + (number == 1 and not asked_at_once)
+
+
+def test_a_bench_is_asked_only_while_nothing_moves_also_in_parallel() -> None:
+    moment = threading.Event()
+    behaviour = {n: lambda stopped: moment.wait(0.02) or COMPLETED for n in range(1, 7)}
+    lab = Lab(6, SwitchedBench(behaviour))
+    assert lab.run(workers=2).outcomes == {Outcome.COMPLETED: 6}
+    assert lab.backend.asked >= 1
 
 
 def test_no_retry_follows_it_however_the_trial_ended() -> None:
     hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE)
-    retry = Policy.model_validate(
-        {"faults": {"default": {"do": "retry", "times": 5, "pause": 1e9}}}, context={"si": True}
-    )
-    outcome, archive = run(stopped_in(1, hot), retry)
-    assert outcome.reason == "panic stop by ada"
-    assert [number for number, _ in archive.attempts] == [1]
+    retry = {"default": {"do": "retry", "times": 5, "pause": 1e9}}
+    lab = Lab(3, stopped_in(1, hot), faults=retry)
+    waits = Attendance(SimulatedOperator(), wait_unless)
+    assert lab.run(attendance=waits).reason == "panic stop by ada"
+    assert [number for number, _ in lab.archive.attempts] == [1]
 
 
 def test_the_run_never_clears_it() -> None:
     backend = stopped_in(1)
-    run(backend)
+    Lab(3, backend).run()
     assert "cleared" not in backend.log
 
 
 def test_a_bench_that_cannot_be_asked_ends_the_run_and_not_the_archive() -> None:
-    outcome, archive = run(StoppableBackend(broken=True))
+    lab = Lab(3, SwitchedBench(broken=True))
+    outcome = lab.run()
     assert outcome.status == "interrupted"
     assert "cannot be asked: panic_stop() failed in" in outcome.reason
-    assert archive.sealed is not None
+    assert lab.archive.sealed is not None

@@ -9,60 +9,15 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ExitCode
-from campaign.execution.operator_prompts import Attendance, SimulatedOperator, wait_unless
-from campaign.execution.outcome import RunOutcome
-from campaign.execution.progress import Progress
-from campaign.execution.runner import run_plan
+from campaign.execution.operator_prompts import wait_unless
 from campaign.execution.stop import StopSwitch
-from campaign.policy import Policy, Response, Rest
-from campaign.recording import Ending, Fault, Outcome, PanicStop, SafeState
+from campaign.policy import Response, Rest
+from campaign.recording import Ending, Fault, Outcome
 from campaign.trial import Trial
-from tests.execution.fakes import (
-    COMPLETED,
-    FakeBackend,
-    MemoryArchive,
-    SwitchedBench,
-    make_trials,
-)
+from tests.execution.fakes import COMPLETED, Lab, make_trials
 
 LOST = Ending(Outcome.FAULT, "no word for 3 s", fault=Fault.LOST_CONNECTION)
 LIMIT = Ending(Outcome.LIMIT, "too fast")
-
-
-class Lab:
-    """A run whose pauses are noted instead of waited for."""
-
-    def __init__(self, trials: int | list[Trial], behaviour: dict, **policy: object) -> None:
-        self.trials = make_trials(trials) if isinstance(trials, int) else trials
-        self.backend = FakeBackend(behaviour)
-        self.archive = MemoryArchive()
-        self.policy = Policy.model_validate(policy, context={"si": True})
-        self.pauses: list[float] = []
-        self.stop = StopSwitch()
-        self.progress: list[Progress] = []
-
-    def run(self, finished: dict[int, Outcome] | None = None, workers: int = 1) -> RunOutcome:
-        return run_plan(
-            self.trials,
-            self.backend,
-            self.archive,
-            workers=workers,
-            display=self.progress.append,
-            stop=self.stop,
-            policy=self.policy,
-            attendance=Attendance(
-                SimulatedOperator(), lambda seconds, stop: self.pauses.append(seconds)
-            ),
-            finished=finished or {},
-        )
-
-    @property
-    def remarks(self) -> list[str]:
-        return [progress.remark for progress in self.progress if progress.remark]
-
-    @property
-    def executed(self) -> list[str]:
-        return [name for name in self.backend.log if name != "made safe"]
 
 
 def in_turn(*endings: Ending) -> Callable[[Callable[[], bool]], Ending]:
@@ -148,22 +103,11 @@ def test_nothing_moves_while_the_bench_rests_or_hands_are_at_it():
             assert not moving.is_set()
             return "done"
 
-    for policy, setups in (
-        (Policy.model_validate({"rest": {"every": 1.0, "pause": 60.0}}, context={"si": True}), ()),
-        (Policy(), ("preload",)),
-    ):
+    for rest, setups in (({"every": "1 s", "pause": "60 s"}, ()), (None, ("preload",))):
         disturbed.clear()
-        lab = Lab(set_up((), (), setups, setups), {1: first, 2: second})
-        run = run_plan(
-            lab.trials,
-            lab.backend,
-            lab.archive,
-            workers=2,
-            display=lab.progress.append,
-            stop=lab.stop,
-            policy=policy,
-            attendance=Attendance(Hands(), lambda seconds, stop: disturbed.set()),
-        )
+        lab = Lab(set_up((), (), setups, setups), {1: first, 2: second}, rest=rest)
+        lab.operator, lab.pause = Hands(), lambda seconds: disturbed.set()
+        run = lab.run(workers=2)
         assert disturbed.is_set()
         assert run.outcomes == {Outcome.COMPLETED: 4}
 
@@ -177,7 +121,7 @@ def test_a_run_that_was_stopped_neither_rests_nor_asks_anybody():
     lab.run()
     assert (lab.pauses, lab.archive.decisions, lab.archive.steps) == ([], [], [])
     lab = Lab(set_up((), ("preload",)), {}, rest=Rest(every="1 s", pause="60 s"))
-    lab.pauses = _StoppedPause(lab.stop)  # in the rest itself
+    lab.pause = lambda seconds: lab.stop.request("Ctrl-C")  # in the rest itself
     lab.run()
     assert lab.archive.steps == []
     assert lab.executed == ["trial-00001"]
@@ -191,59 +135,6 @@ def test_a_rest_asks_for_nothing_that_has_been_done():
     assert lab.pauses == [60.0] * 3
 
 
-BY_EVE = PanicStop(3, "eve", 1.5)
-
-
-def switched(count: int, behaviour: dict, **policy: object) -> Lab:
-    lab = Lab(count, behaviour, **policy)
-    lab.backend = SwitchedBench(behaviour)
-    return lab
-
-
-def test_a_panic_stop_between_trials_ends_the_run_before_anything_moves_again(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    monkeypatch.setattr(
-        "campaign.execution.external_stop.INTERVAL", 0.0
-    )  # these trials take no time
-
-    def switched_off(stopped: Callable[[], bool]) -> Ending:
-        lab.backend.stop = BY_EVE
-        return COMPLETED
-
-    lab = switched(3, {1: switched_off})
-    run = lab.run()
-    assert lab.executed == ["trial-00001"]
-    assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "panic stop by eve")
-    assert lab.archive.decisions == [("panic stop", None)]
-    assert lab.archive.reasons == ["by eve, stop number 3"]
-    assert lab.remarks == ["PANIC STOP by eve: the bench stays off until that is cleared"]
-
-
-def test_a_panic_stop_in_a_trial_is_in_the_journal_before_the_bench_is_made_safe():
-    def switched_off(stopped: Callable[[], bool]) -> Ending:
-        lab.backend.stop = BY_EVE
-        return Ending(Outcome.INTERRUPTED, "switched off by SAFE")
-
-    def made_safe() -> SafeState:
-        assert lab.archive.decisions == [("panic stop", None)]
-        return SafeState.CONFIRMED
-
-    lab = switched(3, {1: switched_off})
-    lab.backend.rest = made_safe
-    run = lab.run()
-    assert (run.exit_code, run.reason) == (ExitCode.INTERRUPTED, "panic stop by eve")
-
-
-def test_a_bench_is_asked_about_stops_only_while_nothing_moves_also_in_parallel():
-    moment = threading.Event()
-    behaviour = {n: lambda stopped: moment.wait(0.02) or COMPLETED for n in range(1, 7)}
-    lab = switched(6, behaviour)
-    run = lab.run(workers=2)
-    assert run.outcomes == {Outcome.COMPLETED: 6}
-    assert lab.backend.asked >= 1
-
-
 def test_nothing_rests_for_a_trial_that_does_not_come():
     lab = Lab(2, {}, rest=Rest(every="4 s", pause="60 s"))
     lab.run()
@@ -252,19 +143,11 @@ def test_nothing_rests_for_a_trial_that_does_not_come():
 
 def test_a_stop_during_the_pause_before_a_retry_interrupts_the_run():
     lab = Lab(2, {1: in_turn(LOST, COMPLETED)}, faults={"default": "retry"})
-    lab.pauses = _StoppedPause(lab.stop)
+    lab.pause = lambda seconds: lab.stop.request("Ctrl-C")
     run = lab.run()
     assert lab.executed == ["trial-00001"]
     assert run.status is RunStatus.INTERRUPTED
     assert lab.archive.decisions == [("retry", 1)]
-
-
-class _StoppedPause(list):
-    def __init__(self, stop: StopSwitch) -> None:
-        self._stop = stop
-
-    def append(self, seconds: float) -> None:
-        self._stop.request("Ctrl-C")
 
 
 def test_a_pause_ends_at_once_when_the_run_is_stopped_already():
@@ -307,15 +190,8 @@ def test_a_person_who_says_stop_interrupts_the_run_before_anything_moves():
             return None
 
     lab = Lab(set_up((), ("preload",)), {})
-    run = run_plan(
-        lab.trials,
-        lab.backend,
-        lab.archive,
-        workers=1,
-        display=lambda progress: None,
-        stop=lab.stop,
-        attendance=Attendance(Unwilling(), lambda seconds, stop: None),
-    )
+    lab.operator = Unwilling()
+    run = lab.run()
     assert lab.executed == ["trial-00001"]
     assert lab.archive.steps == [(2, "preload", "stop")]
     assert (run.status, run.reason) == (RunStatus.INTERRUPTED, "stopped by the operator")

@@ -199,13 +199,9 @@ def test_times_may_be_rounded_otherwise() -> None:
 @pytest.mark.parametrize(
     ("samples", "stop_rate", "good"),
     [
-        (200, None, True),
-        (199, None, True),
-        (198, None, False),
-        (120, None, False),
-        (120, 0.1, True),
+        (200, None, True), (199, None, True), (198, None, False), (120, 0.1, True),
     ],
-)
+)  # fmt: skip
 def test_a_completed_trial_has_all_its_samples(
     samples: int, stop_rate: float | None, good: bool
 ) -> None:

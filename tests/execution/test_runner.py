@@ -13,43 +13,11 @@ import pytest
 
 from campaign.archive.layout.header import RunStatus
 from campaign.errors import ArchiveError, BackendError, ExitCode, UsageError
-from campaign.execution.outcome import RunOutcome
 from campaign.execution.progress import Progress
-from campaign.execution.runner import run_plan
 from campaign.execution.safety import AbortedError, NotSafeError, describe
-from campaign.execution.stop import StopSwitch
 from campaign.recording import Ending, Fault, Outcome, SafeState
 from campaign.trial import Trial
-from tests.execution.fakes import (
-    COMPLETED,
-    RATE,
-    FakeBackend,
-    MemoryArchive,
-    OwnBackend,
-    make_trials,
-)
-
-
-class Bench:
-    """A run of a few trials, with everything around it in memory."""
-
-    def __init__(self, count: int, backend: FakeBackend) -> None:
-        self.trials = make_trials(count)
-        self.backend = backend
-        self.archive = MemoryArchive()
-        self.stop = StopSwitch()
-        self.progress: list[Progress] = []
-        self.display = self.progress.append
-
-    def run(self, workers: int = 1) -> RunOutcome:
-        return run_plan(
-            self.trials,
-            self.backend,
-            self.archive,
-            workers=workers,
-            display=self.display,
-            stop=self.stop,
-        )
+from tests.execution.fakes import COMPLETED, RATE, FakeBackend, Lab, OwnBackend, no_space
 
 
 def raises(error: BaseException) -> Callable[[Callable[[], bool]], Ending]:
@@ -59,12 +27,29 @@ def raises(error: BaseException) -> Callable[[Callable[[], bool]], Ending]:
     return behave
 
 
+def insist(progress: Progress) -> None:
+    """Who looks on says stop once more as soon as a trial has ended."""
+    if progress.ended:
+        raise KeyboardInterrupt
+
+
+def stopping(bench: Lab, then: Callable[[], Ending]) -> Callable[[Callable[[], bool]], Ending]:
+    """The run is stopped while a trial is executed."""
+
+    def behave(stopped: Callable[[], bool]) -> Ending:
+        bench.stop.request("Ctrl-C")
+        assert stopped()
+        return then()
+
+    return behave
+
+
 def ends(outcome: Outcome, reason: str = "", safe: SafeState = SafeState.CONFIRMED):
     return lambda stopped: Ending(outcome, reason, safe)
 
 
 def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
-    bench = Bench(3, FakeBackend())
+    bench = Lab(3, FakeBackend())
     outcome = bench.run()
     assert bench.backend.log == ["trial-00001", "trial-00002", "trial-00003", "made safe"]
     assert outcome.status is RunStatus.COMPLETE
@@ -82,7 +67,7 @@ def test_trials_are_executed_in_order_and_the_bench_is_made_safe_last():
     ],
 )
 def test_a_failed_trial_is_recorded_and_the_campaign_goes_on(outcome: Outcome, code: ExitCode):
-    bench = Bench(3, FakeBackend({2: ends(outcome, "something")}))
+    bench = Lab(3, FakeBackend({2: ends(outcome, "something")}))
     run = bench.run()
     assert bench.archive.endings == {1: COMPLETED, 2: Ending(outcome, "something"), 3: COMPLETED}
     assert run.status is RunStatus.FAILED_TRIALS
@@ -93,20 +78,17 @@ UNSAFE = ends(Outcome.FAULT, "no answer from the drive", SafeState.NOT_CONFIRMED
 
 
 def test_nothing_moves_after_an_unsafe_trial_until_the_bench_was_seen_at_rest():
-    bench = Bench(3, FakeBackend({2: UNSAFE}))
+    bench = Lab(3, FakeBackend({2: UNSAFE}))
     run = bench.run()
-    assert bench.backend.log == [
-        *("trial-00001", "trial-00002", "made safe", "trial-00003", "made safe")
-    ]
+    first, second, third = (f"trial-0000{number}" for number in (1, 2, 3))
+    assert bench.backend.log == [first, second, "made safe", third, "made safe"]
     assert bench.archive.decisions == [("make safe", 2), ("skip", 2)]
-    assert "trial-00002: the safe state was not confirmed; now confirmed" in [
-        progress.remark for progress in bench.progress
-    ]
+    assert "trial-00002: the safe state was not confirmed; now confirmed" in bench.remarks
     assert run.status is RunStatus.FAILED_TRIALS
 
 
 def test_a_bench_that_is_not_seen_at_rest_after_a_trial_ends_the_run():
-    bench = Bench(3, FakeBackend({2: UNSAFE}, rest=lambda: SafeState.NOT_CONFIRMED))
+    bench = Lab(3, FakeBackend({2: UNSAFE}, rest=lambda: SafeState.NOT_CONFIRMED))
     run = bench.run()
     assert set(bench.archive.endings) == {1, 2}
     assert bench.archive.decisions == [("make safe", 2)]
@@ -117,24 +99,29 @@ def test_a_bench_that_is_not_seen_at_rest_after_a_trial_ends_the_run():
 
 
 def test_a_safe_state_that_nobody_saw_comes_before_every_other_exit_code():
-    bench = Bench(2, FakeBackend(rest=lambda: SafeState.NOT_CONFIRMED))
+    bench = Lab(2, FakeBackend(rest=lambda: SafeState.NOT_CONFIRMED))
     run = bench.run()
     assert run.exit_code is ExitCode.NOT_SAFE
     assert run.status is RunStatus.COMPLETE
     assert "not seen at rest" in run.reason
 
 
-def test_a_make_safe_that_fails_is_not_taken_for_safe():
-    def fail() -> SafeState:
-        raise OSError("port is gone")
+def not_confirmed() -> SafeState:
+    return SafeState.NOT_CONFIRMED
 
-    bench = Bench(1, FakeBackend(rest=fail))
+
+def drive_is_gone() -> SafeState:
+    raise OSError("port is gone")
+
+
+def test_a_make_safe_that_fails_is_not_taken_for_safe():
+    bench = Lab(1, FakeBackend(rest=drive_is_gone))
     assert bench.run().exit_code is ExitCode.NOT_SAFE
     assert "port is gone" in bench.archive.sealed[1]
 
 
 def test_a_backend_that_gives_up_ends_the_run_as_a_fault_with_the_trial_kept():
-    bench = Bench(3, FakeBackend({2: raises(BackendError("the port closed"))}))
+    bench = Lab(3, FakeBackend({2: raises(BackendError("the port closed"))}))
     run = bench.run()
     assert bench.archive.endings[2].outcome is Outcome.FAULT
     assert bench.archive.endings[2].reason == "the port closed"
@@ -144,7 +131,7 @@ def test_a_backend_that_gives_up_ends_the_run_as_a_fault_with_the_trial_kept():
 
 
 def test_a_bug_in_a_backend_of_ours_still_seals_the_archive_and_is_not_swallowed():
-    bench = Bench(3, OwnBackend({2: raises(ZeroDivisionError("oops"))}))
+    bench = Lab(3, OwnBackend({2: raises(ZeroDivisionError("oops"))}))
     with pytest.raises(ZeroDivisionError):
         bench.run()
     assert bench.backend.log[-1] == "made safe"
@@ -157,29 +144,21 @@ def test_a_bug_in_a_backend_of_ours_still_seals_the_archive_and_is_not_swallowed
     "error", [ZeroDivisionError("oops"), SystemExit(0), KeyboardInterrupt(), UsageError("oops")]
 )
 def test_whatever_the_backend_of_another_raises_is_a_fault_with_its_name(error: BaseException):
-    bench = Bench(3, FakeBackend({2: raises(error)}))
+    bench = Lab(3, FakeBackend({2: raises(error)}))
     run = bench.run()
     assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
     assert bench.backend.log[-1] == "made safe"
-    named = (
-        isinstance(error, UsageError) or "execute() failed in tests.execution.fakes" in run.reason
-    )
-    assert named, run.reason
+    named = "execute() failed in tests.execution.fakes" in run.reason
+    assert named or isinstance(error, UsageError), run.reason
     assert describe(error) in run.reason
 
 
 @pytest.mark.parametrize(
     "ending",
-    [
-        None,
-        "completed",
-        {"outcome": "completed"},
-        Ending("completed"),
-        Ending(Outcome.FAULT, fault="x"),
-    ],
+    [None, {"outcome": "completed"}, Ending("completed"), Ending(Outcome.FAULT, fault="x")],
 )
 def test_an_ending_of_another_type_is_a_fault(ending: object):
-    run = Bench(2, FakeBackend({1: lambda stopped: ending})).run()
+    run = Lab(2, FakeBackend({1: lambda stopped: ending})).run()
     assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
     assert "execute() of tests.execution.fakes.FakeBackend answered with" in run.reason
 
@@ -187,7 +166,7 @@ def test_an_ending_of_another_type_is_a_fault(ending: object):
 def test_what_execute_says_is_archived_as_plain_text_and_json():
     telemetry = {"bad \ud800": float("nan"), "deep": [{"object": object()}], 3: True}
     ending = Ending(Outcome.FAULT, "a\ud800b\x1b[2J" + "x" * 10_000, telemetry=telemetry)
-    bench = Bench(1, FakeBackend({1: lambda stopped: ending}))
+    bench = Lab(1, FakeBackend({1: lambda stopped: ending}))
     bench.run()
     kept = bench.archive.endings[1]
     assert kept.reason.startswith("a?b?[2Jxxx")
@@ -199,12 +178,8 @@ def test_what_execute_says_is_archived_as_plain_text_and_json():
 
 
 def test_an_archive_that_cannot_be_written_ends_the_run_unsealed_with_the_bench_safe():
-    bench = Bench(3, FakeBackend())
-
-    def full(trial: Trial, keeping: object) -> None:
-        raise ArchiveError("no space left")
-
-    bench.archive.begin = full  # type: ignore[assignment]
+    bench = Lab(3, FakeBackend())
+    bench.archive.begin = no_space  # type: ignore[assignment]
     with pytest.raises(ArchiveError, match="no space left"):
         bench.run()
     assert bench.backend.log == ["made safe"]
@@ -212,14 +187,9 @@ def test_an_archive_that_cannot_be_written_ends_the_run_unsealed_with_the_bench_
 
 
 def test_a_stop_lets_the_running_trial_end_and_begins_no_other():
-    bench = Bench(3, FakeBackend())
-
-    def stop_and_end(stopped: Callable[[], bool]) -> Ending:
-        bench.stop.request("Ctrl-C")
-        assert stopped()
-        return Ending(Outcome.INTERRUPTED, "stopped")
-
-    bench.backend.behaviour[2] = stop_and_end
+    bench = Lab(3, FakeBackend())
+    interrupted = Ending(Outcome.INTERRUPTED, "stopped")
+    bench.backend.behaviour[2] = stopping(bench, lambda: interrupted)
     run = bench.run()
     assert set(bench.archive.endings) == {1, 2}
     assert bench.archive.sealed == ("interrupted", "stopped by Ctrl-C", SafeState.CONFIRMED)
@@ -227,45 +197,31 @@ def test_a_stop_lets_the_running_trial_end_and_begins_no_other():
 
 
 def test_a_stop_after_the_last_trial_changes_nothing():
-    bench = Bench(1, FakeBackend())
-
-    def stop_but_complete(stopped: Callable[[], bool]) -> Ending:
-        bench.stop.request("Ctrl-C")
-        return COMPLETED
-
-    bench.backend.behaviour[1] = stop_but_complete
+    bench = Lab(1, FakeBackend())
+    bench.backend.behaviour[1] = stopping(bench, lambda: COMPLETED)
     assert bench.run().exit_code is ExitCode.DONE
 
 
 @pytest.mark.parametrize(("said", "who"), [("emergency stop", "emergency stop"), ("", "the bench")])
 def test_a_trial_interrupted_at_the_bench_interrupts_the_run(said: str, who: str):
-    bench = Bench(3, FakeBackend({1: ends(Outcome.INTERRUPTED, said)}))
+    bench = Lab(3, FakeBackend({1: ends(Outcome.INTERRUPTED, said)}))
     run = bench.run()
     assert set(bench.archive.endings) == {1}
     assert (run.status, run.reason) == (RunStatus.INTERRUPTED, f"stopped by {who}")
 
 
 def test_who_stopped_a_run_comes_before_what_then_failed():
-    bench = Bench(3, FakeBackend())
-
-    def stop_and_fail(stopped: Callable[[], bool]) -> Ending:
-        bench.stop.request("Ctrl-C")
-        raise BackendError("the port closed")
-
-    bench.backend.behaviour[2] = stop_and_fail
+    bench = Lab(3, FakeBackend())
+    closed = raises(BackendError("the port closed"))
+    bench.backend.behaviour[2] = stopping(bench, lambda: closed(bench.stop))
     run = bench.run()
     assert (run.status, run.exit_code) == (RunStatus.INTERRUPTED, ExitCode.INTERRUPTED)
     assert run.reason == "stopped by Ctrl-C; the port closed"
 
 
 def test_a_run_that_ends_anyway_makes_the_bench_safe_once():
-    bench = Bench(3, FakeBackend())
-
-    def stop_unseen(stopped: Callable[[], bool]) -> Ending:
-        bench.stop.request("Ctrl-C")
-        return Ending(Outcome.FAULT, "no answer", SafeState.NOT_CONFIRMED)
-
-    bench.backend.behaviour[1] = stop_unseen
+    bench = Lab(3, FakeBackend())
+    bench.backend.behaviour[1] = stopping(bench, lambda: UNSAFE(bench.stop))
     bench.run()
     assert bench.backend.log == ["trial-00001", "made safe"]
 
@@ -279,7 +235,7 @@ def test_samples_that_were_lost_are_no_numbers():
             recorder.append(np.array([0.4]), np.array([[5.0]]))
             return Ending(Outcome.FAULT, "samples were lost", fault=Fault.LOST_SAMPLES)
 
-    bench = Bench(1, Leaky())
+    bench = Lab(1, Leaky())
     bench.run()
     recording = bench.archive.recordings[1]
     np.testing.assert_array_equal(recording["gyro_rate"], [1.0, 2.0, np.nan, np.nan, 5.0])
@@ -288,11 +244,7 @@ def test_samples_that_were_lost_are_no_numbers():
 
 
 def test_a_second_stop_aborts_at_once_with_the_bench_safe_and_nothing_sealed():
-    bench = Bench(3, FakeBackend())
-
-    def insist(progress: Progress) -> None:
-        if progress.ended:
-            raise KeyboardInterrupt
+    bench = Lab(3, FakeBackend())
 
     bench.display = insist
     with pytest.raises(AbortedError) as aborted:
@@ -309,22 +261,14 @@ def test_a_stop_while_the_bench_is_made_safe_is_not_taken_for_safe():
         time.sleep(5.0)
         return SafeState.CONFIRMED
 
-    bench = Bench(1, FakeBackend(rest=interrupted))
+    bench = Lab(1, FakeBackend(rest=interrupted))
     with pytest.raises(NotSafeError, match="SAFE STATE NOT CONFIRMED") as unsafe:
         bench.run()
     assert unsafe.value.exit_code is ExitCode.NOT_SAFE
     assert "stopped at once" in str(unsafe.value)
 
 
-def not_confirmed() -> SafeState:
-    return SafeState.NOT_CONFIRMED
-
-
-def drive_is_gone() -> SafeState:
-    raise OSError("port is gone")
-
-
-def assert_unsafe_is_said_first(bench: Bench, *reasons: str) -> None:
+def assert_unsafe_is_said_first(bench: Lab, *reasons: str) -> None:
     with pytest.raises(NotSafeError) as unsafe:
         bench.run()
     assert unsafe.value.exit_code is ExitCode.NOT_SAFE
@@ -339,18 +283,14 @@ def assert_unsafe_is_said_first(bench: Bench, *reasons: str) -> None:
 def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_written(
     rest: Callable[[], SafeState], why: str
 ):
-    bench = Bench(3, FakeBackend(rest=rest))
-
-    def full(trial: Trial, keeping: object) -> None:
-        raise ArchiveError("no space left")
-
-    bench.archive.begin = full  # type: ignore[assignment]
+    bench = Lab(3, FakeBackend(rest=rest))
+    bench.archive.begin = no_space  # type: ignore[assignment]
     assert_unsafe_is_said_first(bench, why, "no space left", "run.partial")
 
 
 def test_an_unsafe_bench_comes_before_a_bug_in_the_backend():
     oops = raises(ZeroDivisionError("oops"))
-    bench = Bench(3, OwnBackend({2: oops}, rest=not_confirmed))
+    bench = Lab(3, OwnBackend({2: oops}, rest=not_confirmed))
     assert_unsafe_is_said_first(bench, "not seen at rest", "ZeroDivisionError: oops", "run.nxs")
     status, reason, safe_state = bench.archive.sealed
     assert (status, safe_state) == ("fault", SafeState.NOT_CONFIRMED)
@@ -368,7 +308,7 @@ def test_an_unsafe_bench_comes_before_a_bug_in_the_backend():
 def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_sealed(
     error: BaseException, said: str
 ):
-    bench = Bench(1, FakeBackend(rest=not_confirmed))
+    bench = Lab(1, FakeBackend(rest=not_confirmed))
 
     def fail(*arguments: object, **more: object) -> None:
         raise error
@@ -378,11 +318,7 @@ def test_an_unsafe_bench_comes_before_an_archive_that_cannot_be_sealed(
 
 
 def test_an_unsafe_bench_comes_before_a_stop_by_force():
-    bench = Bench(3, FakeBackend(rest=not_confirmed))
-
-    def insist(progress: Progress) -> None:
-        if progress.ended:
-            raise KeyboardInterrupt
+    bench = Lab(3, FakeBackend(rest=not_confirmed))
 
     bench.display = insist
     assert_unsafe_is_said_first(bench, "stopped at once")
@@ -396,7 +332,7 @@ def test_parallel_trials_run_at_the_same_time_and_all_are_archived():
         return COMPLETED
 
     before = set(threading.enumerate())
-    bench = Bench(80, FakeBackend(dict.fromkeys(range(1, 81), meet)))
+    bench = Lab(80, FakeBackend(dict.fromkeys(range(1, 81), meet)))
     run = bench.run(workers=40)
     assert not set(threading.enumerate()) - before
     assert run.outcomes == {Outcome.COMPLETED: 80}
@@ -415,12 +351,8 @@ def test_a_second_stop_waits_for_no_trial_that_does_not_end():
         assert hanging.wait(60)
         return COMPLETED
 
-    def insist(progress: Progress) -> None:
-        if progress.ended:
-            raise KeyboardInterrupt
-
     before = set(threading.enumerate())
-    bench = Bench(2, FakeBackend({1: hang, 2: end}))
+    bench = Lab(2, FakeBackend({1: hang, 2: end}))
     bench.display = insist
     try:
         with pytest.raises(AbortedError):
@@ -442,7 +374,7 @@ def until_stopped(then: Callable[[], Ending]) -> Callable[[Callable[[], bool]], 
 
 
 def test_when_the_archive_fails_the_other_trials_end_before_the_bench_is_made_safe():
-    bench = Bench(2, FakeBackend())
+    bench = Lab(2, FakeBackend())
     begin = bench.archive.begin
 
     def last() -> Ending:
@@ -470,7 +402,7 @@ def test_of_several_faults_the_first_is_the_reason():
     def second() -> Ending:
         raise ValueError("two")
 
-    bench = Bench(2, OwnBackend({1: raises(KeyError("one")), 2: until_stopped(second)}))
+    bench = Lab(2, OwnBackend({1: raises(KeyError("one")), 2: until_stopped(second)}))
     with pytest.raises(KeyError, match="one"):
         bench.run(workers=2)
     assert "KeyError: 'one'" in bench.archive.sealed[1]
@@ -489,14 +421,14 @@ def test_a_fault_lets_parallel_trials_end_without_calling_it_an_interruption():
         raise BackendError("the port closed")
 
     waiting = threading.Event()
-    bench = Bench(6, FakeBackend({1: wait_for_stop, 2: fail}))
+    bench = Lab(6, FakeBackend({1: wait_for_stop, 2: fail}))
     run = bench.run(workers=2)
     assert set(bench.archive.endings) == {1, 2}
     assert (run.status, run.exit_code) == (RunStatus.FAULT, ExitCode.LIMIT_OR_FAULT)
 
 
 def test_progress_adds_up_to_the_plan_and_tells_the_time_left():
-    bench = Bench(4, FakeBackend({2: ends(Outcome.DIVERGED)}))
+    bench = Lab(4, FakeBackend({2: ends(Outcome.DIVERGED)}))
     bench.run()
     last = bench.progress[-1]
     assert (last.total, last.done, last.failed, last.left) == (4, 3, 1, 0)

@@ -73,10 +73,7 @@ FAKE = "tests.execution.fakes.FakeBackend"
             raising(SystemExit(0)),
             f"making the bench safe failed: make_safe() failed in {FAKE}: SystemExit: 0",
         ),
-        (
-            lambda: "confirmed",
-            f"{FAILED}: make_safe() of {FAKE} answered with 'str', no SafeState",
-        ),
+        (lambda: "confirmed", f"{FAILED}: make_safe() of {FAKE} answered with 'str', no SafeState"),
     ],
 )
 def test_not_seen_safe_says_why_also_after_it_was(rest: Callable[[], SafeState], why: str) -> None:
@@ -271,10 +268,6 @@ def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Hanging]]
     yield make
     for each in made:
         each.let_go.set()
-
-
-def test_leaving_at_once_does_not_wait_for_ever(hanging: Callable[..., Hanging]) -> None:
-    assert safe_at_once(hanging("make safe")) is ExitCode.NOT_SAFE
 
 
 def test_a_bench_that_hangs_while_it_is_connected_is_made_safe(

@@ -75,17 +75,12 @@ class Run:
     def trials(self) -> list[Trial]:
         return [
             Trial(
-                number=number,
-                test="test",
-                kind="kind",
-                point={"place": place, "step": -1.0},
-                seed=number,
-                bench=self.bench,
-                task=request().task,
+                number=number, test="test", kind="kind", point={"place": place, "step": -1.0},
+                seed=number, bench=self.bench, task=request().task,
                 setup=self.setups.get(place, ()),
             )
             for number, place in enumerate(self.places, start=1)
-        ]
+        ]  # fmt: skip
 
     @property
     def experiment(self) -> Experiment:
@@ -299,10 +294,7 @@ FAST = Polyline(times=(0.0, 1.0), values=(0.0, 100.0))
         (request(float("nan")), "not JSON compliant"),
         (TrialRequest(request().task, point={"place": "c"}), "it chooses place, which is swept"),
         (TrialRequest(request().task, bench={**TREE, "axis": {"inertia": -1.0}}), "inertia"),
-        (
-            TrialRequest(request().task, requires=("gyro_rate", "base_rate")),
-            "it requires base_rate",
-        ),
+        (TrialRequest(request().task, requires=("gyro_rate", "base_rate")), "requires base_rate"),
     ],
 )
 def test_a_trial_that_a_plan_would_not_have_is_refused_by_itself(bad: TrialRequest, why: str):

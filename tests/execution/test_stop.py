@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import signal
 import subprocess
@@ -384,18 +385,29 @@ def insisted(folder: Path, does: str, stderr: int = subprocess.PIPE) -> tuple[in
         return code, process.stderr.read() if process.stderr else ""
 
 
-@on_posix
-def test_who_insists_before_anything_was_begun_leaves_at_once(tmp_path: Path):
-    code, said = insisted(tmp_path, "asked(); hang(ctypes.CDLL)")
-    assert code == 130
-    assert said.endswith("abort\n\nstopped at once; nothing was begun\n")
+NOTHING = "stopped at once; nothing was begun\n"
+SEEN_SAFE = "safe state confirmed: the bench is at rest with its drive off\n"
 
 
 @on_posix
-def test_a_program_that_hangs_already_is_heard_to_be_stopped_as_well(tmp_path: Path):
-    code, said = insisted(tmp_path, "hang(ctypes.CDLL)")
-    assert code == 130
-    assert said == "\nstopped at once; nothing was begun\n"
+@pytest.mark.parametrize(
+    ("before", "code", "said"),
+    [
+        ("asked(); ", 130, f".*abort\n\n{NOTHING}"),
+        ("", 130, f"\n{NOTHING}"),  # it hangs already: it is heard to be stopped as well
+        ("asked(); sys.stderr = sys.__stderr__ = None; ", 130, f".*abort\n\n{NOTHING}"),
+        (
+            "asked(); stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); ",
+            5,
+            f".*\n{NOT_SAFE}\nstopped at once.*",
+        ),
+        ("asked(); stop.kept(lambda: 'kept', moves=True); ", 130, f".*{SEEN_SAFE}kept\n"),
+    ],
+)
+def test_who_insists_leaves_at_once_and_is_told(tmp_path: Path, before: str, code: int, said: str):
+    found, told = insisted(tmp_path, f"{before}hang(ctypes.CDLL)")
+    assert found == code
+    assert re.fullmatch(said, told, re.DOTALL), told
 
 
 @pytest.mark.slow
@@ -409,23 +421,6 @@ def test_the_bench_is_made_safe_first_however_long_that_takes(tmp_path: Path):
 
 
 @on_posix
-def test_a_program_without_standard_error_of_its_own_is_left_as_well(tmp_path: Path):
-    code, said = insisted(
-        tmp_path, "asked(); sys.stderr = sys.__stderr__ = None; hang(ctypes.CDLL)"
-    )
-    assert code == 130
-    assert said.endswith("abort\n\nstopped at once; nothing was begun\n")
-
-
-@on_posix
-def test_a_bench_that_was_not_seen_safe_has_its_own_code_and_line(tmp_path: Path):
-    does = "asked(); stop.make_safe = lambda: made_safe(ExitCode.NOT_SAFE); hang(ctypes.CDLL)"
-    code, said = insisted(tmp_path, does)
-    assert code == 5
-    assert f"\n{NOT_SAFE}\nstopped at once" in said
-
-
-@on_posix
 def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
     ours, theirs = os.openpty()
     try:
@@ -436,12 +431,3 @@ def test_a_terminal_gets_its_cursor_back(tmp_path: Path):
         os.close(theirs)
     assert code == 130
     assert "\x1b[?25h\r\nstopped at once" in said
-
-
-@on_posix
-def test_who_insists_is_told_that_a_bench_which_moves_is_safe(tmp_path: Path):
-    code, said = insisted(
-        tmp_path, "asked(); stop.kept(lambda: 'kept', moves=True); hang(ctypes.CDLL)"
-    )
-    assert code == 130
-    assert said.endswith("safe state confirmed: the bench is at rest with its drive off\nkept\n")

@@ -17,11 +17,8 @@ from campaign.backends.calls import HEARTBEAT, Heartbeat
 from campaign.backends.interface import Source
 from campaign.errors import ArchiveError, BackendError, ExitCode
 from campaign.execution.outcome import RunOutcome
-from campaign.execution.progress import Progress
 from campaign.execution.recorder import LATE, SupervisingRecorder
-from campaign.execution.runner import run_plan
 from campaign.execution.sample_latency import Pace
-from campaign.execution.stop import StopSwitch
 from campaign.execution.supervision import Patience, SilenceWatch, Supervision, TrialStop
 from campaign.recording import (
     ChannelInfo,
@@ -33,7 +30,8 @@ from campaign.recording import (
     SafeState,
 )
 from campaign.trial import Trial
-from tests.execution.fakes import COMPLETED, MemoryArchive, MemoryTrial, make_trials
+from tests.execution import fakes
+from tests.execution.fakes import COMPLETED, MemoryTrial, make_trials
 
 ANGLE = ChannelInfo("relative_angle", "rad", "Angle", "deg")
 INTERRUPTED = Ending(Outcome.INTERRUPTED, "stopped")
@@ -80,29 +78,15 @@ def hand_over(recorder: Recorder, first: int, last: int, angle: float = 0.0) -> 
     recorder.append(np.arange(first, last) / 10, np.full((1, last - first), angle))
 
 
-class Lab:
+class Lab(fakes.Lab):
     def __init__(
         self, behave: Callable[[Live, Recorder, Callable[[], bool]], Ending], trials: int = 2
     ) -> None:
-        self.backend = Live(behave)
-        self.archive = MemoryArchive()
-        self.stop = StopSwitch()
-        self.progress: list[Progress] = []
-        self.trials = [t.model_copy(update={"bench": LIMITS}) for t in make_trials(trials)]
+        limited = [t.model_copy(update={"bench": LIMITS}) for t in make_trials(trials)]
+        super().__init__(limited, Live(behave))
 
-    def run(
-        self, patience: Patience = PATIENT, *, live: bool = True, measure: Measure | None = None
-    ) -> RunOutcome:
-        return run_plan(
-            self.trials,
-            self.backend,  # type: ignore[arg-type]
-            self.archive,
-            workers=1,
-            display=self.progress.append,
-            stop=self.stop,
-            supervision=Supervision(Source.HARDWARE, live, patience),
-            measure=measure,
-        )
+    def watched(self, patience: Patience = PATIENT, measure: Measure | None = None) -> RunOutcome:
+        return self.run(supervision=Supervision(Source.HARDWARE, True, patience), measure=measure)
 
 
 @pytest.fixture
@@ -134,7 +118,7 @@ def once(behave: Callable[..., Ending]) -> Callable[..., Ending]:
 
 def test_a_good_live_trial_is_left_alone(lab: Callable[..., Lab]) -> None:
     bench = lab(once(lambda live, recorder, stop: hand_over(recorder, 0, 20) or COMPLETED), 1)
-    assert bench.run().status is RunStatus.COMPLETE
+    assert bench.watched().status is RunStatus.COMPLETE
     assert bench.backend.log == ["begins", "returns", "made safe"]
     assert bench.archive.endings[1].telemetry["longest_gap_s"] == 0.0
 
@@ -160,7 +144,7 @@ def test_the_loop_that_watches_a_trial_sends_signs_of_life(
             live.released.wait(0.001)
         return INTERRUPTED
 
-    assert lab(waits, 1).run().status is RunStatus.COMPLETE
+    assert lab(waits, 1).watched().status is RunStatus.COMPLETE
     assert signs[-1] is False
 
 
@@ -170,7 +154,7 @@ def test_so_does_one_that_waits_for_an_answer(
     monkeypatch.setattr("campaign.backends.calls.MAKING_SAFE", 1.0)
     bench = lab(lambda live, recorder, stop: hand_over(recorder, 0, 20) or COMPLETED, 1)
     monkeypatch.setattr(bench.backend, "make_safe", lambda: bench.backend.released.wait() and None)
-    assert bench.run().exit_code is ExitCode.NOT_SAFE
+    assert bench.watched().exit_code is ExitCode.NOT_SAFE
     assert signs[-4:] == [True, True, True, False]
 
 
@@ -208,7 +192,7 @@ def test_a_bench_that_was_not_seen_safe_is_made_safe_before_its_recording_is_mea
         return ArchivedMetrics()
 
     bench = lab(unsafe, 1)
-    bench.run(measure=measure)
+    bench.watched(measure=measure)
     assert bench.backend.log[:4] == ["begins", "returns", "made safe", "measured"]
     assert bench.archive.endings[1].safe_state is SafeState.NOT_CONFIRMED, "as the backend said"
 
@@ -224,7 +208,7 @@ def test_a_bench_that_falls_silent_is_made_safe_while_its_backend_hangs(
         return Ending(Outcome.FAULT, "its own view", fault=Fault.DRIVE)
 
     bench = lab(once(hangs))
-    bench.run(replace(PATIENT, silence=0.1))
+    bench.watched(replace(PATIENT, silence=0.1))
     assert bench.backend.log[:4] == ["begins", "made safe", "returns", "made safe"]
     ending = bench.archive.endings[1]
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_CONNECTION)
@@ -241,7 +225,7 @@ def test_a_backend_that_does_not_come_back_ends_the_run_in_order(lab: Callable[.
         return COMPLETED
 
     bench = lab(once(never), 3)
-    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1))
+    run = bench.watched(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1))
     assert bench.backend.log == ["begins", "made safe", "made safe"]
     assert list(bench.archive.endings) == [1]
     ending = bench.archive.endings[1]
@@ -267,7 +251,7 @@ def test_a_bench_that_comes_to_rest_slowly_leaves_its_backend_time_to_return(
     make_safe = bench.backend.make_safe
     slowly = lambda: bench.backend.released.wait(0.3) or make_safe()  # noqa: E731
     monkeypatch.setattr(bench.backend, "make_safe", slowly)
-    run = bench.run(replace(PATIENT, first=0.1, giving_up=0.2, grace=LONG))
+    run = bench.watched(replace(PATIENT, first=0.1, giving_up=0.2, grace=LONG))
     assert "did not come back" not in bench.archive.endings[1].reason
     assert run.status is RunStatus.FAILED_TRIALS
 
@@ -279,10 +263,8 @@ def test_an_unsafe_bench_under_a_stuck_backend_has_its_exit_code(lab: Callable[.
 
     bench = lab(once(never))
     bench.backend.state = SafeState.NOT_CONFIRMED
-    assert (
-        bench.run(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1)).exit_code
-        is ExitCode.NOT_SAFE
-    )
+    run = bench.watched(replace(PATIENT, first=0.1, giving_up=0.1, grace=0.1))
+    assert run.exit_code is ExitCode.NOT_SAFE
     assert bench.archive.endings[1].safe_state is SafeState.NOT_CONFIRMED
 
 
@@ -295,7 +277,7 @@ def test_a_limit_is_followed_by_make_safe_whatever_the_backend_says(
         return COMPLETED
 
     bench = lab(once(exceeds))
-    run = bench.run()
+    run = bench.watched()
     assert bench.backend.log[:4] == ["begins", "returns", "made safe", "begins"]
     assert bench.archive.endings[1].outcome is Outcome.LIMIT
     assert bench.archive.samples[1] == 1
@@ -309,7 +291,7 @@ def test_a_limit_that_the_backend_does_not_heed_is_enforced(lab: Callable[..., L
         return COMPLETED
 
     bench = lab(once(goes_on))
-    bench.run(replace(PATIENT, grace=0.05))
+    bench.watched(replace(PATIENT, grace=0.05))
     assert bench.backend.log[:4] == ["begins", "made safe", "returns", "made safe"]
     assert bench.archive.endings[1].outcome is Outcome.LIMIT
 
@@ -321,7 +303,7 @@ def test_a_backend_that_heeds_its_stop_has_its_grace(lab: Callable[..., Lab]) ->
         return INTERRUPTED
 
     bench = lab(once(brakes))
-    bench.run()
+    bench.watched()
     assert bench.backend.log[:3] == ["begins", "returns", "made safe"]
 
 
@@ -333,7 +315,7 @@ def test_arming_and_coming_to_rest_may_take_longer_than_silence(lab: Callable[..
         return COMPLETED
 
     bench = lab(once(slow), 1)
-    assert bench.run(replace(PATIENT, silence=0.02)).status is RunStatus.COMPLETE
+    assert bench.watched(replace(PATIENT, silence=0.02)).status is RunStatus.COMPLETE
 
 
 def test_a_stop_by_somebody_gives_the_backend_time_to_brake(lab: Callable[..., Lab]) -> None:
@@ -344,7 +326,7 @@ def test_a_stop_by_somebody_gives_the_backend_time_to_brake(lab: Callable[..., L
         return INTERRUPTED
 
     bench = lab(once(brakes))
-    assert bench.run(replace(PATIENT, silence=0.02)).status is RunStatus.INTERRUPTED
+    assert bench.watched(replace(PATIENT, silence=0.02)).status is RunStatus.INTERRUPTED
     assert bench.archive.endings[1] == replace(
         INTERRUPTED, telemetry=bench.archive.endings[1].telemetry
     )
@@ -357,7 +339,7 @@ def test_a_stuck_backend_is_given_up_after_one_ctrl_c(lab: Callable[..., Lab]) -
         return INTERRUPTED
 
     bench = lab(once(never))
-    run = bench.run(replace(PATIENT, closing=0.1, giving_up=0.1, grace=0.1))
+    run = bench.watched(replace(PATIENT, closing=0.1, giving_up=0.1, grace=0.1))
     assert run.status is RunStatus.INTERRUPTED
     assert bench.archive.endings[1].fault is Fault.LOST_CONNECTION
 
@@ -371,7 +353,7 @@ def test_every_trial_has_its_own_stop_flag(lab: Callable[..., Lab]) -> None:
         return COMPLETED
 
     bench = lab(exceeds, 3)
-    bench.run()
+    bench.watched()
     assert [flag() for flag in flags] == [False, True, False]
     assert [e.outcome for e in bench.archive.endings.values()] == [
         Outcome.COMPLETED, Outcome.LIMIT, Outcome.COMPLETED,
@@ -386,10 +368,10 @@ def test_errors_of_the_backends_thread_are_those_of_the_run(lab: Callable[..., L
         raise ArchiveError("no space left")
 
     bench = lab(once(gone))
-    assert bench.run().status is RunStatus.FAULT
+    assert bench.watched().status is RunStatus.FAULT
     assert bench.archive.endings[1].reason == "the port closed"
     with pytest.raises(ArchiveError, match="no space left"):
-        lab(once(full)).run()
+        lab(once(full)).watched()
 
 
 def test_a_disk_that_hangs_leaves_no_bench_running(
@@ -406,7 +388,7 @@ def test_a_disk_that_hangs_leaves_no_bench_running(
 
     bench.archive.begin = begin_on_a_slow_disk  # type: ignore[method-assign]
     with pytest.raises(ArchiveError, match="takes no samples"):
-        bench.run(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1, grace=0.1))
+        bench.watched(replace(PATIENT, first=0.1, silence=0.1, giving_up=0.1, grace=0.1))
     assert bench.backend.log == ["begins", "made safe", "made safe"]
     assert bench.archive.endings == {}
 
@@ -491,7 +473,7 @@ def test_a_long_trial_tells_how_far_it_is(
         return COMPLETED
 
     bench = lab(once(half), 1)
-    bench.run()
+    bench.watched()
     first, within = bench.progress[:2]
     assert first.time_left is None
     assert within.running

@@ -29,12 +29,7 @@ pytest.importorskip("plotext")
 
 TASK = Task(mode="rate", duration=10.0, window=(0.0, 10.0), sample_rate=1000.0)
 TRIAL = Trial(number=1, test="sea", kind="motion", seed=1, bench={}, task=TASK)
-CHANNELS = (
-    info("command", "rate"),
-    info("relative_rate"),
-    info("motor_current"),
-    info("gyro_rate"),
-)
+CHANNELS = (info("command", "rate"), *map(info, ("relative_rate", "motor_current", "gyro_rate")))
 BRAILLE = "⠀⣿"
 
 
@@ -126,19 +121,14 @@ def on_terminal(folder: Path, terminal: str, *arguments: str) -> str:
     """
     ours, theirs = pty.openpty()
     kept = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "FORCE_COLOR")}
+    term = {"TERM": "dumb" if terminal == "dumb" else "xterm"}
     running = subprocess.Popen(
         [sys.executable, "-m", "campaign", *arguments],
         cwd=folder,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=theirs,
-        env={
-            **kept,
-            "PYTHONPATH": str(ROOT),
-            "TERM": "dumb" if terminal == "dumb" else "xterm",
-            "COLUMNS": "100",
-            "LINES": "40",
-        },
+        env=kept | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "LINES": "40"} | term,
     )
     os.close(theirs)
     shown = b""
@@ -175,6 +165,9 @@ def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
 LIVE = SEA.replace("cycles = 1\n", 'cycles = 1\nfrequency = "0.5 Hz"\n', 1)
 
 
+PACE = ("--speed", "1", "--heartbeat-timeout", "10")
+
+
 def live(port: str) -> tuple[str, ...]:
     return ("--backend", "serial", "--port", port, "--set", "backend.motion=emulated", "--yes")
 
@@ -184,9 +177,7 @@ def test_a_live_bench_is_watched_as_it_moves_and_waits_for_no_terminal(tmp_path:
     """4 s of samples a trial, sent at their pace; a host that falls silent finds the drive off."""
     (tmp_path / "sea.toml").write_text(LIVE, encoding="utf-8")
     seen: dict[int, np.ndarray] = {}
-    with controller(
-        "--speed", "1", "--heartbeat-timeout", "10", bench="simulink", pty=True
-    ) as port:
+    with controller(*PACE, bench="simulink", pty=True) as port:
         for terminal in ("slow", "dumb", "gone"):
             text = on_terminal(tmp_path, terminal, "run", "sea.toml", "--watch", *live(port))
             assert has_curve(text) == (terminal != "dumb")
@@ -203,9 +194,7 @@ def test_a_live_bench_is_watched_as_it_moves_and_waits_for_no_terminal(tmp_path:
 @pytest.mark.slow
 def test_resume_is_watched_as_run_is(tmp_path: Path) -> None:
     (tmp_path / "sea.toml").write_text(LIVE, encoding="utf-8")
-    with controller(
-        "--speed", "1", "--heartbeat-timeout", "10", bench="simulink", pty=True
-    ) as port:
+    with controller(*PACE, bench="simulink", pty=True) as port:
         process = begun(tmp_path, "run", "sea.toml", *live(port))
         with process:
             while not list(tmp_path.glob("results/*.partial")):

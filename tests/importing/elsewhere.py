@@ -63,9 +63,7 @@ def written(
             file.write(separator.join(f"{v:.9g}".replace(".", decimal) for v in row) + "\n")
 
 
-def columns_toml(
-    columns: Mapping[str, Foreign], *, repair: str = "", sign: str = "drive_torque"
-) -> str:
+def columns_toml(columns: Mapping[str, Foreign], *, repair: str = "") -> str:
     """The layout of such files, in a mapping."""
     lines = ["[columns.rig.time]", 'column = "t/ms"', 'unit = "ms"']
     if repair:

@@ -111,13 +111,7 @@ def sines(rig: Rig, seconds: float, rate: float, seed: int, most: float = 2.0) -
     return np.asarray(rig.fastest * v / np.abs(v).max())
 
 
-def moved(
-    rig: Rig,
-    rate: float,
-    seed: int,
-    wanted: Array,
-    bandwidth: float = 8.0,
-) -> Moved:
+def moved(rig: Rig, rate: float, seed: int, wanted: Array, bandwidth: float = 8.0) -> Moved:
     """The rig in a position loop along a wanted rate, shape (n,); sampled at `rate`."""
     draw = np.random.default_rng(seed)
     n, h = len(wanted), 1 / rate / FINE
@@ -349,43 +343,21 @@ def _gimbal_file(path: Path, m: Moved) -> None:
 
 
 LABORATORIES = (
-    Laboratory(
-        "spindle",
-        ("spindle.csv",),
-        spindle,
-        SPINDLE,
-        times={"drive_torque": f"{SPINDLE_CONSTANT} N m/A"},
-    ),
-    Laboratory(
-        "direct drive",
-        ("directdrive.mat",),
-        direct_drive,
-        TABLE,
-        units={"relative_angle": "rad", "reference": "rad", "drive_torque": "N m", "time": "s"},
-    ),
+    Laboratory("spindle", ("spindle.csv",), spindle, SPINDLE,
+               times={"drive_torque": f"{SPINDLE_CONSTANT} N m/A"}),
+    Laboratory("direct drive", ("directdrive.mat",), direct_drive, TABLE,
+               units={"relative_angle": "rad", "reference": "rad", "drive_torque": "N m",
+                      "time": "s"}),
     Laboratory("linear motor", ("slide_003.mat",), linear_motor, SLIDE, linear=True),
-    Laboratory(
-        "joint", ("position_rad.txt", "torque_Nm.txt", "position_ref_rad.txt"), joint, JOINT
-    ),
+    Laboratory("joint", ("position_rad.txt", "torque_Nm.txt", "position_ref_rad.txt"), joint,
+               JOINT),
     Laboratory("ball screw", ("carriage.lvm",), ball_screw, SCREW, linear=True),
-    Laboratory(
-        "indexer",
-        ("indexer.csv",),
-        indexer,
-        INDEXER,
-        times={"drive_torque": f"{RATED / 100} N m/%"},
-    ),
+    Laboratory("indexer", ("indexer.csv",), indexer, INDEXER,
+               times={"drive_torque": f"{RATED / 100} N m/%"}),
     Laboratory("turret", ("turm.csv",), turret, TURRET),
-    Laboratory(
-        "feeder",
-        ("feeder.xlsx",),
-        feeder,
-        FEEDER,
-        times={
-            "relative_angle": f"1/{COUNTS} rev/count",
-            "drive_torque": f"{FEEDER_CONSTANT} N m/A",
-        },
-    ),
+    Laboratory("feeder", ("feeder.xlsx",), feeder, FEEDER,
+               times={"relative_angle": f"1/{COUNTS} rev/count",
+                      "drive_torque": f"{FEEDER_CONSTANT} N m/A"}),
     Laboratory("gantry", ("gantry.h5",), gantry, GANTRY, linear=True),
     Laboratory("gimbal", (*SWEEP, "chirp.csv"), gimbal, GIMBAL),
-)
+)  # fmt: skip

@@ -68,24 +68,14 @@ def _worth(unit: str) -> float:
 def _values(role: str, m: rig.Motion, chance: np.random.Generator) -> np.ndarray:
     steady = np.zeros_like(m.t)
     return {
-        "time": m.t,
-        "index": np.arange(len(m.t)) + 0.0,
-        "unknown": chance.normal(3.0, 1.0, len(m.t)),
-        "relative_angle": m.q,
-        "motor_angle": 50 * m.q,
-        "relative_rate": m.v,
-        "gyro_rate": m.v,
-        "base_rate": 0.1 * m.v,
-        "motor_rate": 50 * m.v,
-        "reference": m.target,
-        "command": m.v + 0.01,
-        "motor_current": m.i,
-        "drive_torque": m.tau,
-        "joint_torque": 0.9 * m.tau,
-        "normal_load": steady + 20 + chance.normal(0, 0.05, len(m.t)),
-        "temperature": 25 + m.t / 10,
+        "time": m.t, "index": np.arange(len(m.t)) + 0.0,
+        "unknown": chance.normal(3.0, 1.0, len(m.t)), "relative_angle": m.q,
+        "motor_angle": 50 * m.q, "relative_rate": m.v, "gyro_rate": m.v, "base_rate": 0.1 * m.v,
+        "motor_rate": 50 * m.v, "reference": m.target, "command": m.v + 0.01, "motor_current": m.i,
+        "drive_torque": m.tau, "joint_torque": 0.9 * m.tau,
+        "normal_load": steady + 20 + chance.normal(0, 0.05, len(m.t)), "temperature": 25 + m.t / 10,
         "pointing_error": 1e-3 * m.q,
-    }[role]
+    }[role]  # fmt: skip
 
 
 def listed(name: str) -> list[Source]:

@@ -76,15 +76,8 @@ def imported(files: list[Path], **completing: Any) -> Any:
     text = mapping_text(guess(files), folder)
     (folder / "rig.toml").write_text(rig(text), encoding="utf-8")
     (folder / "mapping.toml").write_text(completed(text, **completing), encoding="utf-8")
-    code = import_recordings(
-        [str(folder / "mapping.toml")],
-        folder / "results",
-        only=(),
-        changes=(),
-        workers=1,
-        report=True,
-        sign=None,
-    )
+    mapping = str(folder / "mapping.toml")
+    code = import_recordings([mapping], folder / "results", workers=1, report=True)
     assert code is ExitCode.DONE
     assert next((folder / "results").glob("*-report")) / "report.html"
     return campaign.open(next((folder / "results").glob("*-mapping.nxs")))

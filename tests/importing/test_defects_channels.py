@@ -18,18 +18,18 @@ BOTH = pytest.mark.parametrize("motion", [f(s) for f in MOTIONS.values() for s i
 
 
 def found(motion: Motion, kind: str, *, gear: float | None = None, **changed) -> list[Defect]:
-    own = {
-        "relative_angle": motion.q,
-        "relative_rate": motion.v,
-        "drive_torque": motion.tau,
-        **changed,
-    }
+    own = {"relative_angle": motion.q, "relative_rate": motion.v, "drive_torque": motion.tau}
+    own |= changed
     return [each for each in find(motion.t, own, gear=gear) if each.kind == kind and not each.noted]
 
 
 def noted(motion: Motion, kind: str, **changed) -> list[Defect]:
     own = {"relative_angle": motion.q, "relative_rate": motion.v, **changed}
-    return [each for each in find(motion.t, own) if each.kind == kind]
+    return of_kind(kind, motion.t, own)
+
+
+def of_kind(kind: str, time: np.ndarray, own: dict[str, np.ndarray]) -> list[Defect]:
+    return [each for each in find(time, own) if each.kind == kind]
 
 
 @BOTH
@@ -136,7 +136,7 @@ def test_an_angle_that_begins_anew_is_made_continuous(motion, scale_of):
     angle = motion.q / np.ptp(motion.q) * 2.5 * scale_of
     wrapped = np.mod(angle, scale_of)
     own = {"relative_angle": wrapped}
-    (wrap,) = [d for d in find(motion.t, own) if d.kind == "wraparound"]
+    (wrap,) = of_kind("wraparound", motion.t, own)
     assert wrap.size == pytest.approx(scale_of)
     made = continuous(wrapped, wrap.size)
     np.testing.assert_allclose(made - made[0], angle - angle[0], atol=1e-6)
@@ -221,9 +221,8 @@ def behind(values: np.ndarray, samples: int) -> np.ndarray:
 @pytest.mark.parametrize("samples", [500, 800, -500])
 @pytest.mark.parametrize("name", ["drive_torque", "motor_current", "joint_torque"])
 def test_a_torque_that_is_late_against_the_motion_is_refused_by_name(motion, name, samples):
-    (late,) = found(
-        motion, "delay", **{"drive_torque": motion.tau, name: behind(motion.tau, samples)}
-    )
+    own = {"drive_torque": motion.tau, name: behind(motion.tau, samples)}
+    (late,) = found(motion, "delay", **own)
     assert late.channels == (name, "relative_rate")
     assert late.size == pytest.approx(samples * 1e-3, abs=0.01)
     assert "'delay'" in late.remedy
@@ -234,7 +233,7 @@ def test_a_torque_that_is_late_against_the_motion_is_refused_by_name(motion, nam
 @BOTH
 def test_it_is_held_against_the_derivative_of_an_angle_where_no_rate_is_recorded(motion):
     own = {"relative_angle": motion.q, "drive_torque": behind(motion.tau, 500)}
-    (late,) = [each for each in find(motion.t, own) if each.kind == "delay"]
+    (late,) = of_kind("delay", motion.t, own)
     assert late.size == pytest.approx(0.5, abs=0.01)
     assert "the derivative of relative_angle" in late.what
 
@@ -261,9 +260,7 @@ def test_of_what_repeats_itself_the_shortest_delay_counts(frequency):
     chance = np.random.default_rng(2)
     rate = v + chance.normal(0, 1e-3, len(t))
     late = np.interp(t - 0.02, t, rate)
-    (delay,) = [
-        d for d in find(t, {"relative_angle": q, "relative_rate": late}) if d.kind == "delay"
-    ]
+    (delay,) = of_kind("delay", t, {"relative_angle": q, "relative_rate": late})
     assert delay.size == pytest.approx(0.02, abs=2e-3)
 
 

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.importing.guess import Basis, TableGuess, guess, mapping_text
-from campaign.importing.guess.names import named
 from campaign.unit_grammar import parse_unit
-from tests.importing.files import LVM
 from tests.importing.wild import Wild
 from tests.importing.wild_binary import all_of_them
 
@@ -133,14 +131,6 @@ def test_channels_in_tables_of_their_own_are_one_recording(tmp_path):
     }
 
 
-def test_blocks_with_the_same_channels_are_recordings_of_their_own(tmp_path):
-    (tmp_path / "a.lvm").write_text(LVM)
-    told = tomllib.loads(mapping_text(guess([tmp_path / "a.lvm"]), tmp_path))
-    assert [each["table"] for each in told["test"][0]["recording"]] == ["block 1", "block 2"]
-    assert {each["columns"] for each in told["test"][0]["recording"]} == set(told["columns"])
-    assert set(told["columns"]) == {"a"}  # which both have alike
-
-
 def test_a_linear_axis_is_asked_for(tmp_path):
     by_name = {each.name: each for each in wild_files()}
     asked = "is the axis linear?"
@@ -165,22 +155,6 @@ def test_names_from_anywhere_are_strings_and_comments(tmp_path):
     assert all(c.isprintable() or c == "\n" for c in text)
 
 
-@pytest.mark.parametrize(
-    ("name", "role", "unit"),
-    [
-        ("state.tau_J[0]", "joint_torque", ""), ("cmd.tau_J_d[0]", "command", ""),
-        ("torque_enable", "unknown", ""), ("phi_m", "motor_angle", ""),
-        ("pos_deg", "relative_angle", "deg"), ("vel_deg_s", "relative_rate", "deg/s"),
-        ("t_ms", "time", "ms"), ("vel_ms", "relative_rate", ""), ("Servo motor speed",
-        "motor_rate", ""), ("tau_nm", "drive_torque", "N m"), ("gyro_z", "gyro_rate", ""),
-        ("gyro_rate", "gyro_rate", ""), ("base_rate", "base_rate", ""), ("", "unknown", ""),
-    ],
-)  # fmt: skip
-def test_names_are_taken_apart(name, role, unit):
-    says = named(name)
-    assert (says.role, says.unit) == (role, unit)
-
-
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the measured files are not here")
 @pytest.mark.parametrize("name", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
 def test_a_measured_axis(name):
@@ -192,16 +166,3 @@ def test_a_measured_axis(name):
     assert roles.get("pulses_N", "unknown") == "unknown"
     assert {column.basis for column in table.columns} == {Basis.LIKELY, Basis.UNKNOWN}
     assert table.step == pytest.approx(1e-3, rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "role"),
-    [
-        ("T", "°C", "temperature"), ("T", "s", "time"), ("s", "mm", "relative_angle"),
-        ("s_soll", "mm", "reference"), ("v", "mm/s", "relative_rate"), ("v", "V", "unknown"),
-        ("FN", "N", "normal_load"), ("FT", "N", "joint_torque"), ("CH1", "V", "unknown"),
-        ("Motorstrom", "", "motor_current"), ("Winkel Antrieb", "", "motor_angle"),
-    ],
-)  # fmt: skip
-def test_a_unit_says_what_one_letter_does_not(name, unit, role):
-    assert named(name, unit).role == role

@@ -13,12 +13,18 @@ import scipy.io
 
 from campaign.cli.import_command import guess_mapping
 from campaign.errors import ProtocolError
-from campaign.importing.guess import Basis, guess, mapping_text
+from campaign.importing.guess import Basis, ColumnGuess, guess, mapping_text
 from campaign.importing.interface import RecordingError
 from tests.importing import rig
 from tests.importing.newcomer import completed, imported
 from tests.importing.test_mapping import planned, served
 from tests.importing.wild import DEG, text, together
+
+
+def check_coulomb(found: Any) -> None:
+    own = found[found.quantity == "coulomb_torque"]
+    assert len(own)
+    assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
 
 
 @pytest.mark.slow
@@ -39,9 +45,7 @@ def test_two_joints_every_15_ms_with_odd_names(tmp_path: Path):
     found = run.results.findings
     assert {"axis_schulter", "axis_ellbogen"} == set(found.test)
     for name in ("axis_schulter", "axis_ellbogen"):
-        own = found[(found.test == name) & (found.quantity == "coulomb_torque")]
-        assert len(own)
-        assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
+        check_coulomb(found[found.test == name])
 
 
 @pytest.mark.slow
@@ -51,25 +55,15 @@ def test_a_robot_joint_in_one_matrix_of_seven(tmp_path: Path):
     data = np.column_stack([m.t, m.q, m.v, acceleration, m.tau, m.i, 35 + m.t / 10])
     scipy.io.savemat(tmp_path / "joint3.mat", {"data": data, "robot": "arm"})
     (table,) = guess([tmp_path / "joint3.mat"])
-    assert [column.role for column in table.columns] == [
-        "time",
-        "relative_angle",
-        "relative_rate",
-        *["unknown"] * 4,
-    ]
+    roles = ["time", "relative_angle", "relative_rate", *["unknown"] * 4]
+    assert [column.role for column in table.columns] == roles
     assert all("by its numbers alone" in column.why for column in table.columns[:3])
     run = imported(
         [tmp_path / "joint3.mat"],
         units={"relative_angle": "rad", "relative_rate": "rad/s"},
-        channels={
-            "data(:,5)": ("drive_torque", "N m"),
-            "data(:,7)": ("temperature", "degC"),
-        },
+        channels={"data(:,5)": ("drive_torque", "N m"), "data(:,7)": ("temperature", "degC")},
     )
-    found = run.results.findings
-    own = found[found.quantity == "coulomb_torque"]
-    assert len(own)
-    assert np.all(np.abs(own.value - rig.COULOMB) < 0.05 * rig.COULOMB)
+    check_coulomb(run.results.findings)
 
 
 def test_signals_beside_their_times_in_a_matrix_are_no_axes(tmp_path: Path):
@@ -116,11 +110,17 @@ def test_files_that_are_alike_share_their_columns(tmp_path: Path):
     told = tomllib.loads(mapping_text(found, tmp_path))
     (test,) = told["test"]
     assert [each["columns"] for each in test["recording"]] == ["run1", "run1", "run3"]
-    assert {name: each["relative_angle"]["unit"] for name, each in told["columns"].items()} == {
-        "run1": "deg",
-        "run3": "rad",
-    }
-    assert "# Columns of run1.csv and of 1 more that are alike" in mapping_text(found)
+    units = {name: each["relative_angle"]["unit"] for name, each in told["columns"].items()}
+    assert units == {"run1": "deg", "run3": "rad"}
+    mapping = mapping_text(found)
+    assert "# Columns of run1.csv and of 1 more that are alike" in mapping
+    assert mapping.count("read as text") == 1  # one remark for all that are alike
+
+
+def guessed(folder: Path, head: str, *columns: np.ndarray) -> list[ColumnGuess]:
+    """The columns of a file a.csv below this heading."""
+    text(together(*columns), f"{head}\n")(folder / "a.csv")
+    return list(guess([folder / "a.csv"])[0].columns)
 
 
 def recordings_of(folder: Path, **files: list[Any]) -> list[Any]:
@@ -261,10 +261,8 @@ def test_times_with_holes_are_times(tmp_path: Path):
 def test_units_that_contradict_each_other_do_not_stand(tmp_path: Path):
     """Degrees, says the heading, and the rate in rad/s is the derivative as it is."""
     m = rig.sines(9)
-    text(together(m.t, m.q, m.v, m.tau), "time [s],angle [deg],rate [rad/s],torque [Nm]\n")(
-        tmp_path / "a.csv"
-    )
-    time, angle, rate, torque = guess([tmp_path / "a.csv"])[0].columns
+    head = "time [s],angle [deg],rate [rad/s],torque [Nm]"
+    time, angle, rate, torque = guessed(tmp_path, head, m.t, m.q, m.v, m.tau)
     assert [each.basis for each in (angle, rate)] == [Basis.LIKELY, Basis.LIKELY]
     assert "0.017453 is due" in angle.unit_why
     assert [each.basis for each in (time, torque)] == [Basis.LIKELY, Basis.STATED]
@@ -275,25 +273,15 @@ def test_units_that_contradict_each_other_do_not_stand(tmp_path: Path):
 
 def test_times_that_contradict_a_rate_do_not_stand_either(tmp_path: Path):
     m = rig.sines(9)
-    text(together(m.t * 1000.0, m.q, m.v), "time [s],angle [rad],rate [rad/s]\n")(
-        tmp_path / "a.csv"
-    )
-    columns = guess([tmp_path / "a.csv"])[0].columns
+    columns = guessed(tmp_path, "time [s],angle [rad],rate [rad/s]", m.t * 1000.0, m.q, m.v)
     assert {each.basis for each in columns} == {Basis.LIKELY}
 
 
 def test_what_follows_has_the_unit_of_what_it_follows(tmp_path: Path):
     m = rig.sines(10)
-    own = {
-        "time [s]": m.t,
-        "angle [deg]": m.q * DEG,
-        "angle_ref": m.q * DEG + 0.01,
-        "setpoint": m.q * DEG * 0.99,
-        "current [A]": m.i,
-        "torque": m.i * 1.7,
-    }
-    text(together(*own.values()), ",".join(own) + "\n")(tmp_path / "a.csv")
-    columns = guess([tmp_path / "a.csv"])[0].columns
+    q = m.q * DEG
+    head = "time [s],angle [deg],angle_ref,setpoint,current [A],torque"
+    columns = guessed(tmp_path, head, m.t, q, q + 0.01, q * 0.99, m.i, m.i * 1.7)
     _, _, reference, setpoint, _, torque = columns
     assert (reference.role, reference.unit, reference.basis) == ("reference", "deg", Basis.LIKELY)
     assert (setpoint.role, setpoint.unit, setpoint.basis) == ("reference", "deg", Basis.LIKELY)
@@ -353,21 +341,8 @@ def test_a_group_of_all_columns_says_nothing(tmp_path: Path):
         ("run1", ("t [s]", "x [m]", "dx [m/s]"), ["time", "relative_angle", "relative_rate"]),
         ("motor", ("t [s]", "pos [m]", "vel [m/s]"), ["time", "motor_angle", "motor_rate"]),
     ):
-        heads = ",".join(f"{group}/{name}" for name in names)
-        text(together(m.t, m.q, m.v), f"{heads}\n")(tmp_path / f"{group}.csv")
-        (table,) = guess([tmp_path / f"{group}.csv"])
-        assert [column.role for column in table.columns] == roles
-
-
-def test_files_that_are_alike_have_one_remark(tmp_path: Path):
-    m = rig.sines(16)
-    for number in (1, 2, 3):
-        text(together(m.t, m.q, m.tau), "time,angle [rad],torque [Nm]\n")(
-            tmp_path / f"{number}.csv"
-        )
-    mapping = mapping_text(guess([tmp_path / f"{number}.csv" for number in (1, 2, 3)]), tmp_path)
-    assert mapping.count("[[test.recording]]") == 3
-    assert mapping.count("read as text") == 1
+        columns = guessed(tmp_path, ",".join(f"{group}/{name}" for name in names), m.t, m.q, m.v)
+        assert [column.role for column in columns] == roles
 
 
 def test_all_that_a_mapping_lacks_is_told_at_once(tmp_path: Path):

@@ -10,20 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign.importing.formats import excel, mdf, open_recordings
-from campaign.importing.interface import RecordingError, Table
+from campaign.importing.formats import excel, mdf
+from campaign.importing.interface import RecordingError
 from tests.importing.files import RATE, TIME, TORQUE
-from tests.importing.whole import whole
-
-
-def opened(path: Path, format_name: str) -> list[Table]:
-    found, tables = open_recordings(path)
-    assert found.name == format_name
-    return list(tables)
-
-
-def headings(table: Table) -> list[tuple[str, str]]:
-    return [(column.name, column.unit) for column in table.columns]
+from tests.importing.whole import headings, opened, whole
 
 
 @pytest.mark.parametrize(
@@ -166,15 +156,10 @@ def asammdf():
 
 @pytest.mark.slow
 def test_groups_are_tables_with_clocks_of_their_own(tmp_path, asammdf, monkeypatch):
+    told = {"name": "tau", "unit": "Nm", "conversion": {"a": 0.01, "b": 0.0}}
     fast = [
         asammdf.Signal(RATE, TIME, name="w", unit="rad/s"),
-        asammdf.Signal(
-            (TORQUE * 100).astype("i2"),
-            TIME,
-            name="tau",
-            unit="Nm",
-            conversion={"a": 0.01, "b": 0.0},
-        ),
+        asammdf.Signal((TORQUE * 100).astype("i2"), TIME, **told),
     ]
     states = np.array([b"on", b"off"] * 13)[: len(TIME[::2])]
     slow = [

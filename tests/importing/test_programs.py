@@ -12,11 +12,11 @@ import pytest
 import scipy.io
 from scipy.io.matlab import MatlabOpaque
 
-from campaign.importing.formats import hdf5, open_recordings, tdms
+from campaign.importing.formats import hdf5, tdms
 from campaign.importing.formats import mat as mat_format
-from campaign.importing.interface import Clock, RecordingError, Table
+from campaign.importing.interface import Clock, RecordingError
 from tests.importing.files import LVM, MADE, RATE, RIGOL, TIME, TORQUE, TWINCAT, N, mat
-from tests.importing.whole import whole
+from tests.importing.whole import headings, opened, whole
 
 OPAQUE_FIELDS = ("s0", "s1", "s2", "arr")
 
@@ -24,16 +24,6 @@ OPAQUE_FIELDS = ("s0", "s1", "s2", "arr")
 def made(folder: Path, name: str) -> Path:
     MADE[name](folder / name)
     return folder / name
-
-
-def opened(path: Path, format_name: str) -> list[Table]:
-    found, tables = open_recordings(path)
-    assert found.name == format_name
-    return list(tables)
-
-
-def headings(table: Table) -> list[tuple[str, str]]:
-    return [(column.name, column.unit) for column in table.columns]
 
 
 # LabVIEW

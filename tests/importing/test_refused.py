@@ -37,14 +37,9 @@ def test_a_pipe_is_no_recording_and_is_not_waited_for(tmp_path: Path):
     write(tmp_path, text)
     os.mkfifo(tmp_path / "pipe")
     for command in (["plan", "m.toml", "--backend", "import"], ["import", "--guess", "pipe"]):
-        done = subprocess.run(
-            [sys.executable, "-m", "campaign", *command],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
+        program = [sys.executable, "-m", "campaign", *command]
+        how = {"capture_output": True, "text": True, "timeout": 120, "check": False}
+        done = subprocess.run(program, cwd=tmp_path, **how)
         assert done.returncode == 2, done.stderr
         assert "no regular file" in done.stderr
 
@@ -123,31 +118,19 @@ def test_short_stretches_are_left_out_and_told(tmp_path: Path):
 @pytest.mark.parametrize(
     ("runs", "line", "what"),
     [
-        (
-            list(range(400)),
-            'each = "run"',
-            "makes 400 stretches, the shortest of 1 row and the longest of 1 row; a recording",
-        ),
-        (
-            [1, ""] * 20,
-            'where = { column = "run", equals = 1 }',
-            "the longest of 1 row; a recording needs 10. Column 'run' has no value in 20 rows",
-        ),
-        (
-            [0, *[2] * 30, *[0] * 5, *[2] * 80],
-            'trigger = { column = "run", level = 1, duration = "50 ms" }',
-            "again in row 37, 15 rows before the trial that is running there ends",
-        ),
-        (
-            [0] * 20 + [1] * 40,
-            'trigger = { column = "run", level = 0.5, duration = "5 ms" }',
-            "its 'duration' holds 5 rows, and a recording needs 10",
-        ),
-        ([1] * 2, "", "a.csv: it has 2 rows, and a recording needs 10"),
+        (list(range(400)), 'each = "run"',
+         "makes 400 stretches, the shortest of 1 row and the longest of 1 row; a recording"),
+        ([1, ""] * 20, 'where = { column = "run", equals = 1 }',
+         "the longest of 1 row; a recording needs 10. Column 'run' has no value in 20 rows"),
+        ([0, *[2] * 30, *[0] * 5, *[2] * 80],
+         'trigger = { column = "run", level = 1, duration = "50 ms" }',
+         "again in row 37, 15 rows before the trial that is running there ends"),
+        ([0] * 20 + [1] * 40, 'trigger = { column = "run", level = 0.5, duration = "9 ms" }',
+         "its 'duration' holds 9 rows, and a recording needs 10"),
         ([1] * 9, "", "a.csv: it has 9 rows, and a recording needs 10"),
-        ([1] * 40, 'stop = "3 ms"', "3 rows from its beginning to 0.003 s, and a recording"),
+        ([1] * 40, 'stop = "9 ms"', "9 rows from its beginning to 0.009 s, and a recording"),
     ],
-)
+)  # fmt: skip
 def test_what_holds_no_trial_is_refused(tmp_path: Path, runs: list[object], line: str, what: str):
     with pytest.raises(ProtocolError) as caught:
         cut(tmp_path, runs, line)
@@ -190,12 +173,16 @@ def test_every_kind_that_is_found_in_channels_can_be_accepted():
     assert found == set(defects.CHANNEL_KINDS)
 
 
+def shares(folder: Path, text: str) -> dict[str, float | None]:
+    """The relative uncertainty of each channel of a mapping's trial."""
+    (trial,) = planned(folder, text + TEST + ENTRY).trials
+    return {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
+
+
 @pytest.mark.parametrize(("uncertainty", "share"), [("5 %", 0.05), ("0.1 N m/A", 0.04), ("0 %", 0)])
 def test_an_uncertainty_may_be_a_share(tmp_path: Path, uncertainty: str, share: float):
-    text = COLUMNS.replace("0.05 N m/A", uncertainty) + TEST + ENTRY
-    (trial,) = planned(tmp_path, text).trials
-    torque = next(c for c in trial.recording["channels"] if c["name"] == "drive_torque")
-    assert torque["relative_uncertainty"] == pytest.approx(share)
+    known = shares(tmp_path, COLUMNS.replace("0.05 N m/A", uncertainty))
+    assert known["drive_torque"] == pytest.approx(share)
 
 
 @pytest.mark.parametrize("uncertainty", ["-5 %", "-0.1 N m/A"])
@@ -214,40 +201,29 @@ uncertainty = "1.5 %"
 [columns.rig.joint_torque]
 derive = "drive_torque"
 """
-    (trial,) = planned(tmp_path, COLUMNS + more + TEST + ENTRY).trials
-    known = {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
+    known = shares(tmp_path, COLUMNS + more)
     assert known["drive_torque"] == pytest.approx(0.02)
     assert known["motor_current"] == pytest.approx(0.025)
     assert known["joint_torque"] == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(
-    ("kind", "known"),
+    ("kind", "wrong", "known"),
     [
-        ("breakaway", "rest, ramp; did you mean 'ramp'?"),
-        ("step_response", "rest, answer"),
-        ("velocity_map", "positive, negative"),
-        ("frequency_response", "steady"),
-        ("stabilization", "measured"),
+        ("breakaway", "rampp", "rest, ramp; did you mean 'ramp'?"),
+        ("step_response", "rampp", "rest, answer"),
+        ("velocity_map", "rampp", "positive, negative"),
+        ("frequency_response", "stady", "steady; did you mean 'steady'?"),
+        ("stabilization", "measure", "measured; did you mean 'measured'?"),
     ],
 )
-def test_windows_that_no_analysis_looks_for_are_refused(tmp_path: Path, kind: str, known: str):
-    line = 'windows = { rampp = ["0 s", "0.1 s"] }'
-    told = refused(tmp_path, COLUMNS + TEST.replace("motion", kind) + ENTRY + line)
-    assert "m.toml:20:13: " in told
-    assert f"looks for a window 'rampp'; allowed are {known}" in told
-
-
-@pytest.mark.parametrize(
-    ("kind", "wrong", "right"),
-    [("frequency_response", "stady", "steady"), ("stabilization", "measure", "measured")],
-)
-def test_a_window_that_is_nearly_called_so_is_not_taken(
-    tmp_path: Path, kind: str, wrong: str, right: str
+def test_windows_that_no_analysis_looks_for_are_refused(
+    tmp_path: Path, kind: str, wrong: str, known: str
 ):
     line = f'windows = {{ {wrong} = ["0 s", "0.1 s"] }}'
     told = refused(tmp_path, COLUMNS + TEST.replace("motion", kind) + ENTRY + line)
-    assert f"did you mean '{right}'?" in told
+    assert "m.toml:20:13: " in told
+    assert f"looks for a window '{wrong}'; allowed are {known}" in told
 
 
 def test_what_a_person_mistakes_most_is_told_how_to_put_right(tmp_path):
@@ -342,9 +318,7 @@ def test_the_scale_of_a_column_without_a_constant_may_be_uncertain(
     tmp_path: Path, uncertainty: str, share: float | None
 ):
     line = f'\nuncertainty = "{uncertainty}"' if uncertainty else ""
-    text = COLUMNS.replace('unit = "deg"', 'unit = "deg"' + line) + TEST + ENTRY
-    (trial,) = planned(tmp_path, text).trials
-    known = {c["name"]: c.get("relative_uncertainty") for c in trial.recording["channels"]}
+    known = shares(tmp_path, COLUMNS.replace('unit = "deg"', 'unit = "deg"' + line))
     assert known["relative_angle"] == share
     assert known["relative_rate"] == share  # what is made of it has its scale
 

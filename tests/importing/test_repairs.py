@@ -101,44 +101,27 @@ CASES = {
     "unit": Case(
         replace(plain, v=np.rad2deg(plain.v)),
         "in deg/s, the angle in rad; correct its 'unit' or 'times'",
-        'unit = "rad/s"',
-        'unit = "deg/s"',
-    ),
+        'unit = "rad/s"', 'unit = "deg/s"'),
     "times": Case(
         replace(plain, v=60 / 2 / np.pi * plain.v),
-        "correct its 'unit' or 'times'",
-        RATE,
-        RATE + 'times = "0.10471975512"\n',
-    ),
+        "correct its 'unit' or 'times'", RATE, RATE + 'times = "0.10471975512"\n'),
     "unwrap": Case(
         replace(plain, q=np.mod(4 * plain.q, 2 * np.pi), v=4 * plain.v),
-        'repair = ["unwrap"]',
-        ANGLE,
-        ANGLE + 'repair = ["unwrap"]\n',
-    ),
+        'repair = ["unwrap"]', ANGLE, ANGLE + 'repair = ["unwrap"]\n'),
     "mark gaps": Case(
-        _gap(),
-        '10 samples are missing, before row 1001; repair = ["mark gaps"]',
-        TIME,
-        TIME + 'repair = ["mark gaps"]\n',
-        lost=tuple(range(1000, 1010)),
-    ),
+        _gap(), '10 samples are missing, before row 1001; repair = ["mark gaps"]',
+        TIME, TIME + 'repair = ["mark gaps"]\n', lost=tuple(range(1000, 1010))),
     "drop repeated": Case(
         _repeated(),
         'row 501, 902 is not after that of the row before; repair = ["drop repeated"]',
-        TIME,
-        TIME + 'repair = ["drop repeated"]\n',
-    ),
+        TIME, TIME + 'repair = ["drop repeated"]\n'),
     "resample": Case(
-        _jittered(), 'repair = ["resample"]', TIME, TIME + 'repair = ["resample"]\n', off=0.02
-    ),
+        _jittered(), 'repair = ["resample"]', TIME, TIME + 'repair = ["resample"]\n', off=0.02),
     "coarse times": Case(
         replace(plain, t=np.floor(SOUND.t * 100) / 100),
         "rounded to 0.01 s, too coarse for steps of 0.001 s; the 'sample_rate' that it had",
-        'column = "t"\nunit = "s"\n',
-        'sample_rate = "1000 Hz"\n',
-    ),
-}
+        'column = "t"\nunit = "s"\n', 'sample_rate = "1000 Hz"\n'),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -151,7 +134,9 @@ def test_what_is_wrong_is_refused_and_right_as_soon_as_the_mapping_says_so(
     assert LAYOUT.count(case.was) == 1
     (trial,) = planned(tmp_path, LAYOUT.replace(case.was, case.now), text).trials
     recording, _ = served(trial)
-    assert tuple(np.flatnonzero(np.isnan(recording["relative_rate"]))) == case.lost
+    for channel in ("relative_rate", "drive_torque"):
+        assert tuple(np.flatnonzero(np.isnan(recording[channel]))) == case.lost
+    assert any("were lost" in event.text for event in recording.events) is bool(case.lost)
     known = np.isfinite(recording["relative_rate"])
     turns = 4.0 if name == "unwrap" else 1.0
     np.testing.assert_allclose(recording.time, SOUND.t, atol=2e-6)

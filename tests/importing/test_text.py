@@ -10,19 +10,13 @@ import pytest
 from campaign.importing.formats import open_recordings
 from campaign.importing.interface import RecordingError, Table
 from tests.importing.files import CSV, GERMAN
-from tests.importing.whole import whole
+from tests.importing.whole import headings, opened, whole
 
 
 def table(path: Path, content: str | bytes) -> Table:
     path.write_bytes(content.encode() if isinstance(content, str) else content)
-    found, tables = open_recordings(path)
-    assert found.name == "text"
-    (only,) = tables
+    (only,) = opened(path, "text")
     return only
-
-
-def headings(found: Table) -> list[tuple[str, str]]:
-    return [(column.name, column.unit) for column in found.columns]
 
 
 @pytest.fixture
@@ -74,6 +68,8 @@ LOGGER = (
         ("t\ta\n0\t1\n1\t2\nEOF\n", ["t", "a"], ["", ""], [1, 2]),
         ('"t","a, b"\n"0","1"\n"1","2"\n', ["t", "a, b"], ["", ""], [1, 2]),
         ("t;a\n0;1D-3\n1;2D+01\n", ["t", "a"], ["", ""], [1, 20]),
+        ("Operator: me\nSampling time interval(ms),0.667\n\nt,a\n0,1\n1,2\n2,3\n", ["t", "a"],
+         ["", ""], [2, 3]),
         (AMPLIFIER, ["Time", "Servo motor speed", "Torque"], ["ms", "", ""], [2, 3, 4]),
         (LOGGER, ["time", "Force", "time", "RMV"], ["", "N", "", "V"], [1, 2, 1, 3]),
         ("x-axis,1,2\nsecond,Volt,Volt\n0,1,2\n1,2,3\n", ["x-axis", "1", "2"],
@@ -87,11 +83,6 @@ def test_habits_of_other_programs(path, content, names, units, last):
     assert [column.name for column in found.columns] == names
     assert [column.unit for column in found.columns] == units
     assert whole(found)[-1].tolist() == last
-
-
-def test_what_stands_above_the_heading_is_no_column(path):
-    found = table(path, "Operator: me\nSampling time interval(ms),0.667\n\nt,a\n0,1\n1,2\n2,3\n")
-    assert [(column.name, column.unit) for column in found.columns] == [("t", ""), ("a", "")]
 
 
 def test_words_are_no_numbers_and_columns_keep_their_places(path):

@@ -1,12 +1,26 @@
-"""All of a table at once."""
+"""Tables of a file, and all of a table at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from campaign.importing.formats import open_recordings
 from campaign.importing.interface import Array, Table
+
+
+def opened(path: Path, format_name: str) -> list[Table]:
+    """The tables of a file, which is found to be of this format."""
+    found, tables = open_recordings(path)
+    assert found.name == format_name
+    return list(tables)
+
+
+def headings(table: Table) -> list[tuple[str, str]]:
+    """Name and unit of each column."""
+    return [(column.name, column.unit) for column in table.columns]
 
 
 def whole(table: Table, places: Sequence[int] | None = None) -> Array:

@@ -160,19 +160,10 @@ def robot_log(m: Motion) -> Callable[[Path], None]:
         "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,"
         "field.position0,field.velocity0,field.effort0\n"
     )
-    rows = [
-        [
-            f"{1700000000000000000 + int(t * 1e9)}",
-            f"{k}",
-            f"{1700000000000000000 + int(t * 1e9)}",
-            "base",
-            "joint_a1",
-            q,
-            v,
-            tau,
-        ]
-        for k, (t, q, v, tau) in enumerate(together(m.t, m.q, m.v, m.tau)[:3000])
-    ]
+    rows = []
+    for k, (t, q, v, tau) in enumerate(together(m.t, m.q, m.v, m.tau)[:3000]):
+        stamp = f"{1700000000000000000 + int(t * 1e9)}"
+        rows.append([stamp, f"{k}", stamp, "base", "joint_a1", q, v, tau])
     return text(rows, head)
 
 
