@@ -53,7 +53,7 @@ def test_of_a_long_sweep_the_first_and_the_last_place_stand_for_all() -> None:
 def test_draws_are_one_number_the_median_and_where_one_more_lies() -> None:
     """Draws 9, 10, 11: mean 10, deviation 1; one more lies within t √(1 + 1/3) = 4.97."""
     draws = [found("torque", value, **{SEED: seed}) for seed, value in enumerate((9.0, 11.0, 10.0))]
-    (told,) = key_numbers(draws, [key("torque")])
+    (told,) = key_numbers(draws, [key("torque")], (0, 1, 2))
     half = T_2 * math.sqrt(4 / 3)
     assert told.value == 10.0
     assert told.known.low == pytest.approx(10.0 - half)
@@ -64,8 +64,12 @@ def test_draws_are_one_number_the_median_and_where_one_more_lies() -> None:
 def test_a_draw_without_a_number_leaves_it_open() -> None:
     lost = Estimate("torque", math.nan, "N m", reason=MADE_UP(), origin=Origin.NOT_DETERMINED)
     draws = [found("torque", 9.0, **{SEED: 0}), Finding.of(lost, {SEED: 1})]
-    (told,) = key_numbers([*draws, found("torque", 10.0, **{SEED: 2})], [])
+    (told,) = key_numbers([*draws, found("torque", 10.0, **{SEED: 2})], [], (0, 1, 2))
     assert not told.known.is_determined
-    others = [found("other", float(seed), **{SEED: seed}) for seed in range(3)]
-    (missing, _) = key_numbers([draws[0], *others], [])
+    (missing,) = key_numbers(draws[:1], [], (0, 1, 2))
     assert not missing.known.is_determined, "two draws have none at all"
+
+
+def test_one_seed_is_no_draw() -> None:
+    one = found("torque", **{SEED: 1})
+    assert key_numbers([one], [], (1,)) == (one,)

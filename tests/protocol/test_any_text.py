@@ -65,3 +65,14 @@ def test_any_text(protocol: str, bench: str, overrides: list[str]) -> None:
     for problem in problems:
         assert problem.message
         assert (problem.line > 0) == (problem.column > 0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.binary(max_size=40))
+def test_any_bytes(content: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "protocol.toml"
+        path.write_bytes(content)
+        # No forty bytes make a valid test: a name, a kind, a bench and its options are longer.
+        with pytest.raises(ProtocolError):
+            load_protocol(path, KINDS, shipped=SHIPPED)
