@@ -33,7 +33,7 @@ ROTARY = re.compile(f"{UNITS}|{WORDS}")
 """A unit or a word of a rotary axis; names of fields, columns and files stay, and are none."""
 PHASES = re.compile(
     r"[−-]\s?(?:180|90) ?(?:°|deg)|[Pp]hase(?: of L)? \((?:°|deg)\)"
-    r"|[Pp]hase margin(?: there)?(?: \(°\)(?: ± \(1σ\) \(°\))?| [\d.]+(?: ± [\d.]+)? °)"
+    r"|[Pp]hase margin(?: there)?(?: \(°\)(?: ± \(1σ\) \(°\))?|\s[\d.]+(?: ± [\d.]+)? °)"
     r"|(?<![\w.])[\d.]+°(?= |$)|, [\d.]+ deg, [\d.]+ dB|below 20 ?(?:°|deg)"
 )
 """Angles of no axis."""
@@ -148,9 +148,6 @@ def test_the_numbers_are_those_of_the_bench(run: tuple[Path, Path]) -> None:
     assert np.allclose(coulomb["value"], true, rtol=5e-3)
     velocity = found[found["quantity"] == "stribeck_velocity"]
     assert np.allclose(velocity["value"], 4e-3, rtol=0.05)
-    page = (run[1] / "report.html").read_text(encoding="utf-8")
-    words = re.search(r"From 0\.2 mm/s to 40 mm/s, positive direction: Coulomb friction", page)
-    assert words, "a sentence's millimetres are those of the protocol"
 
 
 def _executed(trial: Trial) -> Recording:

@@ -54,7 +54,7 @@ def test_the_demo_opens_with_what_was_found_what_is_true_and_what_compensation_g
     assert int(held[0]) >= 0.8 * int(held[1])
     assert "error reduction" in opening
     below = html[start + len(opening) :]
-    assert len(re.findall(r"[\d.]+ times less \([\d.]+ to [\d.]+\)", below)) == 3
+    assert len(re.findall(r"<dt>error reduction, times, \w+</dt><dd>[\d.]+ ±\s[\d.]+<", below)) == 3
     assert '<figure id="' in opening
     assert not (report / "tables" / "scoreboard.csv").exists()
     assert "ublished" not in opening

@@ -67,7 +67,8 @@ def shown_key_numbers(
             for finding, each in zip(found, every, strict=True)
             for rest in [{name: v for name, v in each.items() if name not in shared}]
         )
-        where = _where(dict(shared.items() - plain), units)
+        rest = {name: v for name, v in shared.items() if (name, v) not in plain}
+        where = _where(rest, units)
     drawn = f"median of {draws} draws, and where one more lies" if draws > 1 else ""
     return ", ".join(filter(None, (drawn, where))), numbers
 
