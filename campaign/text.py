@@ -14,7 +14,7 @@ MOST_DIGITS = 9
 MOST_DECIMALS = 7
 """of such a number below 0.01; one that needs more has an exponent."""
 NARROW, SHORT = 1e-5, 5
-"""Half-width, as a share of its number, below which tables and sentences leave an interval out, and
+"""Half-width, as a share of its number, below which tables leave an interval out, and
 the digits that the number then has: the interval is narrower than the last of them."""
 _ROUNDING = 1e-12  # share of a number below which its half-width is a rounding error
 _LEAST = 1e-290  # half-width below which no digit of it could be written

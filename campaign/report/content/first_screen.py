@@ -25,16 +25,13 @@ FROM = {
     "recording": "from recordings",
 }
 MANY = 6
-"""Most tests whose answers stand on top in full; of more, that many are chosen, and have a sentence
-each: nobody reads twenty answers in a minute."""
-
+"""Most tests whose key numbers stand on top; of more, that many are chosen: nobody reads those of
+twenty tests in a minute."""
 CLOSE = (5, 10)
 """Percent of the published value that the first screen counts by, two of `LIMITS`."""
 INTERVALS = (
     "± and brackets behind a number: 95 % interval, systematic parts of known size included."
 )
-
-
 ROOM, FEWEST = 18, 2
 """Key numbers that it has room for, and how many it has of each test, however many there are."""
 ENOUGH = 4
