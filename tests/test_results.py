@@ -227,6 +227,14 @@ def test_a_damaged_file_is_not_used(run):
         _ = campaign.open(run, strict=True).results
 
 
+def test_a_file_of_another_layout_is_not_used_and_is_no_damage(run, monkeypatch):
+    opened = campaign.open(run)
+    monkeypatch.setattr("campaign.archive.writing.results_file.FORMAT", 1)
+    write_results(run, opened.results.found)
+    with pytest.warns(campaign.ArchiveWarning, match="has results of layout 1"):
+        assert len(campaign.open(run, strict=True).results.key_numbers) > 0
+
+
 @pytest.mark.slow
 def test_results_measured_anew_are_told_from_others(run):
     report(run, measure_anew=True)

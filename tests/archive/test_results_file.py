@@ -9,6 +9,7 @@ import os
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -21,8 +22,10 @@ from campaign.archive import find_run, list_runs, open_run
 from campaign.archive.layout.files import sha256_of
 from campaign.archive.layout.results import ENTRY, HASH, ResultsOfTest, RunResults, results_path
 from campaign.archive.layout.results_text import from_text, to_text
-from campaign.archive.reading.results_file import read_results
+from campaign.archive.reading.results_file import OtherLayoutError, read_results
 from campaign.archive.writing.results_file import write_results
+from campaign.cli.keep_results import _found_when_whole
+from campaign.cli.verify import _of_results
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
@@ -143,6 +146,19 @@ def test_what_is_read_is_what_was_written_to_the_last_bit(run):
     assert again.tests[0].result.key_numbers == again.tests[0].result.findings[:1]
     curve = again.tests[0].result.figures[0].panels[0].curves[1]
     np.testing.assert_array_equal(curve.x, [-3.0, -2.0, -1.0])  # of those that share an x
+
+
+def test_sound_results_of_another_layout_are_told_from_damaged_ones(run, monkeypatch):
+    """Of a damaged run they may be all that is left: nothing takes their place."""
+    monkeypatch.setattr("campaign.archive.writing.results_file.FORMAT", 1)
+    path = write_results(run, results())
+    with pytest.raises(OtherLayoutError, match="layout 1; this program reads 2"):
+        read_results(path, ROOT)
+    assert _of_results(path).problems == ()
+    assert _found_when_whole(SimpleNamespace(path=run, root=ROOT))  # type: ignore[arg-type]
+    path.write_bytes(path.read_bytes()[:-1])
+    assert not _found_when_whole(SimpleNamespace(path=run, root=ROOT))  # type: ignore[arg-type]
+    assert _of_results(path).problems
 
 
 def test_arrays_that_no_plot_can_show_are_kept(run):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from campaign.channels import GYRO_RATE
-from campaign.estimate import Estimate, Kind, Origin, Systematic
+from campaign.estimate import OF_ONE_TRIAL, Estimate, Kind, Origin, Systematic
 from campaign.estimation.intervals import with_error
 from campaign.experiments import experiments
 from campaign.experiments.breakaway.experiment import _damping, default_positions
@@ -521,3 +521,11 @@ def test_a_ramp_that_tells_nothing_of_the_stiffness_leaves_the_mean_to_the_other
     first, second, *_ = table(result, "presliding").rows
     assert first["breakaway_torque"] == pytest.approx(second["breakaway_torque"], rel=0.01)
     assert first["bristle_stiffness"] is None
+
+
+def test_the_mean_of_one_ramp_is_of_one_trial() -> None:
+    """How ramps scatter is not in its interval."""
+    one = Estimate("breakaway_torque", 31.4, "N m", 31.3, 31.5, 0.95)
+    told = mean("breakaway_torque", [one])
+    assert (told.low, told.high) == (31.3, 31.5)
+    assert told.reason in OF_ONE_TRIAL

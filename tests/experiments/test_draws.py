@@ -76,6 +76,8 @@ def test_each_draw_is_analysed_by_itself() -> None:
         (1.5, {"statistic": "mean", SEED: 1}),
         (2.5, {"statistic": "mean", SEED: 2}),
     ]
+    (key,) = found.key_numbers
+    assert (key.value, key.conditions) == (2.5, {"statistic": "mean"}), "their median"
 
 
 def test_the_page_has_the_first_draw_and_how_all_lie() -> None:
@@ -126,6 +128,8 @@ def test_a_draw_whose_analysis_fails_costs_itself_only() -> None:
     experiment = Experiment("k", "", Options, lambda options, bench: (), fails_first)
     result = result_of(experiment, TestData("t", "k", {}, tuple(trials([5, 7, 9]))))
     assert {finding.conditions[SEED] for finding in result.findings} == {7, 9}
+    (key,) = result.key_numbers
+    assert not key.known.is_determined, "it is a draw all the same"
     assert [table.key for table in result.tables] == ["draws", "means"]
     assert any("seed 5 could not be analysed" in note for note in result.notes)
     assert any("tables and figures are of seed 7" in note for note in result.notes)

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import pytest
 
 from campaign.archive import RunReader
-from campaign.estimate import Estimate
+from campaign.axis_kind import BOTH_ROTARY
+from campaign.estimate import OF_ONE_TRIAL, Estimate
+from campaign.experiments.interface import key
+from campaign.published.draws import SEED
 from campaign.report.build import render
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import FEWEST, ROOM, Answer
-from campaign.report.content.key_numbers import KeyNumber
-from campaign.result import Finding, Value
+from campaign.report.content.key_numbers import KeyNumber, shown_key_numbers
+from campaign.report.content.written_units import TestUnits
+from campaign.result import Finding, Result, Value
 from tests.report.test_opening import experiments, figure, says
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
@@ -75,6 +80,17 @@ def test_the_first_screen_has_room_for_so_many(made_up: ModuleType, tmp_path: Pa
     assert {len(each.numbers) for each in several} == {ROOM // 6} != {FEWEST}
 
 
+def test_of_draws_it_is_said_that_they_are_medians() -> None:
+    drawn = [SimpleNamespace(trial=SimpleNamespace(point={SEED: seed})) for seed in range(3)]
+    own = (found("breakaway_torque", 31.4),)
+    test: Any = SimpleNamespace(
+        name="t", trials=drawn, sides=BOTH_ROTARY, experiment=None,
+        result=Result(findings=own, key_numbers=own),
+    )  # fmt: skip
+    where, _ = shown_key_numbers(test, TestUnits(test), (), None)
+    assert where == "median of 3 draws, and where one more lies"
+
+
 OWN = """
 source = "Our own paper"
 [[table]]
@@ -104,6 +120,32 @@ def test_published_values_stand_beside_and_a_mark_says_which_agree(
         ("31.4 N·m", True),
         ("40 N·m", False),
     ]
+
+
+def test_beside_a_published_value_stand_its_unit_and_the_interval_of_its_verdict(
+    made_up: ModuleType, tmp_path: Path
+):
+    """That of one trial is none of a verdict."""
+    alone = Estimate("breakaway_torque", 31.4, "N m", 31.3, 31.5, 0.95, reason=OF_ONE_TRIAL())
+    own = OWN.replace('"N m"', '"kN m"').replace("31.4", "0.0314")
+    run = made_up.made_up_run(tmp_path, tests={"breakaway": ("1",)}, published=own)
+    one = Finding.of(alone, {"direction": "positive"})
+    (told,) = document_of(run, experiments(made_up, breakaway=says(one))).opening.shown
+    assert [(n.value, n.published) for n in told.numbers] == [("0.0314 kN·m", "0.0314 kN·m")]
+
+
+def test_what_is_meant_without_a_word_and_what_another_condition_says_is_left_out(
+    made_up: ModuleType, tmp_path: Path
+):
+    conditions = {"statistic": "mean", "bench.gear.preload.torque": 33.0, "average_friction": 33.0}
+    ways = [found("breakaway_torque", 31.4 + k, direction=way, **conditions)
+            for k, way in enumerate(("positive", "negative"))]  # fmt: skip
+    kinds = experiments(made_up, breakaway=says(*ways))
+    declared = (key("breakaway_torque", statistic="mean"),)
+    kinds = {name: replace(each, key_numbers=declared) for name, each in kinds.items()}
+    run = made_up.made_up_run(tmp_path, tests={"breakaway": ()})
+    (own,) = document_of(run, kinds).opening.shown
+    assert own.where == "average friction 33 N·m"
 
 
 def test_true_values_of_a_simulated_bench_stand_beside(made_up: ModuleType, tmp_path: Path):

@@ -91,6 +91,9 @@ def test_what_has_an_interval_stands_on_top_one_test_of_a_kind(opening: FirstScr
     measured = [f"measured-{n}" for n in range(MANY - 1)]
     assert list(opening.main) == [*measured, "tells-more"], "of one kind the one that tells more"
     assert [each.test for each in opening.shown] == list(opening.main)
+    shown = sum(len(FOUND[name.replace("-", "_")]) for name in opening.main)
+    every = sum(map(len, FOUND.values()))
+    assert opening.left_out == f"{shown} of {every}; the report's sections have all."
 
 
 def test_the_figure_on_top_is_of_a_test_that_stands_there(opening: FirstScreen) -> None:

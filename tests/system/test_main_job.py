@@ -20,6 +20,8 @@ def quickstart(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("quickstart")
     done = campaign(folder, "run", "quickstart", "--report")
     assert done.out.count("\n") == 1, "standard output has the archive's path and nothing else"
+    assert "Coulomb friction Tc\tpositive\t25." in done.err, "key numbers beside it"
+    assert "22 of 22 intervals hold the true values of the simulated bench." in done.err
     return folder, folder / done.last_line
 
 
