@@ -220,6 +220,17 @@ def same_dimension(one: str, other: str) -> bool:
         return False
 
 
+DISPLAY = {
+    "rad": "deg",
+    "rad/s": "deg/s",
+    "rad/s^2": "deg/s^2",
+    "m": "mm",
+    "m/s": "mm/s",
+    "m/s^2": "mm/s^2",
+}
+"""What a reader is shown in place of an SI unit, where nothing says another one."""
+
+
 def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
     """`5 mm/s`: a number (SI) with the unit that a reader is shown, of the axis that is meant.
 

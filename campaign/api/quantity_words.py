@@ -13,17 +13,8 @@ from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench_knowledge import number_at
 from campaign.result import Finding, Value
 from campaign.text import number, pretty_unit, quantity_words
-from campaign.units import Quantity, convert
+from campaign.units import DISPLAY, Quantity, convert
 
-DISPLAY = {
-    "rad": "deg",
-    "rad/s": "deg/s",
-    "rad/s^2": "deg/s^2",
-    "m": "mm",
-    "m/s": "mm/s",
-    "m/s^2": "mm/s^2",
-}
-"""What is shown in place of an SI unit where no table of the test says anything else."""
 BENCH = "bench."
 """Before a swept value of the bench."""
 

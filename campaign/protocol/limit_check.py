@@ -8,18 +8,10 @@ from collections.abc import Sequence
 from campaign.errors import LimitError
 from campaign.physics.limits import Margin
 from campaign.protocol.plan import LimitUse, Plan
-from campaign.units import convert
+from campaign.units import DISPLAY, convert
 
 NAMED_TRIALS = 3
 """of each test and limit; the rest is counted."""
-DISPLAY = {
-    "rad": "deg",
-    "rad/s": "deg/s",
-    "rad/s^2": "deg/s^2",
-    "m": "mm",
-    "m/s": "mm/s",
-    "m/s^2": "mm/s^2",
-}
 
 
 REMEDIES = {
