@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from campaign.archive.layout.files import why
 from campaign.archive.layout.header import FORMAT, PlannedTrial, RunHeader
+from campaign.archive.layout.json_lines import parse_at_once
 from campaign.errors import ArchiveError
 from campaign.trial import canonical_json
 
@@ -16,6 +17,8 @@ HEADER = "run.json"
 PLAN = "plan.jsonl"
 SEALING = "sealed.nxs.part"
 """The sealed file while it grows."""
+
+_PLANNED = TypeAdapter(list[PlannedTrial])
 
 
 def read_header(folder: Path) -> RunHeader:
@@ -36,6 +39,8 @@ def header_document(header: RunHeader) -> str:
 
 def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
     """The planned trials, in order. Raises ArchiveError naming the line that is wrong."""
+    if (planned := parse_at_once(_PLANNED, text.encode().splitlines())) is not None:
+        return tuple(planned)
     trials = []
     for number, line in enumerate(text.splitlines(), start=1):
         try:

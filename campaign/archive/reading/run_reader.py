@@ -56,7 +56,7 @@ class RunReader:
         ended: ISO 8601; empty when incomplete.
         plan: every planned trial, executed or not; those that followed come last.
         trials: the executed ones, in plan order, failed ones included. Of a sealed run each is
-            parsed again when it is asked for; `outlines` tells of all of them without that.
+            parsed when it is asked for; `outlines` tells of all of them without that.
         journal: verbatim.
         full_plan: every planned trial, whole.
         damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a

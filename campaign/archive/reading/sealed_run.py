@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 
 from campaign.archive.layout.checksums import text_digest
-from campaign.archive.layout.entries import ENTRY, entry_name, entry_names, file_name
+from campaign.archive.layout.entries import entry_name, entry_names, file_name
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus
@@ -42,7 +42,11 @@ NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
 def read_sealed(path: Path) -> RunReader:
     """A sealed file, whatever its name; samples are held against it when read."""
     damaged = DamageList(path)
-    with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
+    with (
+        safe_hdf5.held_open(path),
+        safe_hdf5.open_file(path) as file,
+        safe_hdf5.guarded(path, "/run"),
+    ):
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
         if texts.seal is not None and texts.seal.run != header.name:
@@ -50,12 +54,14 @@ def read_sealed(path: Path) -> RunReader:
         journal = damaged.read(lambda: texts.text("journal/data"), "").encode()
         story = read_lines(journal, lean=True)
         note_journal(story, damaged)
-        trials, earlier = _Trials.read(path, texts, story, file, damaged).archived(file, damaged)
-        plan: tuple[PlannedTrial, ...] = damaged.read(
+        planned: tuple[PlannedTrial, ...] = damaged.read(
             lambda: parse_plan(path, texts.text("plan/data")), ()
         )
-        _note_contradictions(texts, header, story, len(plan), damaged)
         stages = stages_in(story.entries)
+        plan = planned + planned_in(stages)
+        found = _Trials.read(path, texts, story, file, damaged)
+        trials, earlier = found.archived(plan, damaged)
+        _note_contradictions(texts, header, story, len(planned), damaged)
         return RunReader(
             path=path,
             header=header,
@@ -63,7 +69,7 @@ def read_sealed(path: Path) -> RunReader:
             reason=texts.text("outcome/reason"),
             safe_state=SafeState(texts.text("outcome/safe_state")),
             ended=damaged.read(lambda: texts.text("end_time"), ""),
-            plan=plan + planned_in(stages),
+            plan=plan,
             trials=trials,
             journal=story.text,
             read_story=story,
@@ -201,40 +207,45 @@ class _Trials:
         return cls(path, story, groups, lines, whole, _good_trees(trees), not_kept)
 
     def archived(
-        self, file: h5py.File, damaged: DamageList
+        self, plan: Sequence[PlannedTrial], damaged: DamageList
     ) -> tuple[LazyTrials, dict[int, tuple[ArchivedTrial, ...]]]:
         """The trials that count, and the attempts before them by number; the rest is noted.
 
-        Every record is parsed here once, which shows what is wrong with it, and let go of.
+        Where all texts are as they were sealed, and the index has the records of the journal in the
+        order of trials, plan and journal say what a trial is. Elsewhere its record is parsed once,
+        which shows what is wrong with it, and let go of.
         """
         outlines: list[Outline] = []
-        kept: dict[int, TrialFinished | ArchivedTrial] = {}
+        kept: dict[int, TrialFinished] = {}
         earlier: dict[int, list[ArchivedTrial]] = {}
         attempts = self._told()
         unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
         if unknown:
             damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
-        for entry, told in entry_names(attempts).items():
+        names = entry_names(attempts)
+        sound = self.whole and self.story.whole and not damaged.found
+        sound = sound and [each.record for each in names.values()] == list(self.lines)
+        planned = {each.number: each for each in plan} if sound else {}
+        for entry, told in names.items():
+            last = entry == entry_name(told.trial)
+            there = entry in self.groups or entry in self.not_kept
+            if last and there and (of := planned.get(told.trial)):
+                ending = told.outcome, told.reason
+                outlines.append(Outline(of.number, of.test, of.kind, of.label, *ending))
+                kept[told.trial] = told
+                continue
             with damaged.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
-                archived, in_index = self._archived(entry, told, file)
-                if ENTRY.fullmatch(entry)[2]:  # type: ignore[index]
-                    earlier.setdefault(told.trial, []).append(self._measured(archived, told))
-                    continue
-                outlines.append(Outline.of(archived))
-                kept[told.trial] = told if in_index else self._measured(archived, told)
+                archived = self._archived(entry, told)
+                if last:
+                    outlines.append(Outline.of(archived))
+                    kept[told.trial] = told
+                else:
+                    earlier.setdefault(told.trial, []).append(archived)
         before = {number: tuple(found) for number, found in earlier.items()}
         return LazyTrials(outlines, partial(self._again, kept)), before
 
-    def _again(
-        self, kept: Mapping[int, TrialFinished | ArchivedTrial], number: int
-    ) -> ArchivedTrial:
-        """A trial whose record was parsed before, and is in the index or was kept."""
-        if isinstance(told := kept[number], ArchivedTrial):
-            return told
-        return self._measured(self._archived(entry_name(number), told)[0], told)
-
-    def _measured(self, archived: ArchivedTrial, told: TrialFinished) -> ArchivedTrial:
-        return with_metrics(archived, self.story.measured_of(told.record))
+    def _again(self, kept: Mapping[int, TrialFinished], number: int) -> ArchivedTrial:
+        return self._archived(entry_name(number), kept[number])
 
     def _told(self) -> list[TrialFinished]:
         """Every finished attempt that the journal tells of; the index makes up for lost lines."""
@@ -246,16 +257,14 @@ class _Trials:
                 told.setdefault((finished.trial, finished.attempt), finished)
         return list(told.values())
 
-    def _archived(
-        self, entry: str, told: TrialFinished, file: h5py.File | None = None
-    ) -> tuple[ArchivedTrial, bool]:
-        """A trial, and whether the index has all of it; with `file` its own group is enough."""
+    def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
+        """A trial; what of it the index does not have is read from its own group."""
         trees: Trees = self.trees
         if (line := self.lines.get(told.record)) is not None:
             record = parse_record(self.path, f"/{entry}", line)
-        in_index = line is not None and record.tree_names <= trees.keys()
-        if file is not None and not in_index:
-            record, trees = read_entry(self.path, file, entry, told.record)
+        if line is None or not record.tree_names <= trees.keys():
+            with safe_hdf5.open_file(self.path) as file:
+                record, trees = read_entry(self.path, file, entry, told.record)
         if (record.number, record.attempt) != (told.trial, told.attempt):
             raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
         # Where its samples are there, whatever is said of them, they are held against the record.
@@ -265,7 +274,7 @@ class _Trials:
                 f"{self.path}: /{entry}: is missing, and the journal says that it finished"
             )
         archived = archived_trial(RecordedSamples(self.path, entry, record, not_kept), trees)
-        return archived, in_index
+        return with_metrics(archived, self.story.measured_of(told.record))
 
 
 def _as_finished(record: TrialRecord) -> TrialFinished:

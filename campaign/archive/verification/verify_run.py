@@ -19,6 +19,7 @@ from campaign.archive.layout.journal import JOURNAL
 from campaign.archive.layout.journal_summary import Lines, read_lines
 from campaign.archive.layout.run_folder import HEADER, PLAN, SEALING
 from campaign.archive.reading import safe_hdf5
+from campaign.archive.reading.archived_trial import ArchivedTrial
 from campaign.archive.reading.damage import DamageList
 from campaign.archive.reading.folder import open_folder
 from campaign.archive.reading.open_run import read_sealed
@@ -114,13 +115,14 @@ class _Check(EntryCheck):
             reasons: dict[str, list[str]] = {}
             for entry in sorted(gone):
                 reasons.setdefault(not_kept[entry], []).append(entry)
-            # What the index says of a trial without a group was read when the run was opened.
-            told_of = enumerate(run.outlines)
-            without = (run.trials[n] for n, each in told_of if entry_name(each.number) in gone)
-            for archived in chain(without, *run.earlier_attempts.values()):
-                if (entry := archived.entry) in gone:
-                    fingerprint = archived.trial.fingerprint
-                    self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)
+            # Of a trial without a group, the index has the record, parsed as it is asked for.
+            for number, outline in enumerate(run.outlines):
+                if entry_name(outline.number) in gone:
+                    with self.problems.noting():
+                        self._without_samples(run.trials[number])
+            for archived in chain(*run.earlier_attempts.values()):
+                if archived.entry in gone:
+                    self._without_samples(archived)
             for why, entries in reasons.items():
                 more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
                 what = f"no samples of it{more} are kept: {why}; their digests are"
@@ -141,6 +143,10 @@ class _Check(EntryCheck):
                     note.add(f"/{name}", what if known else "is nothing that the format knows")
         self._agreement(run, story, "/run/provenance", "/run/journal", "/run/plan")
         self._outcome(run, story)
+
+    def _without_samples(self, archived: ArchivedTrial) -> None:
+        entry, fingerprint = archived.entry, archived.trial.fingerprint
+        self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)
 
     def _texts(self, file: h5py.File, texts: SealedTexts) -> None:
         """Every text of the run against the seal."""
