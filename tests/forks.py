@@ -230,12 +230,19 @@ class Begun:
     It is no child of this process: its end is seen on a descriptor, its exit code is asked for.
     """
 
-    def __init__(self, forks: Forks, folder: Path, *arguments: str, stdin: int = -1) -> None:
-        """`stdin`: a descriptor; nothing to read without one."""
+    def __init__(
+        self,
+        forks: Forks,
+        folder: Path,
+        *arguments: str,
+        stdin: int = -1,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """`stdin`: a descriptor; nothing to read without one. `environment`: as of `Forks.run`."""
         pipes = [os.pipe() for _ in range(2)]
         ends = [os.devnull if stdin < 0 else f"/proc/{os.getpid()}/fd/{stdin}"]
         ends += [f"/proc/{os.getpid()}/fd/{theirs}" for _, theirs in pipes]
-        self.pid = forks.fork(folder, arguments, ends)
+        self.pid = forks.fork(folder, arguments, ends, environment)
         for _, theirs in pipes:
             os.close(theirs)
         self.stdout, self.stderr = (os.fdopen(ours, encoding="utf-8") for ours, _ in pipes)
