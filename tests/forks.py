@@ -236,12 +236,18 @@ class Begun:
         folder: Path,
         *arguments: str,
         stdin: int = -1,
+        stderr: int = -1,
         environment: Mapping[str, str] | None = None,
     ) -> None:
-        """`stdin`: a descriptor; nothing to read without one. `environment`: as of `Forks.run`."""
+        """`stdin`, `stderr`: descriptors; nothing to read, and a pipe, without them.
+
+        `environment`: as of `Forks.run`.
+        """
         pipes = [os.pipe() for _ in range(2)]
         ends = [os.devnull if stdin < 0 else f"/proc/{os.getpid()}/fd/{stdin}"]
         ends += [f"/proc/{os.getpid()}/fd/{theirs}" for _, theirs in pipes]
+        if stderr >= 0:
+            ends[2] = f"/proc/{os.getpid()}/fd/{stderr}"
         self.pid = forks.fork(folder, arguments, ends, environment)
         for _, theirs in pipes:
             os.close(theirs)

@@ -239,6 +239,7 @@ def test_another_gear_of_the_bench_is_another_scale_to_confirm(drives: Make) -> 
     assert "scale or sign" in ending.reason
 
 
+@pytest.mark.slow
 def test_a_drive_that_goes_on_without_a_heartbeat_is_refused(drives: Make) -> None:
     name, drive = drives(**{"no reaction": True})
     refused(name, drive, "heartbeat fell silent")
