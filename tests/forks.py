@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Self
 
+ROOT = str(Path(__file__).parents[1])
 TIMEOUT = 600
 """s after which the system ends a command: the first one may compile the engine."""
 
@@ -92,7 +93,8 @@ def run():
     code = 0
     try:
         if sys.argv[1:2] == ["-c"]:  # as `python -c`
-            exec(sys.argv[2], {"__name__": "__main__"})
+            del sys.argv[0]
+            exec(sys.argv.pop(1), {"__name__": "__main__"})
             leave(0)
         if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
             importlib.import_module(hook)
@@ -298,6 +300,23 @@ class Begun:
 @cache
 def forks_of(imports: str) -> Forks:
     """The one of this process for commands that differ in what is installed."""
-    made = Forks(os.environ, imports)
+    made = Forks(os.environ | {"PYTHONPATH": ROOT}, imports)
     atexit.register(made.close)
     return made
+
+
+def python(imports: str, program: str, *arguments: object) -> Begun | subprocess.Popen[str]:
+    """A Python program that goes on beside the test, with its arguments; it begins with `imports`.
+
+    On Linux a fork of a process that has imported them.
+    """
+    words = ["-c", f"{imports}\n{program}", *map(str, arguments)]
+    if sys.platform == "linux":
+        return Begun(forks_of(imports), Path.cwd(), *words)
+    return subprocess.Popen(
+        [sys.executable, *words],
+        env=os.environ | {"PYTHONPATH": ROOT},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
