@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Self
 
+ROOT = str(Path(__file__).parents[1])
 TIMEOUT = 600
 """s after which the system ends a command: the first one may compile the engine."""
 
@@ -92,7 +93,8 @@ def run():
     code = 0
     try:
         if sys.argv[1:2] == ["-c"]:  # as `python -c`
-            exec(sys.argv[2], {"__name__": "__main__"})
+            del sys.argv[0]
+            exec(sys.argv.pop(1), {"__name__": "__main__"})
             leave(0)
         if hook := os.environ.pop("BEFORE_THE_COMMAND", ""):  # a module that changes what it meets
             importlib.import_module(hook)
@@ -230,12 +232,25 @@ class Begun:
     It is no child of this process: its end is seen on a descriptor, its exit code is asked for.
     """
 
-    def __init__(self, forks: Forks, folder: Path, *arguments: str, stdin: int = -1) -> None:
-        """`stdin`: a descriptor; nothing to read without one."""
+    def __init__(
+        self,
+        forks: Forks,
+        folder: Path,
+        *arguments: str,
+        stdin: int = -1,
+        stderr: int = -1,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """`stdin`, `stderr`: descriptors; nothing to read, and a pipe, without them.
+
+        `environment`: as of `Forks.run`.
+        """
         pipes = [os.pipe() for _ in range(2)]
         ends = [os.devnull if stdin < 0 else f"/proc/{os.getpid()}/fd/{stdin}"]
         ends += [f"/proc/{os.getpid()}/fd/{theirs}" for _, theirs in pipes]
-        self.pid = forks.fork(folder, arguments, ends)
+        if stderr >= 0:
+            ends[2] = f"/proc/{os.getpid()}/fd/{stderr}"
+        self.pid = forks.fork(folder, arguments, ends, environment)
         for _, theirs in pipes:
             os.close(theirs)
         self.stdout, self.stderr = (os.fdopen(ours, encoding="utf-8") for ours, _ in pipes)
@@ -285,6 +300,23 @@ class Begun:
 @cache
 def forks_of(imports: str) -> Forks:
     """The one of this process for commands that differ in what is installed."""
-    made = Forks(os.environ, imports)
+    made = Forks(os.environ | {"PYTHONPATH": ROOT}, imports)
     atexit.register(made.close)
     return made
+
+
+def python(imports: str, program: str, *arguments: object) -> Begun | subprocess.Popen[str]:
+    """A Python program that goes on beside the test, with its arguments; it begins with `imports`.
+
+    On Linux a fork of a process that has imported them.
+    """
+    words = ["-c", f"{imports}\n{program}", *map(str, arguments)]
+    if sys.platform == "linux":
+        return Begun(forks_of(imports), Path.cwd(), *words)
+    return subprocess.Popen(
+        [sys.executable, *words],
+        env=os.environ | {"PYTHONPATH": ROOT},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.result import Finding, Result
 from tests.archives import PROTOCOL, simulated_run
+from tests.drawings import keep_drawings
 from tests.system.user import completed
 
 PAGE = (Path(__file__).parents[1] / "docs" / "results-as-data.md").read_text(encoding="utf-8")
@@ -38,6 +40,13 @@ MORE = (
 )
 
 
+@pytest.fixture(scope="module", autouse=True)
+def drawn_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        keep_drawings(patch)
+        yield
+
+
 @pytest.fixture(scope="module")
 def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated run of which a report was made."""
@@ -45,10 +54,11 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return report(run)
 
 
-def report(run: Path, output: Path | None = None, **options: bool) -> Path:
+def report(
+    run: Path, output: Path | None = None, code: ExitCode = ExitCode.DONE, **options: bool
+) -> Path:
     """Make a report of it, as the command does; the run."""
-    _, code = report_run(str(run), run.parent, output, None, open_it=False, **options)
-    assert code == ExitCode.DONE
+    assert report_run(str(run), run.parent, output, None, open_it=False, **options)[1] == code
     return run
 
 
@@ -261,20 +271,18 @@ def test_a_damaged_trial_is_left_out_and_told_of(run):
 
 
 @pytest.mark.slow
-def test_a_report_of_a_damaged_run_keeps_what_was_found_when_it_was_whole(run, tmp_path):
+def test_a_report_of_a_damaged_run_keeps_what_was_found_when_it_was_whole(run, tmp_path, capsys):
     before = results_path(run).read_bytes()
     with h5py.File(run) as file:
         place = file["trial_00002/data/pointing_error"].id.get_chunk_info(0).byte_offset
     content = bytearray(run.read_bytes())
     content[place + 20] ^= 1
     run.write_bytes(content)
-    made = command("report", str(run), "--output", str(tmp_path / "report"))
-    assert made.returncode == ExitCode.ARCHIVE
-    assert "kept as it is" in made.stderr
+    report(run, tmp_path / "report", ExitCode.ARCHIVE)
+    assert "kept as it is" in " ".join(capsys.readouterr().err.split())
     assert results_path(run).read_bytes() == before
-    results_path(run).unlink()
-    made = command("report", str(run), "--output", str(tmp_path / "report"))
-    assert "kept as it is" not in made.stderr
+    report(alone(run), tmp_path / "report", ExitCode.ARCHIVE)
+    assert "kept as it is" not in " ".join(capsys.readouterr().err.split())
     assert read_results(results_path(run), open_run(run).identity).damaged
 
 

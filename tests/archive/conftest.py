@@ -4,8 +4,8 @@ import hashlib
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from campaign.archive import RunHeader, RunStatus, RunWriter
 from campaign.policy import SampleRetention
 from campaign.recording import ChannelInfo, Ending, Event, Outcome
 from campaign.trial import Task, Trial
+from tests import forks
 
 CREATED = "2026-11-21T09:36:58Z"
 STARTED = "2026-11-21T09:37:00.250Z"
@@ -146,19 +147,6 @@ def record_trial(
     return recorder
 
 
-def python(program: str, *arguments: object, **options: Any) -> subprocess.Popen[str]:
-    """A process that runs a program, which has the makers above as `kit`."""
-    root = str(Path(__file__).parents[2])
-    command = [sys.executable, "-c", f"from tests.archive import conftest as kit\n{program}"]
-    return subprocess.Popen(
-        [*command, *map(str, arguments)],
-        env=os.environ | {"PYTHONPATH": root},
-        stdout=subprocess.PIPE,
-        text=True,
-        **options,
-    )
-
-
 @pytest.fixture(scope="session")
 def sealed_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sealed run of two trials; to be copied, not changed."""
@@ -203,4 +191,5 @@ class Kit:
     record = staticmethod(write_trial)
     started = staticmethod(begin_trial)
     recorded = staticmethod(record_trial)
-    python = staticmethod(python)
+    python = partial(forks.python, "from tests.archive import conftest as kit")
+    """A process that runs a program, which has the makers above as `kit`."""

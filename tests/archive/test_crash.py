@@ -3,9 +3,6 @@
 import errno
 import os
 import random
-import resource
-import signal
-import subprocess
 import threading
 import time
 from pathlib import Path
@@ -77,16 +74,17 @@ def test_a_kill_while_sealing_leaves_the_folder_or_the_file(tmp_path, kit, attem
     assert len(list_runs(tmp_path)) == 1
 
 
-def limit_file_size() -> None:
-    """From now on no file grows beyond 400 kB: writes fail as they do on a full disk."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+LIMITED = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+"""
+"""From now on no file grows beyond 400 kB: writes fail as they do on a full disk."""
 
 
 @pytest.mark.slow
 def test_a_file_that_cannot_grow_fails_the_seal_and_keeps_the_trials(tmp_path, kit):
-    options = {"preexec_fn": limit_file_size, "stderr": subprocess.PIPE}
-    child = kit.python(CHILD, tmp_path, 25, **options)
+    child = kit.python(f"{LIMITED}{CHILD}", tmp_path, 25)
     said, errors = child.communicate()
     assert "finished 25" in said
     assert "sealed" not in said.split("\n")

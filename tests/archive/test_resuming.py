@@ -381,7 +381,7 @@ def test_a_kill_before_any_single_step_loses_nothing(tmp_path, kit):
     writer, _ = kit.begin(tmp_path / "template", 2, [50])
     writer.seal(RunStatus.INTERRUPTED, ended=kit.ENDED)
     places = tmp_path / "template", tmp_path / "results"
-    child = kit.python(STEPS, *places, stderr=subprocess.PIPE)
+    child = kit.python(STEPS, *places)
     out, errors = child.communicate()
     assert child.returncode == 0, errors
     assert int(out) > 40

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from campaign.canopen_drive import proof, relay
-from tests.canopen_drive.rig import FastClock, channel
+from tests.canopen_drive.rig import channel, quicken
 from tests.canopen_drive.simulated import SimulatedDrive
 
 SPEED = 10.0
@@ -24,11 +23,8 @@ def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def fast(monkeypatch: pytest.MonkeyPatch) -> float:
-    """The relay's clock; a simulated drive with this `speed` counts heartbeats as fast."""
-    monkeypatch.setattr(relay, "time", FastClock(SPEED))
-    # What waits for the drive waits as long as before: a busy machine is not as fast.
-    monkeypatch.setattr(proof, "REACTION", SPEED * proof.REACTION)
-    monkeypatch.setattr(relay, "ENABLE", SPEED * relay.ENABLE)
+    """How much faster the relay's clock is, and that of its drive."""
+    quicken(SPEED, monkeypatch.setattr)
     return SPEED
 
 

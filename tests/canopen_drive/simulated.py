@@ -2,7 +2,7 @@
 
 Its state machine and its object numbers are written down here anew, after the standard, and share
 nothing with the program. While it is enabled and SYNC comes, its time is that of SYNC: one period
-for each, however late it is. Otherwise it is the wall clock's.
+for each, however late it is. Otherwise it is the wall clock's; off, it is faster by `speed`.
 """
 
 from __future__ import annotations
@@ -90,6 +90,8 @@ RATED = 2.0
 """N m."""
 STILL = 1e-3
 """rad/s; slower it is at rest."""
+NOTHING = 1e-9
+"""N m, rad/s, rad; with less, a drive that is off moves nowhere."""
 NO_SYNC = 0.5
 """s of the wall clock after which an enabled axis goes on without SYNC."""
 
@@ -125,7 +127,7 @@ class SimulatedDrive:
         log: what happened, in order: ("word", w), ("state", name, angle), ("moves", angle),
             ("rest", angle).
         quirks: what is wrong with it; see the tests.
-        speed: of its clock for heartbeats, where the relay's is faster, too.
+        speed: of its clock for heartbeats and rest, where the relay's is faster, too.
     """
 
     def __init__(
@@ -152,7 +154,8 @@ class SimulatedDrive:
         self.syncs = self.counter = 0
         self._beat: float | None = None  # own time since the last heartbeat; None before the first
         self._since_sync = math.inf
-        self._lock = threading.RLock()
+        self._owed = 0.0  # s of the axis that are less than a step
+        self._lock, self._then = threading.RLock(), time.monotonic()
         self.on_read: Callable[[int], None] = lambda index: None
         self.on_sync: Callable[[int], None] = lambda count: None
         bus = can.Bus(interface="virtual", channel=channel)
@@ -251,7 +254,7 @@ class SimulatedDrive:
                 raw = b"".join(self._value(each >> 16) for each in entries)
                 for _ in range(self.quirks.get("frames", lambda syncs: 1)(self.syncs)):
                     self.network.send_message(cob, raw)
-            self._advance(self.get(0x1006) * 1e-6)
+            self._advance(max(STEP, self.get(0x1006) * 1e-6))
 
     def _value(self, index: int) -> bytes:
         code = self._code(index, 0)
@@ -281,6 +284,7 @@ class SimulatedDrive:
         if index in self.quirks.get("stubborn", ()):
             return int(od.default)  # whatever was written
         if index in (0x6041, 0x6061, 0x6064, 0x606C, 0x6077, 0x6078, 0x603F):
+            self._pass_time()  # a busy machine shows no moving axis at rest
             value = int(self._measured(index))
             self.on_read(index)
             return value
@@ -347,25 +351,32 @@ class SimulatedDrive:
     # The axis
 
     def _ticks(self) -> None:
-        then = time.monotonic()
         while not self.closed:
             time.sleep(TICK)
+            self._pass_time()
+
+    def _pass_time(self) -> None:
+        with self._lock:
             now = time.monotonic()
-            passed, then = min(now - then, 4 * TICK), now  # a busy machine is no silence
-            with self._lock:
-                timeout = (
-                    self.get(0x1016, 1) & 0xFFFF if 0x1016 in self.node.object_dictionary else 0
-                )
-                if self._beat is not None:
-                    self._beat += passed * self.speed
-                    if timeout and self._beat > timeout * 1e-3:
-                        self._lost_heartbeat()
-                self._since_sync += passed
-                if self.state != "enabled" or self._since_sync > NO_SYNC:
-                    self._advance(passed)
+            passed = min(now - self._then, 4 * TICK)  # a busy machine is no silence
+            self._then = now
+            timeout = self.get(0x1016, 1) & 0xFFFF if 0x1016 in self.node.object_dictionary else 0
+            if self._beat is not None:
+                self._beat += passed * self.speed
+                if timeout and self._beat > timeout * 1e-3:
+                    self._lost_heartbeat()
+            self._since_sync += passed
+            if self.state != "enabled":
+                self._advance(passed * self.speed)
+            elif self._since_sync > NO_SYNC:
+                self._advance(passed)
 
     def _advance(self, duration: float) -> None:
-        steps = max(1, round(duration / STEP))
+        if self.state in OFF and max(map(abs, (self.torque, self.rate, self.bristle))) < NOTHING:
+            return
+        self._owed += duration
+        steps = round(self._owed / STEP)
+        self._owed -= steps * STEP
         for _ in range(steps):
             self.torque = self._drive()
             self._move()

@@ -61,7 +61,6 @@ def ended(name: str, drive: SimulatedDrive, what: Any, **options: Any) -> Ending
 # What happens in a trial
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "fault"),
     [(0x2310, Fault.DRIVE), (0x4210, Fault.OVER_TEMPERATURE), (0x7305, Fault.SENSOR)],
@@ -76,7 +75,6 @@ def test_an_emergency_message_ends_the_trial_as_the_fault_that_it_names(
     assert ending.safe_state is SafeState.CONFIRMED
 
 
-@pytest.mark.slow
 def test_an_emergency_message_of_a_drive_that_goes_on_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
     ending = ended(name, drive, lambda: drive.node.emcy.send(0x3210, 1, b""))
@@ -84,14 +82,12 @@ def test_an_emergency_message_of_a_drive_that_goes_on_ends_the_trial(drives: Mak
     assert "3210h" in ending.reason
 
 
-@pytest.mark.slow
 def test_a_drive_that_leaves_its_state_without_a_word_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
     ending = ended(name, drive, lambda: drive.become("switched on"))
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.DRIVE)
 
 
-@pytest.mark.slow
 def test_a_lost_answer_to_sync_is_marked_and_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
 
@@ -103,7 +99,6 @@ def test_a_lost_answer_to_sync_is_marked_and_ends_the_trial(drives: Make) -> Non
     assert ending.safe_state is SafeState.CONFIRMED
 
 
-@pytest.mark.slow
 def test_a_doubled_answer_is_no_sample(drives: Make) -> None:
     name, drive = drives()
 
@@ -114,7 +109,6 @@ def test_a_doubled_answer_is_no_sample(drives: Make) -> None:
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES)
 
 
-@pytest.mark.slow
 def test_a_drive_that_starts_anew_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
 
@@ -127,7 +121,6 @@ def test_a_drive_that_starts_anew_ends_the_trial(drives: Make) -> None:
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.RESET)
 
 
-@pytest.mark.slow
 def test_a_drive_that_started_anew_between_trials_is_set_and_proved_again(drives: Make) -> None:
     name, drive = drives()
     with backend(name) as connected:
@@ -142,14 +135,12 @@ def test_a_drive_that_started_anew_between_trials_is_set_and_proved_again(drives
         assert "fault" in [event[1] for event in drive.log[since:]], "its silence was not tried"
 
 
-@pytest.mark.slow
 def test_an_internal_limit_ends_the_trial(drives: Make) -> None:
     name, drive = drives()
     ending = ended(name, drive, lambda: drive.quirks.update({"limit bit": True}))
     assert ending.outcome is Outcome.LIMIT
 
 
-@pytest.mark.slow
 def test_a_runaway_ends_at_the_limit_of_position(drives: Make) -> None:
     name, drive = drives()
 
@@ -220,7 +211,6 @@ def test_a_slow_move_shows_a_wrong_scale_or_sign(quirk: dict[str, int], drives: 
     refused(name, drive, "scale or sign")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.3, -0.3])
 def test_a_trial_begins_at_its_start_angle(angle: float, drives: Make) -> None:
     name, _ = drives()
@@ -230,7 +220,6 @@ def test_a_trial_begins_at_its_start_angle(angle: float, drives: Make) -> None:
     assert samples["relative_angle"][0] == pytest.approx(angle, abs=0.03)
 
 
-@pytest.mark.slow
 def test_a_start_angle_that_is_far_away_is_refused_before_its_samples_are_late(
     drives: Make,
 ) -> None:
@@ -240,7 +229,6 @@ def test_a_start_angle_that_is_far_away_is_refused_before_its_samples_are_late(
     refused(name, drive, "turn the load nearer", bench=bench, start_angle=20.0)
 
 
-@pytest.mark.slow
 def test_another_gear_of_the_bench_is_another_scale_to_confirm(drives: Make) -> None:
     name, drive = drives()
     with backend(name) as connected:
@@ -263,7 +251,6 @@ TORQUE: dict[str, Any] = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
 def test_torque_needs_a_limit_of_speed_that_acts(drives: Make) -> None:
     name, drive = drives(**{"no speed limit": True})
     refused(name, drive, "no limit of speed was seen to act", **TORQUE)
@@ -271,13 +258,11 @@ def test_torque_needs_a_limit_of_speed_that_acts(drives: Make) -> None:
     assert drive.peak_rate < fastest
 
 
-@pytest.mark.slow
 def test_a_torque_that_moves_nothing_shows_no_limit_of_speed(drives: Make) -> None:
     name, drive = drives(static=2.0, coulomb=1.9)
     refused(name, drive, "no limit of speed was seen to act", **TORQUE)
 
 
-@pytest.mark.slow
 def test_limits_of_the_bench_are_in_the_drive_during_a_trial_and_its_own_after(
     drives: Make,
 ) -> None:
@@ -295,7 +280,6 @@ def test_limits_of_the_bench_are_in_the_drive_during_a_trial_and_its_own_after(
     assert (drive.get(0x6072), drive.get(0x60E0), drive.get(0x6080)) == (5000, 2000, 3000)
 
 
-@pytest.mark.slow
 def test_a_drive_in_fault_is_not_moved_and_its_fault_is_told(drives: Make) -> None:
     name, drive = drives()
     drive.fail(0x2310)
@@ -430,7 +414,6 @@ def test_a_linear_axis_is_refused() -> None:
 # The latch
 
 
-@pytest.mark.slow
 def test_a_stop_outlives_every_process_of_the_program(drives: Make) -> None:
     name, drive = drives()
     port = f"can://virtual/{name}?node=5"
@@ -445,7 +428,6 @@ def test_a_stop_outlives_every_process_of_the_program(drives: Make) -> None:
         assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
 
 
-@pytest.mark.slow
 def test_the_relay_refuses_what_the_host_has_not_heard_of(drives: Make) -> None:
     """A stop that comes between the host's question and its trial."""
     name, drive = drives()

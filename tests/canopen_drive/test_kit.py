@@ -34,7 +34,7 @@ def check(name: str, speed: float) -> None:
             possible = trial()
         CHECKS[name](
             BackendUnderTest(
-                open=lambda: backend(bus),
+                open=lambda: backend(bus, heartbeat=5.0 if speed > 1.0 else 2.0),
                 possible=possible,
                 impossible=SWUNG,
                 names="task.base_acceleration",
@@ -46,7 +46,6 @@ def check(name: str, speed: float) -> None:
         drive.wait(drive.at_rest_and_off)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CHECKS if name != IN_TIME])
 def test_canopen_passes(name: str, fast: float) -> None:
     check(name, fast)

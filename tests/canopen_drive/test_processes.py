@@ -6,8 +6,6 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -19,40 +17,41 @@ import pytest
 
 from campaign.backends.canopen import CanopenBackend, CanopenOptions
 from campaign.recording import Fault, MemoryRecorder, Outcome, SafeState
+from tests.canopen_drive import host as hosts
 from tests.canopen_drive.hub import Hub, cut, unharmed
-from tests.canopen_drive.rig import PATIENT, channel, execute, trial
+from tests.canopen_drive.rig import PATIENT, channel, execute, start_thread, trial
 from tests.canopen_drive.simulated import SimulatedDrive
 from tests.canopen_drive.test_backend import stays_off
-from tests.system.user import ROOT
+from tests.forks import Begun
+from tests.system.user import ROOT, environment, forks
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 @contextmanager
-def rig() -> Iterator[tuple[SimulatedDrive, Hub]]:
+def rig(speed: float = hosts.SPEED) -> Iterator[tuple[SimulatedDrive, Hub]]:
     name = channel()
-    with SimulatedDrive(name) as drive, Hub(name) as hub:
+    with SimulatedDrive(name, speed=speed) as drive, Hub(name) as hub:
         yield drive, hub
 
 
+def begun(folder: Path, *arguments: str) -> Begun:
+    """In a fork, with the variables of this test."""
+    return Begun(forks(), folder, *arguments, environment=environment())
+
+
 @contextmanager
-def host(hub: Hub, drive: SimulatedDrive, **options: Any) -> Iterator[subprocess.Popen[str]]:
+def host(hub: Hub, drive: SimulatedDrive, **options: Any) -> Iterator[Begun]:
     """A program in the midst of its trial: faster than any motion that proves the drive."""
-    settings = {**PATIENT, "port": hub.port, **options}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.canopen_drive.host", json.dumps(settings)],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    )
-    try:
-        drive.wait(lambda: process.poll() is not None or abs(drive.rate) > 0.65)
-        assert process.poll() is None, process.communicate()
-        yield process
-    finally:
-        if process.poll() is None:
+    settings = json.dumps({**PATIENT, "port": hub.port, **options})
+    code = f"from tests.canopen_drive.host import main; main({settings!r})"
+    with begun(ROOT, "-c", code) as process:
+        try:
+            drive.wait(lambda: process.poll() is not None or abs(drive.rate) > 0.65)
+            assert process.poll() is None, process.communicate()
+            yield process
+        finally:
             process.kill()
-        process.communicate(timeout=60)
 
 
 def states(drive: SimulatedDrive, since: int) -> list[str]:
@@ -83,7 +82,7 @@ def test_a_killed_host_leaves_the_drive_at_rest_and_the_bus_silent() -> None:
 @posix
 @pytest.mark.slow
 def test_a_host_that_hangs_is_silent_and_the_relay_stops_the_drive() -> None:
-    with rig() as (drive, hub), host(hub, drive, silence=1.0) as process:
+    with rig() as (drive, hub), host(hub, drive, silence=2.5) as process:
         since = len(drive.log)
         process.send_signal(signal.SIGSTOP)
         stays_off(drive, since)
@@ -112,7 +111,7 @@ def test_a_killed_relay_is_followed_by_a_stop(state_folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_pulled_cable_is_the_drives_own_business() -> None:
-    with rig() as (drive, hub), host(hub, drive, late=2.0) as process:
+    with rig() as (drive, hub), host(hub, drive, late=5.0, safe_time=1.0) as process:
         since = len(drive.log)
         hub.fate = cut
         stays_off(drive, since)
@@ -126,18 +125,18 @@ def test_a_pulled_cable_is_the_drives_own_business() -> None:
 @contextmanager
 def connected(hub: Hub, **options: Any) -> Iterator[CanopenBackend]:
     settings = {**PATIENT, "port": hub.port, **options}
-    backend = CanopenBackend(CanopenOptions.model_validate(settings, context={"si": True}))
-    with backend:
+    chosen = CanopenOptions.model_validate(settings, context={"si": True})
+    with CanopenBackend(chosen, start_thread) as backend:
         first, _ = execute(backend, trial())
         assert first.outcome is Outcome.COMPLETED, first
         yield backend
 
 
 @pytest.mark.slow
-def test_delayed_frames_move_no_sample() -> None:
+def test_delayed_frames_move_no_sample(fast: float) -> None:
     """Each SYNC waits for the answers to the last: the samples are those of a fast bus."""
     draw = random.Random(4)
-    with rig() as (drive, hub), connected(hub) as backend:
+    with rig(fast) as (drive, hub), connected(hub) as backend:
         drive.angle = drive.bristle = drive.rate = 0.0
         _, quick = execute(backend, trial())
         hub.fate = lambda to_drive, cob, data: [draw.choice((0.0, 0.0, 0.0, 0.012))]
@@ -157,9 +156,9 @@ CASES = (
 
 
 @pytest.mark.slow
-def test_a_lost_or_doubled_frame_is_no_other_sample() -> None:
+def test_a_lost_or_doubled_frame_is_no_other_sample(fast: float) -> None:
     """SYNC, and an answer to it, once samples have come."""
-    with rig() as (drive, hub), connected(hub, late=5.0) as backend:
+    with rig(fast) as (drive, hub), connected(hub, late=20.0) as backend:
         for cob, copies, outcome in CASES:
             recorder, left = MemoryRecorder(), [1]
             hub.fate = partial(_harm, recorder, left, cob, copies)
@@ -218,25 +217,18 @@ duration = "100 s"
 def test_campaign_run_is_stopped_by_campaign_stop(tmp_path: Path) -> None:
     (tmp_path / "desk.toml").write_text(DESK)
     (tmp_path / "map.toml").write_text(PROTOCOL)
-    program = [sys.executable, "-m", "campaign"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "dumb"}
-    with rig() as (drive, hub):
+    with rig(speed=1.0) as (drive, hub):
         settings = ("late=60 s", "silence=60 s", "heartbeat=2 s")
         given = [part for each in settings for part in ("--set", f"backend.{each}")]
         line = ["run", "map.toml", "--backend", "canopen", "--port", hub.port, "--yes", *given]
-        run = subprocess.Popen(
-            [*program, *line], cwd=tmp_path, env=environment, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
+        run = begun(tmp_path, *line)
         drive.wait(lambda: run.poll() is not None or abs(drive.rate) > 0.515, 120.0)
         assert run.poll() is None, run.communicate()
         since = len(drive.log)
-        stop = [*program, "stop", "--port", hub.port, "--patience", "60"]
-        done = subprocess.run(
-            stop, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-        )
+        stop = ("stop", "--port", hub.port, "--patience", "60")
+        done = forks().run(tmp_path, *stop, environment=environment())
         assert (done.returncode, done.stdout.strip()) == (0, "safe state confirmed"), done
-        out, _ = run.communicate(timeout=120)
-        assert run.returncode == 130, out
-        assert "panic stop" in out
+        out, err = run.communicate(timeout=120)
+        assert run.returncode == 130, err
+        assert "panic stop" in out + err
         stays_off(drive, since)

@@ -13,6 +13,7 @@ from campaign.canopen_drive.state import ENABLING, State, reset_words, state_of,
 from tests.canopen_drive.rig import channel
 from tests.canopen_drive.simulated import OFF, STATUS, SimulatedDrive
 
+Make = Callable[..., tuple[str, SimulatedDrive]]
 NEARNESS = {
     "fault": 0, "fault reaction": 0, "switch on disabled": 0, "quick stop": 0, "ready": 1,
     "switched on": 2, "enabled": 3,
@@ -81,19 +82,19 @@ def nearest(drive: SimulatedDrive, since: int) -> int:
     return max((NEARNESS[e[1]] for e in drive.log[since:] if e[0] == "state"), default=0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("option", range(8))
-def test_a_moving_drive_comes_to_rest_with_each_quick_stop_option(option: int) -> None:
-    name = channel()
-    with SimulatedDrive(name) as drive:
-        bus = rig(name)
-        drive.put(0x605A, option)
-        moving(drive)
-        since = len(drive.log)
-        assert bus.bring_to_rest(60.0)
-        assert drive.at_rest_and_off()
-        assert nearest(drive, since) == 0
-        bus.close()
+def test_a_moving_drive_comes_to_rest_with_each_quick_stop_option(
+    option: int, drives: Make
+) -> None:
+    name, drive = drives()
+    bus = rig(name)
+    drive.put(0x605A, option)
+    moving(drive)
+    since = len(drive.log)
+    assert bus.bring_to_rest(60.0)
+    assert drive.at_rest_and_off()
+    assert nearest(drive, since) == 0
+    bus.close()
 
 
 PASSES: dict[str, Callable[[SimulatedDrive], None]] = {
@@ -133,19 +134,17 @@ def test_a_state_that_passes_between_two_readings(what: str, before: str, option
         bus.close()
 
 
-@pytest.mark.slow
-def test_it_is_not_at_rest_while_it_coasts() -> None:
+def test_it_is_not_at_rest_while_it_coasts(drives: Make) -> None:
     """605Ah of 0: off at once, and still moving."""
-    name = channel()
-    with SimulatedDrive(name, coulomb=0.02, static=0.02, viscous=0.0) as drive:
-        bus = rig(name)
-        drive.put(0x605A, 0)
-        moving(drive)
-        assert bus.bring_to_rest(60.0)
-        off = [event[:2] for event in drive.log].index(("state", "switch on disabled"))
-        assert "rest" in [event[0] for event in drive.log[off:]], "seen at rest before it was"
-        assert not drive.moves
-        bus.close()
+    name, drive = drives(coulomb=0.02, static=0.02, viscous=0.0)
+    bus = rig(name)
+    drive.put(0x605A, 0)
+    moving(drive)
+    assert bus.bring_to_rest(60.0)
+    off = [event[:2] for event in drive.log].index(("state", "switch on disabled"))
+    assert "rest" in [event[0] for event in drive.log[off:]], "seen at rest before it was"
+    assert not drive.moves
+    bus.close()
 
 
 def test_clearing_a_fault_ends_in_switch_on_disabled() -> None:

@@ -64,7 +64,6 @@ def states(drive: SimulatedDrive) -> list[str]:
     return [event[1] for event in drive.log if event[0] == "state"]
 
 
-@pytest.mark.slow
 def test_a_host_that_reads_no_more_is_silent_like_any_other() -> None:
     """Neither a sample nor an answer that it does not take keeps the relay from its work."""
     with relay(Deaf()) as (made, drive):
@@ -243,7 +242,6 @@ def test_an_answer_that_comes_too_late_ends_no_trial() -> None:
     lines.put(b"")
 
 
-@pytest.mark.slow
 def test_a_trial_that_was_between_two_motions_moves_no_more_after_make_safe(drives: Make) -> None:
     name, drive = drives()
     with backend(name) as connected:
@@ -266,7 +264,6 @@ def test_a_trial_that_was_between_two_motions_moves_no_more_after_make_safe(driv
         assert execute(connected, trial())[0].outcome is Outcome.COMPLETED
 
 
-@pytest.mark.slow
 def test_a_limit_that_cannot_be_written_keeps_no_other_from_being_restored(drives: Make) -> None:
     name, drive = drives(stiff=(0x6072,))
     with backend(name) as connected:

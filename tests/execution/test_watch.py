@@ -6,8 +6,6 @@ import os
 import pty
 import select
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -22,8 +20,9 @@ from campaign.channels import info
 from campaign.execution.progress import Progress
 from campaign.execution.watch_display import AFTERWARDS, MOST, Trace, WatchDisplay, drawn
 from campaign.trial import Task, Trial
+from tests.forks import Begun
 from tests.link.controllers import controller
-from tests.system.user import ROOT, SEA, begun, campaign
+from tests.system.user import SEA, begun, campaign, environment, forks
 
 pytest.importorskip("plotext")
 
@@ -120,16 +119,8 @@ def on_terminal(folder: Path, terminal: str, *arguments: str) -> str:
     The run must be complete, and named at the end, whatever the terminal.
     """
     ours, theirs = pty.openpty()
-    kept = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "FORCE_COLOR")}
-    term = {"TERM": "dumb" if terminal == "dumb" else "xterm"}
-    running = subprocess.Popen(
-        [sys.executable, "-m", "campaign", *arguments],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=theirs,
-        env=kept | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "LINES": "40"} | term,
-    )
+    term = {"TERM": "dumb" if terminal == "dumb" else "xterm", "COLUMNS": "100", "LINES": "40"}
+    running = Begun(forks(), folder, *arguments, stderr=theirs, environment=environment() | term)
     os.close(theirs)
     shown = b""
     try:
@@ -143,7 +134,7 @@ def on_terminal(folder: Path, terminal: str, *arguments: str) -> str:
     os.close(ours)
     out, _ = running.communicate(timeout=120)
     assert running.returncode == 0
-    assert out.decode().strip().endswith(".nxs")
+    assert out.strip().endswith(".nxs")
     assert open_run(find_run(folder / "results")).status is RunStatus.COMPLETE
     return shown.decode(errors="replace")
 
@@ -162,7 +153,7 @@ def test_a_run_on_a_terminal(tmp_path: Path, terminal: str) -> None:
         assert "\x1b[" not in text
 
 
-LIVE = SEA.replace("cycles = 1\n", 'cycles = 1\nfrequency = "0.5 Hz"\n', 1)
+LIVE = SEA.replace("cycles = 1\n", 'cycles = 1\nfrequency = "1 Hz"\n', 1)
 
 
 PACE = ("--speed", "1", "--heartbeat-timeout", "10")
@@ -174,7 +165,7 @@ def live(port: str) -> tuple[str, ...]:
 
 @pytest.mark.slow
 def test_a_live_bench_is_watched_as_it_moves_and_waits_for_no_terminal(tmp_path: Path) -> None:
-    """4 s of samples a trial, sent at their pace; a host that falls silent finds the drive off."""
+    """2 s of samples a trial, sent at their pace; a host that falls silent finds the drive off."""
     (tmp_path / "sea.toml").write_text(LIVE, encoding="utf-8")
     seen: dict[int, np.ndarray] = {}
     with controller(*PACE, bench="simulink", pty=True) as port:

@@ -1,9 +1,8 @@
 """Friction models of another kind than the shipped ones go through the same door.
 
-A Maxwell-slip model of ten elements (the sticking part of the generalised Maxwell-slip model:
-Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic Control 50 (2005) 1883) has a state whose
-size follows from its options. Karnopp's model (J. Dyn. Sys., Meas., Control 107 (1985) 100) has
-none, and holds what is applied; or it is declared as a set at rest, and needs no band of rates.
+Karnopp's model (J. Dyn. Sys., Meas., Control 107 (1985) 100) has no state, and holds what is
+applied; or it is declared as a set at rest, and needs no band of rates. Models whose state follows
+from their options are in `tests/physics/friction`.
 """
 
 from __future__ import annotations
@@ -18,58 +17,11 @@ from pydantic import Field
 
 from campaign.physics.elementary import where
 from campaign.physics.friction.interface import DryFriction, FrictionModel, FrictionOptions
-from campaign.physics.lanes import Lane
-from campaign.physics.rows import OUTPUTS
-from campaign.physics.simulate import simulate_together
 from campaign.physics.step_function import Motion, single_step
 from campaign.signals import Polyline
 from campaign.testing import known
-from campaign.units import AngularRate, RotationalStiffness, Torque
+from campaign.units import AngularRate, Torque
 from tests.physics.benches import Tree, bench, run, task
-
-
-class MaxwellOptions(FrictionOptions):
-    """Parallel springs, each of which slips at a torque of its own."""
-
-    model: Literal["maxwell"]
-    """Maxwell slip."""
-    elements: int = Field(default=10, ge=1, le=50)
-    """How many."""
-    slip_torque: Torque = Field(gt=0)
-    """Of all elements, when all slip."""
-    stiffness: RotationalStiffness = Field(gt=0)
-    """Of all elements, while all stick."""
-
-
-def _maxwell_parameters(options: MaxwellOptions) -> np.ndarray:
-    """Equal stiffnesses; the i-th of n slips at a torque in proportion to i."""
-    n = options.elements
-    torques = options.slip_torque * np.arange(1, n + 1) / (n * (n + 1) / 2)
-    return np.concatenate([[n, options.stiffness / n], torques])
-
-
-def _maxwell_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
-    """state: the torque of each element (N m)."""
-    before, after = 0.0, 0.0
-    for i in range(int(parameters[0])):
-        slip = parameters[2 + i]
-        before += state[i]
-        stuck = state[i] + parameters[1] * motion.rate_mean * motion.step
-        state[i] = min(max(stuck, -slip), slip)
-        after += state[i]
-    return 0.5 * (before + after), after - before
-
-
-MAXWELL = FrictionModel(
-    name="maxwell",
-    summary="parallel springs that slip",
-    options=MaxwellOptions,
-    parameters=_maxwell_parameters,
-    state_size=lambda options, step: options.elements,
-    step=_maxwell_step,
-    viscous=lambda options: 0.0,
-    steady_state=lambda options, v: options.slip_torque * np.sign(v),
-)
 
 
 class KarnoppOptions(FrictionOptions):
@@ -107,7 +59,6 @@ KARNOPP = FrictionModel(
     viscous=lambda options: 0.0,
     steady_state=lambda options, v: options.coulomb_torque * np.sign(v),
 )
-MAXWELL_TREE: Tree = {"model": "maxwell", "slip_torque": "30 N m", "stiffness": "20000 N m/rad"}
 KARNOPP_TREE: Tree = {
     "model": "karnopp",
     "static_torque": "30 N m",
@@ -116,59 +67,11 @@ KARNOPP_TREE: Tree = {
 }
 
 
-def on(tree: Tree, inertia: float = 35.0) -> Any:
+def on(tree: Tree) -> Any:
     def edit(whole: Tree) -> None:
         whole["friction"], whole["compensation"] = {"load": tree}, {}
-        whole["axis"]["inertia"] = f"{inertia!r} kg m^2"
 
     return bench(edit)
-
-
-def moved(way: float, state: np.ndarray, steps: int = 100) -> float:
-    """The torque of ten elements after a motion (rad), slow or fast."""
-    options = MaxwellOptions.model_validate(MAXWELL_TREE)
-    parameters = MAXWELL.parameters(options)
-    for _ in range(steps):
-        rate = way / steps / 1e-3
-        mean, change = single_step(MAXWELL.step, parameters, state, Motion.at(rate, rate, 1e-3))
-    return mean + 0.5 * change
-
-
-def virgin(way: float) -> float:
-    """Torque of the first loading: each element k x up to its own slip."""
-    return float(sum(min(2000.0 * way, 30.0 * i / 55) for i in range(1, 11)))
-
-
-@pytest.mark.slow
-def test_ten_elements_have_a_memory_of_where_they_turned() -> None:
-    """Masing's rule: going back is twice the first loading at half the way, from where it turned;
-    and a small loop inside closes."""
-    state = np.zeros(10)
-    turned = moved(2e-3, state)
-    assert turned == pytest.approx(virgin(2e-3), rel=1e-12)
-    inner = state.copy()
-    for way in (-3e-4, -1.2e-3, -3.6e-3):
-        own = state.copy()
-        assert moved(way, own) == pytest.approx(turned - 2 * virgin(-way / 2), rel=1e-12)
-    moved(-5e-4, inner)
-    assert moved(5e-4, inner) == pytest.approx(turned, rel=1e-12)
-
-
-@pytest.mark.slow
-def test_a_bench_with_ten_elements_is_the_same_alone_and_in_company() -> None:
-    push = Polyline(times=(0.0, 0.15, 0.3), values=(0.0, 40.0, -40.0))
-    turning = task(mode="torque", command=push, duration=0.3)
-    with known(MAXWELL):
-        lanes = [Lane.of(on(MAXWELL_TREE, 30.0 + n), turning, seed=1) for n in range(5)]
-        together = [
-            np.hstack(own) for own in zip(*(o for _, o in simulate_together(lanes)), strict=True)
-        ]
-        for lane, out in zip(lanes, together, strict=True):
-            alone = np.hstack([own for _, (own,) in simulate_together([lane])])
-            assert out.tobytes() == alone.tobytes()
-    friction = together[0][OUTPUTS.index("friction_torque")]
-    assert friction.max() > 25.0
-    assert friction.min() < -10.0
 
 
 @pytest.mark.slow
@@ -231,12 +134,12 @@ def test_a_model_of_the_former_kind_is_refused_by_name() -> None:
     def former(parameters, state, v0, v1, h, compliance, line):  # type: ignore[no-untyped-def]
         line[0] = 0.0
 
-    fields = {name: getattr(MAXWELL, name) for name in MAXWELL.__dataclass_fields__}
-    with pytest.raises(TypeError, match=r"'maxwell'.*v0, v1, h.*docs/developers/plug-ins\.md"):
+    fields = {name: getattr(KARNOPP, name) for name in KARNOPP.__dataclass_fields__}
+    with pytest.raises(TypeError, match=r"'karnopp'.*v0, v1, h.*docs/developers/plug-ins\.md"):
         FrictionModel(**{**fields, "step": former})
-    with pytest.raises(TypeError, match=r"'maxwell'.*fixed state size"):
+    with pytest.raises(TypeError, match=r"'karnopp'.*fixed state size"):
         FrictionModel(**{**fields, "state_size": 10})
-    with pytest.raises(TypeError, match=r"'maxwell' must take options and step"):
+    with pytest.raises(TypeError, match=r"'karnopp' must take options and step"):
         FrictionModel(**{**fields, "state_size": lambda options: 10})
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from campaign.errors import UsageError
 from campaign.experiments import experiments
 from campaign.protocol import load_protocol, make_plan, memory
 from campaign.protocol.matrix import LARGEST_PLAN
@@ -93,7 +94,6 @@ ABSURD = {
         test("stick_slip", 'duration = "1e9 s"\nsample_rate = "100 kHz"'),
         "1e\\+14 samples; at most 2e\\+08 are allowed",
     ),
-    "long lists": (test("velocity_map", f"x = [{SHORT_WORDS}]"), "more than 200000 values"),
     "a long list to sweep": (
         test("velocity_map", f"[test.matrix]\nwarm_up_cycles = [{SHORT_WORDS}]"),
         "more than 200000 values",
@@ -114,16 +114,17 @@ def test_an_absurd_protocol_is_bad_usage(narrow: Forks, tmp_path: Path, name: st
     assert re.search(message, said), said
 
 
-@pytest.mark.slow
-def test_includes_count_together(narrow: Forks, tmp_path: Path):
+def test_includes_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Each file may be read; all of them would take what one of them may not."""
+    for module in ("files", "collect"):
+        monkeypatch.setattr(f"campaign.protocol.{module}.MOST_VALUES", 2000)
     for part in range(12):
-        write(tmp_path, f"notes = 'x'\nx = [{'1, ' * 20_000}]\n", f"part-{part}.toml")
+        write(tmp_path, f"notes = 'x'\nx = [{'1, ' * 200}]\n", f"part-{part}.toml")
     names = ", ".join(f'"part-{part}.toml"' for part in range(12))
-    write(tmp_path, f"include = [{names}]\n" + test("stabilization", ""))
-    code, said = plan(narrow, tmp_path)
-    assert code == 2
-    assert "part-9.toml: with what was included before: more than 200000 values" in said
+    path = write(tmp_path, f"include = [{names}]\n" + test("stabilization", ""))
+    told = "part-9.toml: with what was included before: more than 200000 values"
+    with pytest.raises(UsageError, match=told):
+        load_protocol(path, experiments(), shipped=ROOT / "protocols")
 
 
 def test_the_bound_is_above_what_allow_large_is_for():

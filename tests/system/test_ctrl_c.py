@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.user import ROOT, SEA, campaign, environment, write
+from tests.forks import Begun
+from tests.system.user import ROOT, SEA, Process, campaign, environment, forks, write
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -34,12 +35,12 @@ __main__.main()
 """As `python -m campaign`. What a signal does to an interpreter that starts is not ours to say."""
 
 
-def started(folder: Path, *more: str, path: str = "", main: str = MAIN) -> subprocess.Popen[str]:
-    """A run that listens to signals."""
+def started(folder: Path, main: str = MAIN) -> subprocess.Popen[str]:
+    """A run that listens to signals, also while it is imported."""
     process = subprocess.Popen(
-        [sys.executable, "-c", main, "run", "protocol.toml", *more],
+        [sys.executable, "-c", main, "run", "protocol.toml"],
         cwd=folder,
-        env={**environment(), "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT))))},
+        env=environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
@@ -49,7 +50,7 @@ def started(folder: Path, *more: str, path: str = "", main: str = MAIN) -> subpr
     return process
 
 
-def interrupt(process: subprocess.Popen[str]) -> None:
+def interrupt(process: Process) -> None:
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
 
@@ -116,7 +117,7 @@ __main__.main()
 def test_twice_while_the_run_is_begun(tmp_path: Path) -> None:
     """Its folder is there, and nobody has said so: the last line does."""
     write(tmp_path, LONG)
-    process = started(tmp_path, main=SLOW_TO_BEGIN)
+    process = started(tmp_path, SLOW_TO_BEGIN)
     _, err = process.communicate(timeout=120)
     (partial,) = (tmp_path / "results").glob("*.partial")
     assert process.returncode == 130, err
@@ -161,7 +162,6 @@ MOVES = BackendKind("stuck_live", "hangs", StuckOptions, Stuck, Source.HARDWARE,
 '''
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("hold", [False, True])
 def test_inside_a_call_that_does_not_return(tmp_path: Path, hold: bool) -> None:
     packages = tmp_path / "packages"
@@ -174,7 +174,9 @@ def test_inside_a_call_that_does_not_return(tmp_path: Path, hold: bool) -> None:
     write(tmp_path, LONG)
     options = ("--backend", "stuck_live" if hold else "stuck", "--yes")
     options += ("--set", f"backend.hold={str(hold).lower()}")
-    with started(tmp_path, *options, path=str(packages)) as process:
+    own = {"PYTHONPATH": f"{packages}{os.pathsep}{ROOT}"}
+    run = ("run", "protocol.toml", *options)
+    with Begun(forks(), tmp_path, *run, environment=environment() | own) as process:
         deadline = time.monotonic() + 120
         while not (tmp_path / "stuck").exists():
             assert process.poll() is None, process.stderr.read()

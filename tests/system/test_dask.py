@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -16,6 +15,8 @@ from campaign.archive import RunReader, RunStatus, find_run, open_run
 from campaign.errors import UsageError
 from campaign.execution import dask_executor
 from campaign.execution.dask_executor import _scheduler
+from tests.forks import PROGRAM, Forks
+from tests.system import user
 from tests.system.user import SEA, begun, campaign, write
 
 pytest.importorskip("distributed", reason="dask.distributed is an extra")
@@ -25,6 +26,11 @@ pytestmark = [
 ]
 
 PROTOCOL = SEA.replace('"simulink"', '"platform"\nrepeat = 12\nseed = 5')
+IMPORTS = f"""{PROGRAM}
+import distributed.cli.dask_scheduler, distributed.cli.dask_worker
+from campaign.execution import dask_executor
+dask_executor.GONE = 3.0
+"""
 OTHER = """
 import campaign
 campaign.__version__ = "0.0.9"
@@ -39,14 +45,26 @@ if not hasattr(dask_executor, "swift"):  # Dask executes a preload twice
         return dask_executor.swift(*arguments)
     dask_executor.execute_remotely = slowly
 """
+SLOWER = SLOW.replace("1.0", "0.3")
+"""Than the run is stopped: 24 trials last 3 s, or 7."""
+
+
+@pytest.fixture(scope="module")
+def forks() -> Iterator[Forks]:
+    """Of a process that has imported Dask as well: for commands, schedulers and workers."""
+    made = Forks(user.USUAL, IMPORTS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(user, "forks", lambda: made)
+        yield made
+    made.close()
 
 
 class Site:
-    """A scheduler and its workers."""
+    """A scheduler and its workers; each is known by its pid."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.begun: list[subprocess.Popen[bytes]] = []
+    def __init__(self, folder: Path, forks: Forks) -> None:
+        self.folder, self.forks = folder, forks
+        self.begun: list[int] = []
         told = folder / "scheduler.json"
         arguments = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard")
         self.scheduler = self._begin("scheduler", *arguments, "--scheduler-file", str(told))
@@ -57,7 +75,7 @@ class Site:
         address = told.read_text().partition("tcp://")[2].partition('"')[0]
         self.address = f"dask://{address}"
 
-    def worker(self, preload: str = "") -> subprocess.Popen[bytes]:
+    def worker(self, preload: str = "") -> int:
         """Begin one; `preload` is code that it runs first."""
         arguments = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
         arguments += ["--local-directory", str(self.folder)]
@@ -69,41 +87,33 @@ class Site:
 
     def await_workers(self, count: int) -> None:
         # Another process: a client leaves its loop and sockets to the garbage collector.
-        does = (
-            "import sys; from distributed import Client\n"
-            "Client(sys.argv[1]).wait_for_workers(int(sys.argv[2]), timeout=60)"
-        )
         at = self.address.replace("dask", "tcp")
-        subprocess.run(
-            [sys.executable, "-c", does, at, str(count)], check=True, stderr=subprocess.DEVNULL
+        does = (
+            f"from distributed import Client\nClient({at!r}).wait_for_workers({count}, timeout=60)"
         )
+        assert self.forks.run(self.folder, "-c", does).returncode == 0
 
     def end(self) -> None:
-        for process in self.begun:
-            process.kill()
-            process.wait()
+        for pid in self.begun:
+            os.kill(pid, signal.SIGKILL)
+            self.forks.ended(pid)
 
-    def _begin(self, what: str, *arguments: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments]
-        environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-        process = subprocess.Popen(
-            command, env=environment, cwd=self.folder, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        self.begun.append(process)
-        return process
+    def _begin(self, what: str, *arguments: str) -> int:
+        does = f"from distributed.cli.dask_{what} import main; main({arguments})"
+        self.begun.append(self.forks.fork(self.folder, ("-c", does), [os.devnull] * 3))
+        return self.begun[-1]
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Site]:
+def site(tmp_path: Path, forks: Forks) -> Iterator[Site]:
     (tmp_path / "site").mkdir()
-    made = Site(tmp_path / "site")
+    made = Site(tmp_path / "site", forks)
     yield made
     made.end()
 
 
 @pytest.fixture(scope="module")
-def at_home(tmp_path_factory: pytest.TempPathFactory) -> RunReader:
+def at_home(tmp_path_factory: pytest.TempPathFactory, forks: Forks) -> RunReader:
     folder = tmp_path_factory.mktemp("home")
     write(folder, PROTOCOL)
     campaign(folder, "run", "protocol.toml")
@@ -148,7 +158,7 @@ def test_a_worker_that_is_killed_costs_its_batch_and_one_that_joins_is_used(
         time.sleep(0.05)
     site.worker()
     site.await_workers(2)
-    slow.kill()
+    os.kill(slow, signal.SIGKILL)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, out + err
     assert_equal(tmp_path, at_home)
@@ -157,12 +167,12 @@ def test_a_worker_that_is_killed_costs_its_batch_and_one_that_joins_is_used(
 def test_without_its_scheduler_a_run_ends_and_is_resumed_at_home(
     site: Site, tmp_path: Path, at_home: RunReader, monkeypatch: pytest.MonkeyPatch
 ):
-    site.worker(SLOW)
+    site.worker(SLOWER)
     site.await_workers(1)
     write(tmp_path, PROTOCOL)
     process = begun(tmp_path, "run", "protocol.toml", "--executor", site.address)
     await_trials(tmp_path, 1)
-    site.scheduler.kill()
+    os.kill(site.scheduler, signal.SIGKILL)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 3, out + err
     assert "the scheduler of the cluster, or the last" in " ".join((out + err).split())
@@ -176,8 +186,8 @@ def test_without_its_scheduler_a_run_ends_and_is_resumed_at_home(
 def test_ctrl_c_ends_the_work_and_the_run_is_resumed_on_the_cluster(
     site: Site, tmp_path: Path, at_home: RunReader
 ):
-    site.worker(SLOW)
-    site.worker(SLOW)
+    site.worker(SLOWER)
+    site.worker(SLOWER)
     site.await_workers(2)
     write(tmp_path, PROTOCOL)
     process = begun(tmp_path, "run", "protocol.toml", "--executor", site.address)

@@ -31,14 +31,13 @@ def own_curve(name: str, v: float, coulomb: float) -> float:
     return coulomb + (32.0 - coulomb) * math.exp(-((v / 0.03) ** 2))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_steady_sliding_is_the_models_own_curve_in_both_directions(name: str) -> None:
-    driven = Driven(name, negative=NEGATIVE)
+    driven = Driven(name, 1e-2, negative=NEGATIVE)
     for v, coulomb in ((0.02, 26.0), (-0.02, 20.0), (0.3, 26.0), (-0.3, 20.0)):
         if name == "armstrong":  # whose curve is that of a slide that began rested
-            driven = Driven(name, negative=NEGATIVE)
-        for _ in range(20_000 if name == "bliman-sorine" else 4000):
+            driven = Driven(name, 1e-2, negative=NEGATIVE)
+        for _ in range(2000 if name == "bliman-sorine" else 400):
             mean, end = driven.over(v, v)
         expected = math.copysign(own_curve(name, abs(v), coulomb), v)
         # Leuven's last element slips at Ts: towards it the way is long.
@@ -117,9 +116,9 @@ def test_a_reversal_inside_a_step_is_that_of_short_steps(name: str) -> None:
     lagless = {"memory_lag": 0.0} if name == "armstrong" else {}
     falls = []
     for count in (1, 1000):
-        driven, step = Driven(name, **lagless), 0.1 / count
-        driven.move(0.2, 4000)
-        for _ in range(10_000):
+        driven, step = Driven(name, 1e-2, **lagless), 0.1 / count
+        driven.move(0.2, 400)
+        for _ in range(1000):
             driven.over(1e-3, 1e-3)
         before = held(driven)
         for k in range(count):
