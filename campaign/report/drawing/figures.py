@@ -122,6 +122,8 @@ STYLE: dict[Any, Any] = {
     "savefig.transparent": True,
     "savefig.dpi": 200,
 }
+PADS: dict[str, Any] = {"w_pad": 3.0 / 72, "h_pad": 4.3 / 72, "wspace": 0.0, "hspace": 0.0}
+"""Inches that stay free around axes with their labels, and around the legend."""
 METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
@@ -212,14 +214,14 @@ def style() -> Iterator[None]:
 def canvas(width: float, height: float) -> Iterator[Canvas]:
     """An empty matplotlib figure (inches) under the report's own style."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    from campaign.report.drawing.margins import Margins
     from campaign.report.drawing.sheet import Sheet
 
     with style():
         sheet = Sheet(figsize=(width, height), dpi=72)  # as an SVG document is drawn
         FigureCanvasSVG(sheet).get_renderer = _measuring  # type: ignore[attr-defined]
-        sheet.set_layout_engine(Margins())
+        sheet.set_layout_engine(ConstrainedLayoutEngine(**PADS))
         yield sheet
 
 
@@ -246,7 +248,7 @@ def to_svg(sheet: Canvas) -> str:
     keep_as_pdf(sheet)
     text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
     text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
-    return in_svg(_SIGNS.sub(_styled_once, text))
+    return in_svg(text)
 
 
 def _place(sheet: Canvas) -> None:
@@ -261,17 +263,6 @@ def _place(sheet: Canvas) -> None:
 
 
 _DIGITS = re.compile(r"(\d\.\d\d)\d+")
-_SIGNS = re.compile(r'<g clip-path="([^"]*)">\s*((?:<use [^>]*/>\s*)+)</g>')
-_LOOK = re.compile(r' style="([^"]*)"')
-
-
-def _styled_once(group: re.Match[str]) -> str:
-    """The signs of one series with the style that all of them have told once."""
-    styles = set(_LOOK.findall(group[2]))
-    if len(styles) != 1:
-        return group[0]
-    signs = _LOOK.sub("", group[2])
-    return f'<g clip-path="{group[1]}" style="{styles.pop()}">\n{signs}</g>'
 
 
 def inline(svg: str, prefix: str, title: str, alt: str) -> str:

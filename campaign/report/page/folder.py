@@ -15,7 +15,6 @@ from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import inline
 from campaign.report.drawing.label_size import legible_width, view_box
 from campaign.report.drawing.pdf import taken
-from campaign.report.page.merged_marks import merged
 from campaign.report.page.names import Names
 from campaign.report.palette import Look
 from campaign.result import Figure, Table
@@ -217,7 +216,7 @@ class Folder:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(merged(svg), anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
         shown = ShownFigure(self.figures, anchor, title, caption, markup, file)
         box, least = view_box(svg) or shown.box, math.ceil(legible_width(svg))
         return replace(shown, command=command, box=box, least=least)
