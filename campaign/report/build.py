@@ -28,10 +28,9 @@ from campaign.report.page.drawings import Drawable, Key
 from campaign.report.page.folder import Folder
 from campaign.report.page.interactive import interactive
 from campaign.report.page.layout import Layout, draw_on_demand, lay_out
-from campaign.report.page.names import slug
+from campaign.report.page.names import slug, trial_links
 from campaign.report.page.policy import policy
 from campaign.report.page.templates import Templates
-from campaign.report.page.trial_links import trial_links
 from campaign.report.page.trial_page import trial_pages
 from campaign.report.palette import variables
 from campaign.report.previous_report import Formats, all_formats, made_before, remember

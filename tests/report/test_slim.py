@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from campaign.experiments.interface import TestData
+from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.drawing.figures import draw, inline
-from campaign.report.drawing.label_size import legible_width
 from campaign.report.drawing.short_paths import CURVES, SIGNS, short_path
 from campaign.report.drawing.slim_svg import slim
 from campaign.result import Axis, Curve, Figure, Mark, Panel
@@ -221,8 +221,8 @@ def test_paths_that_matplotlib_does_not_write_stay(path: str) -> None:
 def test_the_width_at_which_labels_are_legible() -> None:
     """9 px over the smallest of 7.5 and 8 units, of a drawing that is 500 units wide."""
     svg = '<svg viewBox="0 0 500 200"><text style="font-size: 8px"/><g style="font-size:7.5px"/>'
-    assert legible_width(svg) == pytest.approx(600.0)
-    assert legible_width('<svg viewBox="0 0 500 200">') == 0.0
+    assert DrawingFiles(svg).least == 600
+    assert DrawingFiles('<svg viewBox="0 0 500 200">').least == 0
 
 
 # An SVG reader of this test's own: what is painted, with the style that is in force there.

@@ -33,7 +33,7 @@ from campaign.report.build import Report, build_report
 from campaign.report.content.settings import point_settings, settings_of, task_settings
 from campaign.report.content.trial_account import _metric, _recorded
 from campaign.report.content.trial_choice import chosen_trials, stretches
-from campaign.report.drawing.label_size import LEGIBLE
+from campaign.report.drawing.drawing_files import LEGIBLE
 from campaign.report.drawing.traces import (
     BOTTOM,
     FONT,
@@ -46,7 +46,7 @@ from campaign.report.drawing.traces import (
     Trace,
     draw_traces,
 )
-from campaign.report.page.trial_links import trial_links
+from campaign.report.page.names import trial_links
 from campaign.report.page.trial_page import charts, legible
 from campaign.report.palette import SERIES
 from campaign.signals import MultiSine, Polyline, Sine
