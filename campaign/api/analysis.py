@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
@@ -155,6 +155,12 @@ def analyse_run(
         )
         for test in run.header.tests
     )
+
+
+def damage_of(run: RunReader, tests: Iterable[AnalysedTest]) -> tuple[Damage, ...]:
+    """What of a run is damaged, as far as its reader and its analyses looked at it."""
+    found = (damage for test in tests for damage in test.damaged)
+    return tuple(dict.fromkeys((*run.damaged, *found)))
 
 
 def name_of(test: Tree) -> str:

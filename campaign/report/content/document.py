@@ -11,6 +11,7 @@ from campaign.api.analysis import (
     AnalysedTest,
     TestAnalysis,
     analyse_run,
+    damage_of,
     published_of,
     source_of,
     title_of,
@@ -127,9 +128,8 @@ def document_of(
     happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
-    of_tests = (damage for test in tests for damage in test.damaged)
     _, of_pages = readable(run.path, [t for t in trials if t.trial.number in shown])
-    damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged, *of_pages)))
+    damaged = tuple(dict.fromkeys((*damage_of(run, tests), *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
     references = compared_with(run, tests, files)

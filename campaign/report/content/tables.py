@@ -13,7 +13,7 @@ from urllib.parse import quote
 from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
 from campaign.published.headline import LIMITS, Headline, headline
-from campaign.published.scoreboard import Line, Scoreboard, place_columns
+from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.values import heading_of
 from campaign.reason import NONE
 from campaign.report.content.lines import cell_name
@@ -299,33 +299,6 @@ def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
             yield from (
                 in_axis_terms(p.source) for p in cell.systematic if p.standard_uncertainty is None
             )
-
-
-def published_csv(lines: Sequence[Line]) -> str:
-    """One published table: every cell with what was reproduced, unrounded, and the reason."""
-    headers = ("row", "column", "unit", "published", "reproduced", "deviation_percent", "status")
-    more = ("reason", "test", "low", "high", "verdict", "source")
-    draws = ("place", "place_low", "place_high", "draws")
-    rows = (
-        (
-            line.cell.row,
-            line.cell.column,
-            line.cell.unit,
-            _exact(line.cell.value),
-            _exact(line.reproduced),
-            _exact(line.deviation),
-            "" if line.status is None else str(line.status),
-            line.cell.reason,
-            line.test,
-            _exact(None if line.found is None else line.found.low),
-            _exact(None if line.found is None else line.found.high),
-            str(line.verdict),
-            line.source,
-            *place_columns(line),
-        )
-        for line in lines
-    )
-    return _csv((*headers, *more, *draws), rows)
 
 
 def data_link(text: str) -> str:

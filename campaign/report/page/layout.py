@@ -11,7 +11,7 @@ from shlex import quote
 
 from campaign.api.analysis import NOT_EXECUTED, AnalysedTest
 from campaign.axis_kind import axis_terms
-from campaign.published.scoreboard import Scoreboard, to_csv
+from campaign.published.scoreboard import COLUMNS, Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
 from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
@@ -46,6 +46,8 @@ from campaign.report.page.names import figure_name, stood_for
 from campaign.result import Figure, Table
 from campaign.trial import Role
 
+OF_A_TABLE = (*COLUMNS[1:8], "reason", "test", *COLUMNS[8:])
+"""Columns of the file of one published table."""
 Drawn = Callable[[Key], DrawingFiles | None]
 """Waits for a drawing that was begun; None when it cannot be made so."""
 DrawAll = Callable[[Mapping[Key, Drawable]], Drawn]
@@ -288,7 +290,7 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
     download = folder.table(to_csv(scoreboard.lines), "scoreboard")
     if scoreboard.further:
-        folder.table(to_csv(scoreboard.further, tests=True), "scoreboard-runs")
+        folder.table(to_csv(scoreboard.further, (*COLUMNS, "test")), "scoreboard-runs")
     return download
 
 
@@ -421,5 +423,5 @@ def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -
         title=table.title,
         source=table.source,
         lines=tuple(shown_line(line) for line in lines),
-        download=folder.table(tables.published_csv(lines), table.slug),
+        download=folder.table(to_csv(lines, OF_A_TABLE), table.slug),
     )
