@@ -157,14 +157,14 @@ def test_a_figure_that_cannot_be_drawn_costs_only_itself(pair: Comparison, monke
         raise ValueError("no ink")
 
     monkeypatch.setattr("campaign.comparison.page.changes_figure", broken)
-    monkeypatch.setattr("campaign.comparison.page.draw", lambda figure: "<svg></svg>")
+    monkeypatch.setattr("campaign.report.page.drawings.Drawing.svg", lambda _: "<svg></svg>")
     html, files = render(pair)
     assert "the picture of all changes cannot be shown: ValueError: no ink" in html
     assert "tables/pairs.csv" in files
 
 
 def test_a_test_without_result_is_a_problem_on_the_page(pair: Comparison, monkeypatch):
-    monkeypatch.setattr("campaign.comparison.page.draw", lambda figure: "<svg></svg>")
+    monkeypatch.setattr("campaign.report.page.drawings.Drawing.svg", lambda _: "<svg></svg>")
     side = pair.sides[1]
     broken = replace(side, tests=(replace(side.tests[0], problem="the analysis failed"),))
     html, _ = render(replace(pair, sides=(pair.sides[0], broken)))
