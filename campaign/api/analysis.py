@@ -228,6 +228,12 @@ def source_of(run: RunReader) -> str:
     return run.header.source or FORMER_SOURCES.get(run.header.backend, "")
 
 
+def run_title(run: RunReader) -> str:
+    """What a run is called: by its protocol, or by its name."""
+    header = run.header
+    return title_of(header.title or header.protocol_name or header.name, source_of(run))
+
+
 def title_of(title: str, source: str) -> str:
     """A title from a protocol; one that speaks of hardware says where it was simulated.
 

@@ -31,8 +31,8 @@ from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawing_files import DrawingFiles
 from campaign.report.formats.interface import Format
 from campaign.report.page.article import Article, PageParts, Part, damage_text, problems_part
-from campaign.report.page.changes import changes_figure
 from campaign.report.page.folder import Folder, ShownFigure
+from campaign.report.page.pictures import changes_figure
 from campaign.report.page.pieces import Files, FoldedSection, Items, Paragraph, Piece
 
 NAME = "comparison"

@@ -11,8 +11,8 @@ from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.overlays import Letters
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.changes_picture import MOST, PITCH, name_row
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
 from campaign.report.drawing.rows import set_rows
 from campaign.report.palette import MUTED, Look
 from campaign.text import pretty_unit

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, source_of, title_of
+from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, run_title
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms
@@ -33,9 +33,7 @@ class Side:
 
     @property
     def title(self) -> str:
-        header = self.run.header
-        title = header.title or header.protocol_name or header.name
-        return title_of(title, source_of(self.run))
+        return run_title(self.run)
 
     @property
     def damaged(self) -> tuple[Damage, ...]:

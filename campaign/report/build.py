@@ -13,7 +13,7 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import listed
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
-from campaign.report.content import lines, tables
+from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import NO_FILES, Document, document_of
 from campaign.report.content.references import Files
@@ -213,7 +213,7 @@ def render(
         "interactive": added,
         "script": Markup(script),  # noqa: S704 (packaged)
         "policy": policy(script),
-        "agreement": tables.agreement(document.scoreboard),
+        "agreement": lines.agreement(document.scoreboard),
         "scoreboard": [lines.shown_line(line) for line in document.scoreboard.lines],
         "statuses": lines.statuses(document.scoreboard),
         "answers": {answer.test: answer for answer in document.opening.answers},

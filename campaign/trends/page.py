@@ -24,6 +24,7 @@ from campaign.trends.rig_trends import WITHIN, Trends, TrendSeries, Verdict
 from campaign.trends.tables import (
     beside_the_jump,
     circumstances_table,
+    detectable,
     effect,
     followed_table,
     headline,
@@ -246,8 +247,7 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
         "adjusted": adjusted,
         "shape": each.change.shape,
         "detectable": {
-            name: in_display * (trends.covariate.step if name == "trend" else 1.0)
-            for name, in_display in _detectable(each).items()
+            name: detectable(each, name, trends.covariate) for name in each.detectable or {}
         },
         "jumps": [
             {
@@ -263,10 +263,3 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
             for jump in each.jumps
         ],
     }
-
-
-def _detectable(each: TrendSeries) -> dict[str, float]:
-    from campaign.units import convert
-
-    own = float(convert(1.0, each.series.unit, each.series.display))
-    return {name: own * size for name, size in (each.detectable or {}).items()}

@@ -270,7 +270,7 @@ def detectable_words(
     each: TrendSeries, name: str, covariate: Covariate, *, per: bool = True
 ) -> str:
     """`0.12 N·m per month (1.3 %)`: the smallest effect that would have been seen."""
-    size = _detectable(each, name, covariate)
+    size = detectable(each, name, covariate)
     if size is None:
         return "–"
     share = size * each.share
@@ -301,7 +301,7 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "trend_share": effects[1],
         "p_trend": each.p.get(TREND),
         "p_trend_adjusted": adjusted.get(TREND),
-        "detectable_trend": _detectable(each, TREND, covariate),
+        "detectable_trend": detectable(each, TREND, covariate),
         "scatter": own * each.change.trend.scatter,
         "correlation": each.change.trend.correlation,
     }
@@ -315,11 +315,12 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "jump_share": sizes[1],
         "p_jump": jump.p,
         "p_jump_adjusted": adjusted.get(JUMP),
-        "detectable_jump": _detectable(each, JUMP, covariate),
+        "detectable_jump": detectable(each, JUMP, covariate),
     }
 
 
-def _detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
+def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
+    """The smallest effect that would have been seen, in the unit that is shown; None unknown."""
     size = (each.detectable or {}).get(name)
     if size is None:
         return None

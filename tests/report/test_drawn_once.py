@@ -8,8 +8,9 @@ import pytest
 from matplotlib.figure import Figure as Canvas
 
 from campaign.report.drawing.cached_axes import settled
+from campaign.report.drawing.canvas import canvas
 from campaign.report.drawing.decimate import kept
-from campaign.report.drawing.figures import canvas, draw
+from campaign.report.drawing.figures import draw
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 X, Y = Axis("x", "s"), Axis("y", "rad")

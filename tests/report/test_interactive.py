@@ -17,8 +17,7 @@ import pytest
 from campaign.report.build import Report
 from campaign.report.drawing import curves as drawing
 from campaign.report.drawing.curves import drawn_points
-from campaign.report.drawing.decimate import decimate
-from campaign.report.drawing.figure_csv import points_of_each
+from campaign.report.drawing.decimate import decimate, points_of_each
 from campaign.report.drawing.figures import draw
 from campaign.report.page import interactive as module
 from campaign.report.page.folder import ShownFigure

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from campaign.experiments.interface import TestData
+from campaign.report.drawing.canvas import inline
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import draw, inline
+from campaign.report.drawing.figures import draw
 from campaign.report.drawing.short_paths import CURVES, SIGNS, short_path
 from campaign.report.drawing.slim_svg import slim
 from campaign.result import Axis, Curve, Figure, Mark, Panel

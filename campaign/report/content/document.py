@@ -13,8 +13,7 @@ from campaign.api.analysis import (
     analyse_run,
     damage_of,
     published_of,
-    source_of,
-    title_of,
+    run_title,
 )
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.reading.damage import Damage
@@ -64,9 +63,7 @@ class Document:
 
     @property
     def title(self) -> str:
-        header = self.run.header
-        title = header.title or header.protocol_name or header.name
-        return title_of(title, source_of(self.run))
+        return run_title(self.run)
 
     @property
     def command(self) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from campaign.references.verdict import JudgedNumber, Verdict
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.rows import LEFT, set_rows, signed_decades, word, zero_line
 from campaign.report.palette import INK, MUTED, OTHERS, PAPER
 

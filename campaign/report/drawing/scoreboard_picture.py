@@ -19,7 +19,7 @@ from markupsafe import escape
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import cell_name, shown_line
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.rows import (
     LEFT,
     RIGHT,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import cell_name
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
 from campaign.report.drawing.rows import LEFT, RIGHT, set_rows, word, zero_line
 from campaign.report.palette import INK, MUTED, STATUS
 from campaign.text import number

@@ -280,7 +280,7 @@ def _scoreboard(layout: Layout) -> data.Scoreboard:
     board, counted = document.scoreboard, headline(document.scoreboard)
     pictures = [each for each in (layout.picture, layout.strips) if each is not None]
     return data.Scoreboard(
-        agreement=tables.agreement(board),
+        agreement=lines.agreement(board),
         counts=tuple(
             _as(
                 data.Count,

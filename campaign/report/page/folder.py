@@ -10,8 +10,8 @@ from campaign.api.analysis import AnalysedTest
 from campaign.plain_text import on_a_page
 from campaign.report.content import tables
 from campaign.report.content.lines import ShownLine
+from campaign.report.drawing.canvas import inline
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import inline
 from campaign.report.drawing.pdf import taken
 from campaign.report.page.names import Names
 from campaign.report.palette import Look

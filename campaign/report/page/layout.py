@@ -13,19 +13,17 @@ from campaign.api.analysis import NOT_EXECUTED, AnalysedTest
 from campaign.axis_kind import axis_terms
 from campaign.published.scoreboard import COLUMNS, Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
-from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
+from campaign.report.content.lines import closeness as closeness_table
 from campaign.report.content.published_columns import as_compared, with_published
 from campaign.report.content.references import ReferenceComparison
 from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.strips import draw_strips
 from campaign.report.page.article import PageParts
-from campaign.report.page.changes import changes_figure
 from campaign.report.page.drawings import (
     OVERVIEW,
     Drawable,
@@ -43,6 +41,7 @@ from campaign.report.page.folder import (
     ShownTable,
 )
 from campaign.report.page.names import figure_name, stood_for
+from campaign.report.page.pictures import changes_figure, draws, overview
 from campaign.result import Figure, Table
 from campaign.trial import Role
 
@@ -156,7 +155,7 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
             draws(scoreboard, folder),
         )
     )
-    close = tables.closeness(scoreboard)
+    close = closeness_table(scoreboard)
     closeness = None if close is None else folder.shown_table(close, (), close.key)
     sections = _sections(document, makers)
     happened = document.incidents
@@ -251,39 +250,6 @@ def _of_incident(figure: Figure, folder: Folder, command: str) -> ShownFigure:
 
 def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
     return folder.shown_table(table, (), f"incidents-{table.key}")
-
-
-def overview(
-    scoreboard: Scoreboard, folder: Folder, drawn: DrawingFiles | None
-) -> ShownFigure | None:
-    """The picture on top of the page."""
-    if drawn is None:
-        return None
-    return folder.picture(
-        drawn,
-        "Deviation from the published values",
-        "One sign per published number: how far the reproduced value is from it, and what the"
-        " comparison is worth; pointing at a sign shows which number it is. The axis is linear up"
-        " to ±1 % and logarithmic beyond.",
-        tables.agreement(scoreboard),
-        "scoreboard",
-    )
-
-
-def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
-    """Where published values stand among the draws of a random bench."""
-    svg = draw_strips(scoreboard)
-    if svg is None:
-        return None
-    return folder.picture(
-        DrawingFiles.of(svg),
-        "Published values among the draws of a random bench",
-        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
-        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
-        " published value, one draw itself; the share of draws below it stands on the right.",
-        "One strip of ticks per published number, around a line at the published value.",
-        "draws",
-    )
 
 
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
