@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from html import unescape
@@ -17,7 +16,7 @@ from campaign.archive.layout.header import PARTIAL
 from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
 from campaign.report.index.report_summary import summary_of_report
-from campaign.report.output import MARKER
+from campaign.report.output import MARKER, replace_file
 from campaign.report.page.policy import hashed
 from campaign.report.page.templates import Templates
 from campaign.report.palette import variables
@@ -69,13 +68,9 @@ def write_index(results: Path, packaged_templates: Path) -> Path:
     path = results / NAME
     _refuse_foreign(path)
     text = on_a_page(render(results, packaged_templates))
-    part = path.with_name(f".{NAME}.{os.getpid()}.part")
     try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(path)
+        replace_file(path, text.encode())
     except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
     return path
 
