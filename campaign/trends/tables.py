@@ -16,7 +16,6 @@ from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit
 from campaign.trends.covariates import ORDER, TIME, Covariate
 from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
-from campaign.units import convert
 
 MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
 CIRCUMSTANCES = 4
@@ -293,7 +292,6 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
     effects = effect(each, covariate)
     if effects is None or each.change is None or each.change.trend is None:
         return row
-    own = float(convert(1.0, each.series.unit, each.series.display))
     adjusted = each.adjusted or {}
     row |= {
         "mean": each.mean,
@@ -302,7 +300,7 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "p_trend": each.p.get(TREND),
         "p_trend_adjusted": adjusted.get(TREND),
         "detectable_trend": detectable(each, TREND, covariate),
-        "scatter": own * each.change.trend.scatter,
+        "scatter": each.series.scale * each.change.trend.scatter,
         "correlation": each.change.trend.correlation,
     }
     jump = each.change.jump
@@ -324,8 +322,7 @@ def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | No
     size = (each.detectable or {}).get(name)
     if size is None:
         return None
-    own = float(convert(1.0, each.series.unit, each.series.display))
-    return size * own * (covariate.step if name == TREND else 1.0)
+    return size * each.series.scale * (covariate.step if name == TREND else 1.0)
 
 
 def _shared(each: TrendSeries, estimate: Estimate) -> Estimate:
