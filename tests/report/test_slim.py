@@ -174,8 +174,8 @@ def test_ticks_and_grid_lines_are_one_path_each_past_their_words() -> None:
     assert drawn(*lines, group="<g>") == [
         '<path d="m10 150v-145m10 145v-145" style="stroke:#d9dde1" />',
         '<path d="m10 1v3.5m10-3.5v3.5" style="stroke:#123456" />',
-        '<text x="10" y="9" style="">10</text>',
-        '<text x="20" y="9" style="">20</text>',
+        '<text x="10" y="9">10</text>',
+        '<text x="20" y="9">20</text>',
     ]
 
 

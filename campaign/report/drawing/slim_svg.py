@@ -84,7 +84,7 @@ def slim(svg: str) -> str:
     """An SVG document of matplotlib's, looking the same; the same text always gives the same."""
     root = ET.fromstring(svg)  # noqa: S314 (ours, not somebody's file)
     named = {each.attrib["id"]: each for each in root.iter() if "id" in each.attrib}
-    shapes = list(_merged(_shapes(root, {}, "", ("", ""), named)))
+    shapes = _merged(_shapes(root, {}, "", ("", ""), named))
     clips = dict.fromkeys(shape.clip for shape in shapes if shape.clip)
     names = {clip: f"c{place}" for place, clip in enumerate(clips)}
     common = _common([shape.style for shape in shapes if shape.is_text])
@@ -153,7 +153,7 @@ def _moved(path: str, x: float, y: float) -> str:
     return re.sub(r"(-?[\d.]+) (-?[\d.]+)", place, path)
 
 
-def _merged(shapes: Iterable[_Shape]) -> Iterator[_Shape]:
+def _merged(shapes: Iterable[_Shape]) -> list[_Shape]:
     """Each path goes to the first of its look; past lines and words, but past nothing else."""
     found: list[_Shape] = []
     open_: dict[object, _Shape] = {}
@@ -173,7 +173,7 @@ def _merged(shapes: Iterable[_Shape]) -> Iterator[_Shape]:
             else:
                 open_[look] = shape
                 found.append(shape)
-    return iter(found)
+    return found
 
 
 def _covers(style: Style) -> bool:
@@ -195,7 +195,7 @@ def _written(shape: _Shape, names: Mapping[str, str], common: Style) -> Element:
     if turned := _turned(element.get("transform", "")):
         attributes["transform"] = turned
     own = {name: value for name, value in shape.style.items() if common.get(name) != value}
-    attributes["style"] = _css(own)
+    attributes |= {"style": _css(own)} if own else {}
     clip = {"clip-path": f"url(#{names[shape.clip]})"} if shape.clip else {}
     written = Element(element.tag, attributes if turned else clip | attributes)
     written.text = element.text if shape.is_text else ""
