@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from pydantic import ValidationError
@@ -157,6 +157,12 @@ def analyse_run(
     )
 
 
+def damage_of(run: RunReader, tests: Iterable[AnalysedTest]) -> tuple[Damage, ...]:
+    """What of a run is damaged, as far as its reader and its analyses looked at it."""
+    found = (damage for test in tests for damage in test.damaged)
+    return tuple(dict.fromkeys((*run.damaged, *found)))
+
+
 def name_of(test: Tree) -> str:
     """The name of a test of a run's header."""
     return str(test.get("name", ""))
@@ -220,6 +226,12 @@ def _has_unreadable(run: RunReader, test: str) -> bool:
 def source_of(run: RunReader) -> str:
     """Where a run's samples come from: `simulation`, `hardware`, `recording`; "" unknown."""
     return run.header.source or FORMER_SOURCES.get(run.header.backend, "")
+
+
+def run_title(run: RunReader) -> str:
+    """What a run is called: by its protocol, or by its name."""
+    header = run.header
+    return title_of(header.title or header.protocol_name or header.name, source_of(run))
 
 
 def title_of(title: str, source: str) -> str:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, get_args
 
+from pydantic.fields import FieldInfo
+
 from campaign.api.analysis import AnalysedTest
 from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate
@@ -55,10 +57,14 @@ def option_quantity(test: AnalysedTest, name: str) -> Quantity | None:
     fields = test.experiment.options.model_fields if test.experiment else {}
     for path in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
         if path in fields:
-            hints = (*fields[path].metadata, fields[path].annotation)
-            quantity = next(_quantities(hints), None)
+            quantity = field_quantity(fields[path])
             return quantity and quantity.of(test.sides)
     return None
+
+
+def field_quantity(field: FieldInfo) -> Quantity | None:
+    """What an option measures; of a list, what each of its values does."""
+    return next(_quantities((*field.metadata, field.annotation)), None)
 
 
 def plain(value: Any, quantity: Quantity | None = None) -> str:

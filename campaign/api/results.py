@@ -12,7 +12,14 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from campaign import __version__
-from campaign.api.analysis import AnalysedTest, analyse_run, published_of, source_of, title_of
+from campaign.api.analysis import (
+    AnalysedTest,
+    analyse_run,
+    damage_of,
+    published_of,
+    source_of,
+    title_of,
+)
 from campaign.api.damage_warnings import tell, warn
 from campaign.api.estimates import findings_table
 from campaign.api.plots import plot
@@ -141,8 +148,6 @@ def results_of(
     `telling`: test and key of the figure that tells most.
     """
     header = run.header
-    found = (damage for test in tests for damage in test.damaged)
-    damaged = tuple(dict.fromkeys((*run.damaged, *found)))
     return RunResults(
         run=run.name,
         file=run.path.name,
@@ -153,7 +158,7 @@ def results_of(
         tests=tuple(map(_of_test, tests)),
         title=title_of(header.title or header.protocol_name, source_of(run)),
         measured_anew=measured_anew,
-        damaged=tuple(in_words(damage) for damage in damaged),
+        damaged=tuple(in_words(damage) for damage in damage_of(run, tests)),
         published=scoreboard_table(scoreboard) if scoreboard.lines else None,
         telling=telling,
     )
@@ -258,29 +263,19 @@ def scoreboard_table(scoreboard: Scoreboard) -> Table:
         Column("reason", "Reason"),
         Column("draws", "Draws", exact=True),
     )
-    lines = tuple(map(_line, scoreboard.lines))
+    cells = map(_line, scoreboard.lines)
+    lines = tuple({column.name: each[column.name] for column in columns} for each in cells)
     return Table("published", "Published values and what was found", columns, lines)
 
 
 def _line(line: Line) -> dict[str, Cell]:
-    cell, found = line.cell, line.found
-    return {
-        "table": cell.table,
-        "row": cell.row,
-        "column": cell.column,
-        "unit": cell.unit,
-        "published": cell.value,
-        "reproduced": line.reproduced,
-        "low": None if found is None else found.low,
-        "high": None if found is None else found.high,
+    """Its cells under the names of this table's columns."""
+    own: dict[str, Cell] = {
         "deviation": line.deviation,
-        "verdict": str(line.verdict),
-        "status": "" if line.status is None else str(line.status),
-        "test": line.test,
-        "source": line.source,
-        "reason": line.why or cell.reason,
+        "reason": line.why or line.cell.reason,
         "draws": len(line.draws),
     }
+    return {**line.cells, **own}
 
 
 def _beside_test(findings: Sequence[Finding]) -> Sequence[Finding]:

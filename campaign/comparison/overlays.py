@@ -60,7 +60,7 @@ def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
     told = f"{letters.reference} and {letters.other} over each other."
     if one.caption == other.caption:  # else it is of one run
         told = f"{told} {one.caption}"
-    return replace(one, panels=tuple(panels), caption=told, thesis=(), across=across)
+    return replace(one, panels=tuple(panels), caption=told, thesis=(), trials=(), across=across)
 
 
 def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) -> Panel:

@@ -29,14 +29,11 @@ from campaign.references.verdict import Verdict
 from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import draw
 from campaign.report.formats.interface import Format
-from campaign.report.page.article import Article, Part, damage_text, problems_part
-from campaign.report.page.article_page import PageParts
-from campaign.report.page.changes import changes_figure
+from campaign.report.page.article import Article, PageParts, Part, damage_text, problems_part
 from campaign.report.page.folder import Folder, ShownFigure
+from campaign.report.page.pictures import changes_figure
 from campaign.report.page.pieces import Files, FoldedSection, Items, Paragraph, Piece
-from campaign.result import Figure
 
 NAME = "comparison"
 UNTOLD = ("test", "quantity", "conditions", "p")
@@ -225,22 +222,14 @@ def _figures(
         )
     ]
     notes = []
+    # Each run in the look that it has in all pictures of the page.
+    chosen = dict(zip((letters.reference, letters.other), letters.looks, strict=True))
     for each in overlays(tested.reference, tested.other, letters):
         if isinstance(each, str):
             notes.append(each)
         else:
-            drawn = partial(_drawn, each, letters, name, folder)
-            found.append(making.attempt(f"{name}: {each.key}", drawn))
+            found.append(making.drawn(each, f"{name}-", chosen))
     return tuple(figure for figure in found if figure is not None), tuple(notes)
-
-
-def _drawn(figure: Figure, letters: Letters, name: str, folder: Folder) -> ShownFigure:
-    """Each run in the look that it has in all pictures of the page."""
-    chosen = dict(zip((letters.reference, letters.other), letters.looks, strict=True))
-    svg = draw(figure, chosen=chosen)
-    return folder.figure(
-        figure, DrawingFiles.of(svg, figure), (), f"{name}-{figure.key}", looks=chosen
-    )
 
 
 def _side_by_side(

@@ -11,9 +11,9 @@ from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.overlays import Letters
 from campaign.estimate import Estimate
 from campaign.estimation.difference import in_unit
-from campaign.references.verdict import Verdict
-from campaign.report.drawing.changes_picture import MOST, PITCH, name_row, rows
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
+from campaign.report.drawing.changes_picture import MOST, PITCH, name_row
+from campaign.report.drawing.rows import set_rows
 from campaign.report.palette import MUTED, Look
 from campaign.text import pretty_unit
 
@@ -66,8 +66,8 @@ def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
         for estimate, look, shift, whose in own:
             letter = letters.reference if whose == "r" else letters.other
             _draw_number(ax, in_unit(estimate, unit), look, row + shift, letter if not row else "")
-        name_row(ax, row, names[row], bold=pair.verdict is Verdict.DIFFERENT)
-    rows(ax, len(pairs))
+        name_row(ax, row, names[row], pair)
+    set_rows(ax, (len(pairs) - 0.4, -0.6), len(pairs) - 1)
     words = axis_quantity_name(first.test, first.quantity)
     label = words[:1].upper() + words[1:]
     ax.set_xlabel(f"{label} ({pretty_unit(unit)})" if unit else label)

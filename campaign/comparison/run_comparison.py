@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from campaign.api.analysis import AnalysedTest, analyse_run, source_of, title_of
+from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, run_title
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms
@@ -33,15 +33,12 @@ class Side:
 
     @property
     def title(self) -> str:
-        header = self.run.header
-        title = header.title or header.protocol_name or header.name
-        return title_of(title, source_of(self.run))
+        return run_title(self.run)
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
         """What of the run is damaged, as far as the analyses looked at it."""
-        found = (damage for test in self.tests for damage in test.damaged)
-        return tuple(dict.fromkeys((*self.run.damaged, *found)))
+        return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -172,10 +169,15 @@ def _check(runs: Sequence[RunReader]) -> None:
         raise UsageError(
             f"{len(runs)} runs are too many to tell apart; {len(LETTERS)} are possible"
         )
+    refuse_twice(runs)
+
+
+def refuse_twice(runs: Iterable[RunReader]) -> None:
+    """Raises UsageError for a run that is named twice, by its place or by its content."""
     seen: dict[str, RunReader] = {}
     for run in runs:
-        for key in (str(run.path.resolve()), run.root):
-            if key and key in seen:
+        for key in filter(None, (str(run.path.resolve()), run.root)):
+            if key in seen:
                 raise UsageError(f"{seen[key].path} and {run.path} are the same run")
             seen[key] = run
 

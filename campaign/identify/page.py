@@ -18,15 +18,12 @@ from campaign.identify.identification import Identification, Section, widest
 from campaign.identify.tables import changes_table, parameters_table
 from campaign.parameter import Parameter
 from campaign.report.article import write_article
-from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import draw, series_of
+from campaign.report.drawing.figures import series_of
 from campaign.report.formats.interface import Format
-from campaign.report.page.article import Article, Part, problems_part
-from campaign.report.page.article_page import PageParts
-from campaign.report.page.folder import ShownFigure
+from campaign.report.page.article import Article, PageParts, Part, problems_part
 from campaign.report.page.pieces import Items, Paragraph, Piece
 from campaign.report.palette import Look, looks_of_page
-from campaign.result import Figure, Result
+from campaign.result import Result
 from campaign.text import words
 
 CURES = {
@@ -172,8 +169,7 @@ def _section(
         changes = changes_table(found.chosen.name, found.compared.name, section)
         yield folder.shown_table(changes, (), changes.key)
     for figure in result.figures:
-        drawn = making.attempt(f"{name}: {figure.key}", partial(_drawn, figure, name, making))
-        if drawn is not None:
+        if drawn := making.drawn(figure, f"{name}-", making.looks):
             yield drawn
     yield from (folder.shown_table(each, (), f"{name}-{each.key}") for each in result.tables)
     if result.notes:
@@ -187,11 +183,6 @@ def _looks(found: Identification) -> Mapping[str, Look]:
             with suppress(Exception):  # a plug-in's, which is told where it is shown
                 series.append(series_of(figure))
     return looks_of_page(series)
-
-
-def _drawn(figure: Figure, name: str, making: _Making) -> ShownFigure:
-    drawn = DrawingFiles.of(draw(figure, chosen=making.looks), figure)
-    return making.folder.figure(figure, drawn, (), f"{name}-{figure.key}", trials=figure.trials)
 
 
 def content_of(found: Identification) -> dict[str, Any]:

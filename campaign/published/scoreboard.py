@@ -27,23 +27,10 @@ from campaign.result import Finding, same_value
 from campaign.trial import canonical_json
 
 COLUMNS = (
-    "table",
-    "row",
-    "column",
-    "unit",
-    "published",
-    "reproduced",
-    "deviation_percent",
-    "status",
-    "low",
-    "high",
-    "verdict",
-    "source",
-    "place",
-    "place_low",
-    "place_high",
-    "draws",
+    *("table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status"),
+    *("low", "high", "verdict", "source", "place", "place_low", "place_high", "draws"),
 )
+"""Of `scoreboard.csv`: `Line.cells`."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +67,31 @@ class Line:
     def deviation(self) -> float | None:
         """Of reproduced from published in percent; None where that has no meaning."""
         return None if self.found is None else deviation(self.cell, self.found, self.verdict)
+
+    @property
+    def cells(self) -> dict[str, str | float | None]:
+        """What a table of lines says of it, by name; numbers in the printed unit."""
+        cell, found, place = self.cell, self.found, self.place
+        return {
+            "table": cell.table,
+            "row": cell.row,
+            "column": cell.column,
+            "unit": cell.unit,
+            "published": float(cell.value),
+            "reproduced": self.reproduced,
+            "deviation_percent": self.deviation,
+            "status": "" if self.status is None else str(self.status),
+            "low": None if found is None else found.low,
+            "high": None if found is None else found.high,
+            "verdict": str(self.verdict),
+            "source": self.source,
+            "place": None if place is None else place.value,
+            "place_low": None if place is None else place.low,
+            "place_high": None if place is None else place.high,
+            "draws": None if place is None else len(self.draws),
+            "reason": cell.reason,
+            "test": self.test,
+        }
 
 
 @dataclass(frozen=True)
@@ -141,38 +153,21 @@ def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
     return Scoreboard(tuple(lines), tuple(further), tuple(dict.fromkeys(problems)))
 
 
-def to_csv(lines: Iterable[Line], *, tests: bool = False) -> str:
-    """`scoreboard.csv`: unrounded values in the printed unit; `tests` adds who found them."""
+def to_csv(lines: Iterable[Line], columns: Sequence[str] = COLUMNS) -> str:
+    """Lines with these of their `cells`, unrounded."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*COLUMNS, "test") if tests else COLUMNS)
+    writer.writerow(columns)
     for line in lines:
-        writer.writerow((*_row(line), line.test) if tests else _row(line))
+        cells = line.cells
+        writer.writerow([_exact(cells[name]) for name in columns])
     return text.getvalue()
 
 
-def _row(line: Line) -> tuple[str, ...]:
-    cell, found = line.cell, line.found
-    ends = (None, None) if found is None else (found.low, found.high)
-    value, again, off, low, high = (
-        "" if number is None else repr(float(number))
-        for number in (cell.value, line.reproduced, line.deviation, *ends)
-    )
-    status = "" if line.status is None else str(line.status)
-    where = (cell.table, cell.row, cell.column, cell.unit)
-    verdict = (str(line.verdict), line.source)
-    return (*where, value, again, off, status, low, high, *verdict, *place_columns(line))
-
-
-def place_columns(line: Line) -> tuple[str, str, str, str]:
-    """Share of draws below the published value, its interval, and how many; empty without draws."""
-    if line.place is None:
-        return "", "", "", ""
-    share, low, high = (
-        "" if number is None else repr(number)
-        for number in (line.place.value, line.place.low, line.place.high)
-    )
-    return share, low, high, str(len(line.draws))
+def _exact(value: str | float | None) -> str:
+    if isinstance(value, float):
+        return repr(float(value))
+    return "" if value is None else str(value)
 
 
 def _unknown_tables(published: Published, evidence: Sequence[Evidence]) -> Iterator[str]:

@@ -13,7 +13,7 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import listed
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment
-from campaign.report.content import lines, tables
+from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import NO_FILES, Document, document_of
 from campaign.report.content.references import Files
@@ -28,10 +28,9 @@ from campaign.report.page.drawings import Drawable, Key
 from campaign.report.page.folder import Folder
 from campaign.report.page.interactive import interactive
 from campaign.report.page.layout import Layout, draw_on_demand, lay_out
-from campaign.report.page.names import slug
+from campaign.report.page.names import slug, trial_links
 from campaign.report.page.policy import policy
 from campaign.report.page.templates import Templates
-from campaign.report.page.trial_links import trial_links
 from campaign.report.page.trial_page import trial_pages
 from campaign.report.palette import variables
 from campaign.report.previous_report import Formats, all_formats, made_before, remember
@@ -214,7 +213,7 @@ def render(
         "interactive": added,
         "script": Markup(script),  # noqa: S704 (packaged)
         "policy": policy(script),
-        "agreement": tables.agreement(document.scoreboard),
+        "agreement": lines.agreement(document.scoreboard),
         "scoreboard": [lines.shown_line(line) for line in document.scoreboard.lines],
         "statuses": lines.statuses(document.scoreboard),
         "answers": {answer.test: answer for answer in document.opening.answers},

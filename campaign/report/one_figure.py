@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,6 +20,7 @@ from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import leading_figure, most_telling
 from campaign.report.drawing.figures import Column, in_column
 from campaign.report.drawing.pdf import also_as_pdf
+from campaign.report.output import replace_file
 from campaign.report.page.damage_notice import notice_on_page
 from campaign.report.page.drawings import drawings_of
 from campaign.report.page.layout import lay_out
@@ -131,9 +131,9 @@ def _write(output: Path, files: Mapping[str, bytes]) -> None:
                 )
         output.mkdir(parents=True, exist_ok=True)
         # What is written stands here before it is: whatever happens, it is known for ours.
-        _replace(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))).encode())
+        replace_file(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))).encode())
         for line, data in new.items():
-            _replace(output / line.partition("  ")[2], data)
+            replace_file(output / line.partition("  ")[2], data)
     except OSError as error:
         raise UsageError(f"{output}: the figure cannot be written: {error.strerror}") from None
 
@@ -145,13 +145,3 @@ def _is_one_of(path: Path, lines: set[str]) -> bool:
 
 def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """The whole file or the old one, also when somebody interrupts."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -30,6 +30,16 @@ def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:
         path.write_text(on_a_page(text), encoding="utf-8", newline="\n")
 
 
+def replace_file(path: Path, data: bytes) -> None:
+    """The whole file or the old one, also when somebody interrupts."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def refuse_other(output: Path, page: str) -> None:
     """Raises UsageError when `output` is there, and no folder with that page."""
     _refuse_foreign(output)

@@ -18,7 +18,7 @@ from campaign.errors import UsageError
 from campaign.report.content.trial_choice import executed_trials
 from campaign.report.formats import chosen_formats
 from campaign.report.formats.interface import Format
-from campaign.report.page.trial_links import trial_file
+from campaign.report.page.names import trial_file
 
 MADE = ".campaign-made.json"
 """Of the report's folder: of which run it is, the files of each format, the trials with a page."""

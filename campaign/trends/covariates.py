@@ -206,11 +206,7 @@ def _of_series(one: Series) -> Covariate:
             f"--over: {one.name} varies too little between runs for how well each knows it: "
             "trends along it would come out too flat"
         )
-    from campaign.units import convert
-
-    shown = {
-        p.member.number: float(convert(p.estimate.value, one.unit, one.display)) for p in one.points
-    }
+    shown = {p.member.number: one.scale * p.estimate.value for p in one.points}
     return Covariate(
         f"{one.test}: {one.name}",
         one.name[:1].upper() + one.name[1:],

@@ -13,7 +13,6 @@ from campaign.estimation.intervals import LEVEL
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.trends.covariates import Covariate
 from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
-from campaign.units import convert
 
 Array = NDArray[np.float64]
 
@@ -85,7 +84,7 @@ def _line(each: TrendSeries, label: str) -> Curve:
     assert each.change is not None and each.change.trend is not None  # noqa: S101, PT018
     trend = each.change.trend
     x = np.linspace(float(np.min(each.x)), float(np.max(each.x)), ALONG)
-    own = float(convert(1.0, each.series.unit, each.series.display))
+    own = each.series.scale
     known = [trend.at(float(at)) for at in x]
     ends = own * np.array([mixture.interval(LEVEL) for mixture in known])
     y = own * np.array([mixture.value for mixture in known])

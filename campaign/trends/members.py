@@ -9,12 +9,13 @@ from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
-from campaign.api.analysis import AnalysedTest, analyse_run, source_of
+from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, source_of
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
 from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
 from campaign.comparison.circumstances import Change, changes
 from campaign.comparison.draws import SIMULATION
+from campaign.comparison.run_comparison import refuse_twice
 from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.shared_systematics import constants, source_called
 from campaign.errors import UsageError
@@ -60,8 +61,7 @@ class Member:
     @property
     def damaged(self) -> tuple[Damage, ...]:
         """What of the run is damaged, as far as anybody looked at it."""
-        found = (damage for test in self.tests for damage in test.damaged)
-        return tuple(dict.fromkeys((*self.run.damaged, *found)))
+        return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -149,12 +149,7 @@ def _exchanges(member: Member) -> Iterator[Change]:
 
 
 def _check(runs: Sequence[RunReader]) -> None:
-    seen: dict[str, RunReader] = {}
-    for run in runs:
-        for key in (str(run.path.resolve()), run.root):
-            if key and key in seen:
-                raise UsageError(f"{seen[key].path} and {run.path} are the same run")
-            seen[key] = run
+    refuse_twice(runs)
     if len(runs) == 2:
         raise UsageError(
             "two runs show no trend; name three or more, or hold them against each other with "

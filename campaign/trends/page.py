@@ -15,19 +15,16 @@ from campaign.estimation.family import RATE
 from campaign.estimation.trends.family import POWER
 from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
-from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import draw
 from campaign.report.formats.interface import Format
-from campaign.report.page.article import Article, Part, damage_text, problems_part
-from campaign.report.page.article_page import PageParts
-from campaign.report.page.folder import Folder, ShownFigure
+from campaign.report.page.article import Article, PageParts, Part, damage_text, problems_part
+from campaign.report.page.folder import Folder
 from campaign.report.page.pieces import Files, Items, Paragraph, Piece
-from campaign.result import Figure
 from campaign.trends.figures import declared_figure, small_multiples
 from campaign.trends.rig_trends import WITHIN, Trends, TrendSeries, Verdict
 from campaign.trends.tables import (
     beside_the_jump,
     circumstances_table,
+    detectable,
     effect,
     followed_table,
     headline,
@@ -107,7 +104,7 @@ def _parts(trends: Trends, making: PageParts) -> Iterator[Part]:
         ),
     )
     multiples = small_multiples(trends.of(Verdict.NOT_SHOWN), trends.covariate)
-    small = None if multiples is None else _drawn(multiples, making)
+    small = None if multiples is None else making.drawn(multiples)
     if small is not None:
         yield Part("rest", "What shows no trend", (small,))
     yield Part("numbers", "All numbers", tuple(_numbers(trends, folder)))
@@ -188,20 +185,13 @@ def _declared(
 ) -> tuple[str, tuple[Piece, ...]]:
     """A declared number: its headline, and what is shown of it."""
     told = headline(each, trends)
-    drawn = _drawn(declared_figure(each, trends, told, place), making)
+    drawn = making.drawn(declared_figure(each, trends, told, place))
     notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
     beside = filter(None, (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps)))
     caution = f"; {WITHIN}" if WITHIN in each.notes else ""
     pieces: list[Piece] = [] if drawn is None else [drawn]
     pieces += [Paragraph(text, "note") for text in beside]
     return f"{told}{caution}.", tuple(pieces)
-
-
-def _drawn(figure: Figure, making: PageParts) -> ShownFigure | None:
-    return making.attempt(
-        figure.key,
-        lambda: making.folder.figure(figure, DrawingFiles.of(draw(figure), figure), (), figure.key),
-    )
 
 
 def content_of(trends: Trends) -> dict[str, Any]:
@@ -257,8 +247,7 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
         "adjusted": adjusted,
         "shape": each.change.shape,
         "detectable": {
-            name: in_display * (trends.covariate.step if name == "trend" else 1.0)
-            for name, in_display in _detectable(each).items()
+            name: detectable(each, name, trends.covariate) for name in each.detectable or {}
         },
         "jumps": [
             {
@@ -274,10 +263,3 @@ def _tree(each: TrendSeries, trends: Trends) -> dict[str, Any]:
             for jump in each.jumps
         ],
     }
-
-
-def _detectable(each: TrendSeries) -> dict[str, float]:
-    from campaign.units import convert
-
-    own = float(convert(1.0, each.series.unit, each.series.display))
-    return {name: own * size for name, size in (each.detectable or {}).items()}

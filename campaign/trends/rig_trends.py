@@ -40,7 +40,6 @@ from campaign.trends.members import (
 )
 from campaign.trends.models import TrendFit, fit_models
 from campaign.trends.series import SAME_IN_ALL, Series, series_of
-from campaign.units import convert
 
 Array = NDArray[np.float64]
 
@@ -129,7 +128,7 @@ class TrendSeries:
 
     def estimate(self, name: str, known: Mixture, unit: str, size: float = 1.0) -> Estimate:
         """A number of the series as it is shown, times `size`."""
-        own = size * float(convert(1.0, self.series.unit, self.series.display))
+        own = size * self.series.scale
         value, ends = known.value, known.interval(LEVEL)
         low, high = sorted(end * own for end in ends)
         method = "scatter between runs and its correlation integrated over"

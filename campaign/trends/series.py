@@ -29,6 +29,7 @@ from campaign.reason import NONE, Cause, Reason
 from campaign.references.verdict import WRONG_MODEL
 from campaign.result import Finding, Value
 from campaign.trends.members import LEAST, Member
+from campaign.units import convert
 
 Array = NDArray[np.float64]
 
@@ -92,6 +93,11 @@ class Series:
     def values(self) -> Array:
         """Shape (n,), in `unit`."""
         return np.array([point.estimate.value for point in self.points])
+
+    @property
+    def scale(self) -> float:
+        """What one `unit` is in the unit that is shown."""
+        return float(convert(1.0, self.unit, self.display))
 
     @property
     def bare(self) -> str:

@@ -16,7 +16,6 @@ from campaign.result import Cell, Column, Table
 from campaign.text import interval, number, pretty_unit
 from campaign.trends.covariates import ORDER, TIME, Covariate
 from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
-from campaign.units import convert
 
 MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
 CIRCUMSTANCES = 4
@@ -270,7 +269,7 @@ def detectable_words(
     each: TrendSeries, name: str, covariate: Covariate, *, per: bool = True
 ) -> str:
     """`0.12 N·m per month (1.3 %)`: the smallest effect that would have been seen."""
-    size = _detectable(each, name, covariate)
+    size = detectable(each, name, covariate)
     if size is None:
         return "–"
     share = size * each.share
@@ -293,7 +292,6 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
     effects = effect(each, covariate)
     if effects is None or each.change is None or each.change.trend is None:
         return row
-    own = float(convert(1.0, each.series.unit, each.series.display))
     adjusted = each.adjusted or {}
     row |= {
         "mean": each.mean,
@@ -301,8 +299,8 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "trend_share": effects[1],
         "p_trend": each.p.get(TREND),
         "p_trend_adjusted": adjusted.get(TREND),
-        "detectable_trend": _detectable(each, TREND, covariate),
-        "scatter": own * each.change.trend.scatter,
+        "detectable_trend": detectable(each, TREND, covariate),
+        "scatter": each.series.scale * each.change.trend.scatter,
         "correlation": each.change.trend.correlation,
     }
     jump = each.change.jump
@@ -315,16 +313,16 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
         "jump_share": sizes[1],
         "p_jump": jump.p,
         "p_jump_adjusted": adjusted.get(JUMP),
-        "detectable_jump": _detectable(each, JUMP, covariate),
+        "detectable_jump": detectable(each, JUMP, covariate),
     }
 
 
-def _detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
+def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
+    """The smallest effect that would have been seen, in the unit that is shown; None unknown."""
     size = (each.detectable or {}).get(name)
     if size is None:
         return None
-    own = float(convert(1.0, each.series.unit, each.series.display))
-    return size * own * (covariate.step if name == TREND else 1.0)
+    return size * each.series.scale * (covariate.step if name == TREND else 1.0)
 
 
 def _shared(each: TrendSeries, estimate: Estimate) -> Estimate:

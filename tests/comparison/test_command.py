@@ -28,7 +28,7 @@ def typed(results: Path, *names: str, **more: object) -> tuple[Path, ExitCode]:
 def test_declared_differences_come_first_and_the_code_is_0(
     results: Path, tmp_path: Path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("campaign.comparison.page.draw", lambda figure: "<svg></svg>")
+    monkeypatch.setattr("campaign.report.page.drawings.Drawing.svg", lambda _: "<svg></svg>")
     page, code = typed(results, "before", "after", output=tmp_path / "out")
     assert code is ExitCode.DONE
     assert page == tmp_path / "out" / "comparison.html"

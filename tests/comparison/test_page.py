@@ -6,7 +6,6 @@ import csv
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -19,24 +18,9 @@ from campaign.experiments import experiments
 from campaign.report.article import article_html
 from campaign.report.page.templates import Templates
 from campaign.resources import templates_folder
+from tests.html_pages import Page
 
 Compare = Callable[..., Comparison]
-
-
-class Seen(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.links: list[str] = []
-        self.tags: dict[str, int] = {}
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags[tag] = self.tags.get(tag, 0) + 1
-        found = dict(attrs)
-        if found.get("id"):
-            self.ids.append(str(found["id"]))
-        if tag == "a" and found.get("href"):
-            self.links.append(str(found["href"]))
 
 
 @pytest.fixture(scope="module")
@@ -50,30 +34,26 @@ def render(comparison: Comparison) -> tuple[str, dict[str, str]]:
     return article_html(article, Templates(templates_folder(), None)), article.folder.files
 
 
-def seen(html: str) -> Seen:
-    found = Seen()
-    found.feed(html)
-    return found
-
-
 @pytest.mark.slow
 def test_anchors_are_unique_and_resolve_and_nothing_is_asked_of_a_network(page):
-    found = seen(page[0])
-    assert len(found.ids) == len(set(found.ids))
-    assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
-    beside = [link for link in found.links if not link.startswith(("#", "data:"))]
+    found = Page(page[0])
+    ids = [attrs["id"] for _, attrs in found.elements if "id" in attrs]
+    links = [attrs["href"] for attrs in found.all("a")]
+    assert len(ids) == len(set(ids))
+    assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
+    beside = [link for link in links if not link.startswith(("#", "data:"))]
     assert set(beside) <= set(page[1])  # what is too long for the page
-    assert "script" not in found.tags
+    assert not found.all("script")
     assert "default-src 'none'" in page[0]
 
 
 def test_results_come_before_contents_on_a_small_screen(page):
     """The contents are folded, and what the runs are wraps instead of being a wide table."""
     head, contents = re.search(r"<header.*?(?=<main)", page[0], re.S)[0].split("<nav", 1)
-    assert seen(contents).tags["details"] == 1
+    assert len(Page(contents).all("details")) == 1
     assert "<details open" not in contents
-    assert "table" not in seen(head).tags
-    assert seen(head).tags["dl"] == 3
+    assert not Page(head).all("table")
+    assert len(Page(head).all("dl")) == 3
 
 
 def test_titles_are_text_whatever_is_in_them(page):
@@ -157,14 +137,14 @@ def test_a_figure_that_cannot_be_drawn_costs_only_itself(pair: Comparison, monke
         raise ValueError("no ink")
 
     monkeypatch.setattr("campaign.comparison.page.changes_figure", broken)
-    monkeypatch.setattr("campaign.comparison.page.draw", lambda figure: "<svg></svg>")
+    monkeypatch.setattr("campaign.report.page.drawings.Drawing.svg", lambda _: "<svg></svg>")
     html, files = render(pair)
     assert "the picture of all changes cannot be shown: ValueError: no ink" in html
     assert "tables/pairs.csv" in files
 
 
 def test_a_test_without_result_is_a_problem_on_the_page(pair: Comparison, monkeypatch):
-    monkeypatch.setattr("campaign.comparison.page.draw", lambda figure: "<svg></svg>")
+    monkeypatch.setattr("campaign.report.page.drawings.Drawing.svg", lambda _: "<svg></svg>")
     side = pair.sides[1]
     broken = replace(side, tests=(replace(side.tests[0], problem="the analysis failed"),))
     html, _ = render(replace(pair, sides=(pair.sides[0], broken)))

@@ -9,8 +9,7 @@ from campaign.published.headline import headline, once
 from campaign.published.scoreboard import Scoreboard, score
 from campaign.published.status import Status
 from campaign.published.values import read_published
-from campaign.report.content.lines import scored_tables
-from campaign.report.content.tables import agreement, closeness
+from campaign.report.content.lines import agreement, closeness, scored_tables
 from campaign.result import Finding
 
 PUBLISHED = read_published(

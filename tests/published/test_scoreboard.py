@@ -249,7 +249,9 @@ def test_the_file_has_the_interval_and_a_bound_only_on_its_side() -> None:
 
 def test_the_file_of_further_runs_says_who_found_them() -> None:
     tests = [Evidence(name, ("1.1",), [ERROR]) for name in ("first", "again")]
-    (row,) = csv.DictReader(io.StringIO(to_csv(score(PUBLISHED, tests).further, tests=True)))
+    (row,) = csv.DictReader(
+        io.StringIO(to_csv(score(PUBLISHED, tests).further, (*COLUMNS, "test")))
+    )
     assert (row["test"], row["row"]) == ("again", "0.5")
 
 

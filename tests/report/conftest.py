@@ -32,15 +32,9 @@ def made_up() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def report(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Report:
-    from campaign.report.build import build_report
 
     folder = tmp_path_factory.mktemp("report")
-    return build_report(
-        made_up.made_up_run(folder),
-        folder / "report",
-        experiments=made_up.EXPERIMENTS,
-        packaged_templates=made_up.TEMPLATES,
-    )
+    return made_up.build(made_up.made_up_run(folder), folder / "report")
 
 
 @pytest.fixture

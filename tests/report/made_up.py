@@ -15,6 +15,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.recording import ChannelInfo, Ending, Outcome, Recording, SafeState
+from campaign.report.build import Report, build_report
 from campaign.result import (
     Axis,
     Column,
@@ -39,6 +40,12 @@ METHODS = {
     "lugre": "LuGre",
     "observer": "observer",
 }
+
+
+def build(run: RunReader, output: Path, **more: object) -> Report:
+    """The report of a made-up run; `more`: as of `build_report`."""
+    options = {"experiments": EXPERIMENTS, "packaged_templates": TEMPLATES}
+    return build_report(run, output, **(options | more))
 
 
 class ShakeOptions(Options):

@@ -13,9 +13,10 @@ import pytest
 
 from campaign.report.content.tables import show, table_csv
 from campaign.report.drawing import figures
+from campaign.report.drawing.canvas import inline
 from campaign.report.drawing.curves import DENSE
 from campaign.report.drawing.decimate import decimate
-from campaign.report.drawing.figures import draw, inline, pretty_unit
+from campaign.report.drawing.figures import draw, pretty_unit
 from campaign.report.palette import (
     INK,
     MUTED,

@@ -5,12 +5,12 @@ from itertools import pairwise
 import matplotlib.backends.backend_svg as backend
 import numpy as np
 import pytest
-from matplotlib.axis import Axis as DrawnAxis
 from matplotlib.figure import Figure as Canvas
 
 from campaign.report.drawing.cached_axes import settled
+from campaign.report.drawing.canvas import canvas
 from campaign.report.drawing.decimate import kept
-from campaign.report.drawing.figures import canvas, draw
+from campaign.report.drawing.figures import draw
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 X, Y = Axis("x", "s"), Axis("y", "rad")
@@ -46,22 +46,6 @@ def test_a_figure_is_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "a dot" in draw(marked())
     assert len(drawn) == 1
     assert len(begun) == 1  # which writes
-
-
-def test_ticks_are_worked_out_once_for_each_measuring_and_drawing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    worked_out, original = [], DrawnAxis._update_ticks
-
-    def counted(self):
-        worked_out.append(self)
-        return original(self)
-
-    monkeypatch.setattr(DrawnAxis, "_update_ticks", counted)
-    t = np.linspace(0.0, 1.0, 50)
-    panel = Panel(X, Y, (Curve(t, t**2, "square"),), "a panel")
-    draw(Figure("key", "A title", "a caption", "what it shows", (panel,)))
-    assert len(worked_out) == 4  # of two axes, which are measured and drawn
 
 
 @pytest.mark.slow

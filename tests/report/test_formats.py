@@ -23,7 +23,7 @@ from campaign.estimate import Estimate
 from campaign.experiments.interface import TestData
 from campaign.plugins import GROUPS
 from campaign.reason import Reason
-from campaign.report.build import Report, build_report
+from campaign.report.build import Report
 from campaign.report.content.citation import citation_of
 from campaign.report.formats import chosen_formats, formats, pdf
 from campaign.report.formats.markdown import escaped, paragraph
@@ -48,8 +48,7 @@ HOSTILE = (
 
 
 def build(made_up: ModuleType, run, folder: Path, *names: str, **more) -> Report:
-    options = {"experiments": made_up.EXPERIMENTS, "packaged_templates": made_up.TEMPLATES}
-    return build_report(run, folder, **(options | more), formats=chosen_formats(names))
+    return made_up.build(run, folder, formats=chosen_formats(names), **more)
 
 
 @pytest.fixture(scope="module")

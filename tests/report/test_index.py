@@ -7,7 +7,6 @@ import hashlib
 import json
 import re
 import shutil
-from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -21,35 +20,10 @@ from campaign.report.index.page import entry_of, render, write_index
 from campaign.report.index.report_summary import summary_of_report
 from campaign.report.index.sketch import sketch
 from campaign.resources import templates_folder
+from tests.html_pages import Page
 
 KEPT = Path(__file__).parents[1] / "archive" / "kept" / "format-3.nxs"
 HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>'
-
-
-class Page(HTMLParser):
-    """Tags with their attributes, and text."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.inside = ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        self.inside = tag
-
-    def handle_data(self, data: str) -> None:
-        if self.inside not in ("script", "style"):
-            self.words.append(data)
-
-    def all(self, tag: str) -> list[dict[str, str | None]]:
-        return [attrs for name, attrs in self.tags if name == tag]
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
 
 
 @pytest.fixture
@@ -102,7 +76,7 @@ def test_hostile_names_are_text(results: Path):
     page = shown(results)
     assert HOSTILE in page.text
     assert len(page.all("script")) == 1
-    assert not any(name.startswith("on") for _, attrs in page.tags for name in attrs)
+    assert not any(name.startswith("on") for _, attrs in page.elements for name in attrs)
     assert all(str(a.get("src", "")).startswith("./") for a in page.all("img"))
 
 

@@ -14,11 +14,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from campaign.report.build import Report, build_report
+from campaign.report.build import Report
 from campaign.report.drawing import curves as drawing
 from campaign.report.drawing.curves import drawn_points
-from campaign.report.drawing.decimate import decimate
-from campaign.report.drawing.figure_csv import points_of_each
+from campaign.report.drawing.decimate import decimate, points_of_each
 from campaign.report.drawing.figures import draw
 from campaign.report.page import interactive as module
 from campaign.report.page.folder import ShownFigure
@@ -42,13 +41,7 @@ def figure(*curves: Curve) -> Figure:
 @pytest.fixture(scope="module")
 def zoomed(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("zoomed")
-    report = build_report(
-        made_up.made_up_run(folder),
-        folder / "report",
-        experiments=made_up.EXPERIMENTS,
-        packaged_templates=made_up.TEMPLATES,
-        zoom=True,
-    )
+    report = made_up.build(made_up.made_up_run(folder), folder / "report", zoom=True)
     return report.path.read_text(encoding="utf-8")
 
 

@@ -7,19 +7,14 @@ from types import ModuleType
 
 import pytest
 
-from campaign.report.build import build_report
 from campaign.report.formats import chosen_formats
 
 
 @pytest.mark.slow
 def test_figures_and_tables_do_not_leave_their_section(made_up: ModuleType, tmp_path: Path) -> None:
     """LaTeX floats wait for a place, if need be behind later sections; a barrier holds them."""
-    build_report(
-        made_up.made_up_run(tmp_path),
-        tmp_path / "out",
-        experiments=made_up.EXPERIMENTS,
-        packaged_templates=made_up.TEMPLATES,
-        formats=chosen_formats(["latex"]),
+    made_up.build(
+        made_up.made_up_run(tmp_path), tmp_path / "out", formats=chosen_formats(["latex"])
     )
     floating, sections, barriers, before = False, 0, 0, ""
     for line in (tmp_path / "out" / "report.tex").read_text(encoding="utf-8").splitlines():

@@ -14,7 +14,6 @@ from campaign.archive import RunReader
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment, TestData
 from campaign.reason import NONE, Reason
-from campaign.report.build import build_report
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import MANY, FirstScreen
 from campaign.report.formats import chosen_formats
@@ -111,9 +110,7 @@ def test_few_tests_stand_there_all(
 def test_the_page_opens_with_the_main_tests_and_each_test_has_all_of_its_own(
     made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
 ) -> None:
-    report = build_report(
-        run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
-    )
+    report = made_up.build(run, tmp_path / "out", experiments=kinds)
     html = report.path.read_text(encoding="utf-8")
     top, below = html.split('<section id="opening"')[1].split("</section>", 1)
     on_top = ("tells_more", *(f"measured_{n}" for n in range(MANY - 1)))
@@ -129,12 +126,8 @@ def test_what_is_not_in_an_interval_on_top_is_told_there(
     made_up: ModuleType, tmp_path: Path, run: RunReader, kinds: dict[str, Experiment]
 ) -> None:
     """Each remark once, with the tests that it is of."""
-    report = build_report(
-        run,
-        tmp_path / "out",
-        experiments=kinds,
-        packaged_templates=made_up.TEMPLATES,
-        formats=chosen_formats(("markdown", "latex")),
+    report = made_up.build(
+        run, tmp_path / "out", experiments=kinds, formats=chosen_formats(("markdown", "latex"))
     )
     texts = [report.path, *(report.path.with_suffix(suffix) for suffix in (".md", ".tex"))]
     for text in (path.read_text(encoding="utf-8") for path in texts):

@@ -19,7 +19,7 @@ from campaign.experiments.interface import Experiment, TestData
 from campaign.published.headline import is_compared, once
 from campaign.reason import NONE, Reason
 from campaign.recording import Ending, Outcome, SafeState
-from campaign.report.build import build_report, render
+from campaign.report.build import render
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import document_of
 from campaign.report.content.first_screen import FirstScreen
@@ -470,9 +470,7 @@ def test_hostile_text_is_only_text(made_up: ModuleType, tmp_path: Path):
     kinds = experiments(
         made_up, stabilization=says(Finding.of(Estimate(hostile, 1.0, "rad", 0.9, 1.1, 0.95), {}))
     )
-    report = build_report(
-        run, tmp_path / "out", experiments=kinds, packaged_templates=made_up.TEMPLATES
-    )
+    report = made_up.build(run, tmp_path / "out", experiments=kinds)
     html = report.path.read_text(encoding="utf-8")
     assert html.count("<script") == 1, "the page's own"
     assert "{{ 7 * 7 }}" in _section(html)

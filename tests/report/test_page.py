@@ -12,7 +12,6 @@ import re
 import subprocess
 import sys
 import zlib
-from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
 from urllib.parse import unquote
@@ -20,79 +19,23 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from campaign.archive import RunReader
 from campaign.errors import UsageError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.recording import Ending, Outcome
-from campaign.report.build import Report, build_report
+from campaign.report.build import Report
 from campaign.report.one_figure import WRITTEN, write_figures
 from campaign.report.output import MARKER, replaced_folder
 from campaign.report.page.drawings import Drawing
 from campaign.report.page.folder import LINKED, Folder
 from campaign.result import Axis, Column, Curve, Figure, Panel, Result, Table
+from tests.html_pages import Page
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
-
-VOID = {"meta", "link", "br", "img", "input", "hr"}
-FOREIGN_VOID = {"path", "use", "rect", "circle", "image", "stop"}
-
-
-class Page(HTMLParser):
-    """Every element with its attributes and text, and whether the tags are balanced.
-
-    `stops` are the elements that the Tab key stops at: the figure around it, or "", and its tag.
-    """
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str]]] = []
-        self.open: list[str] = []
-        self.mistakes: list[str] = []
-        self.words: list[str] = []
-        self.stops: list[tuple[str, str]] = []
-        self.figure = ""
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, {k: v or "" for k, v in attrs}))
-        if tag == "figure":
-            self.figure = dict(attrs)["id"] or ""
-        stops = tag in ("a", "button", "summary", "input") or ("tabindex", "0") in attrs
-        if stops and ("tabindex", "-1") not in attrs:
-            self.stops.append((self.figure, tag))
-        if len(dict(attrs)) != len(attrs):
-            self.mistakes.append(f"an attribute twice in <{tag}>")
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, {k: v or "" for k, v in attrs}))
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag == "figure":
-            self.figure = ""
-        if not self.open or self.open.pop() != tag:
-            self.mistakes.append(f"</{tag}> closes something else")
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-    def all(self, tag: str) -> list[dict[str, str]]:
-        return [attrs for name, attrs in self.elements if name == tag]
 
 
 @pytest.fixture(scope="module")
 def page(report: Report) -> Page:
     return Page(report.path.read_text(encoding="utf-8"))
-
-
-def build(made_up: ModuleType, run: RunReader, output: Path, **more: object) -> Report:
-    options = {
-        "experiments": made_up.EXPERIMENTS,
-        "packaged_templates": made_up.TEMPLATES,
-    }
-    return build_report(run, output, **(options | more))
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -240,7 +183,7 @@ def test_any_figure_is_soon_reached(
 
     kind = dataclasses.replace(made_up.EXPERIMENTS["velocity_map"], analyse=analyse)
     run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
-    found = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind})
+    found = made_up.build(run, tmp_path / "out", experiments={"velocity_map": kind})
     page = Page(found.path.read_text(encoding="utf-8"))
     skips = [a["href"] for a in page.all("a") if a.get("class") == "skip"]
     assert skips == ["#content", "#figures"]
@@ -281,7 +224,7 @@ def test_an_analysis_that_leaves_the_program_costs_its_test_only(
 
     kind = dataclasses.replace(made_up.EXPERIMENTS["velocity_map"], analyse=analyse)
     run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
-    found = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind})
+    found = made_up.build(run, tmp_path / "out", experiments={"velocity_map": kind})
     assert [each.partition(": ")[2] for each in found.problems] == [
         "the analysis failed: SystemExit: 0"
     ]
@@ -321,7 +264,7 @@ def test_the_command_repeats_what_was_asked(made_up: ModuleType, tmp_path: Path)
         overrides={"bench.gear.ratio": "100"},
         backend="serial",
     )
-    build(made_up, run, tmp_path / "out")
+    made_up.build(run, tmp_path / "out")
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
     assert (
         "campaign run made-up.toml --backend serial --only 'a b' --set bench.gear.ratio=100" in text
@@ -332,7 +275,7 @@ def test_options_of_the_backend_are_told_in_words(made_up: ModuleType, tmp_path:
     """Neither Python nor JSON: an option that says nothing is left out, a number is SI."""
     options = {"check_step": False, "longest_step": None, "timeout": 2.0}
     run = made_up.made_up_run(tmp_path, tests={}, backend_options=options)
-    build(made_up, run, tmp_path / "out")
+    made_up.build(run, tmp_path / "out")
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
     assert "sim, check step: no, timeout: 2 (SI)" in text
 
@@ -380,8 +323,7 @@ def test_hostile_names_are_only_names(made_up: ModuleType, tmp_path: Path) -> No
         sources={hostile: hostile},
         notes=hostile,
     )
-    build(
-        made_up,
+    made_up.build(
         run,
         tmp_path / "out",
         experiments={"stabilization": dataclasses.replace(kind, analyse=analyse)},
@@ -399,7 +341,7 @@ def test_own_templates_win_one_by_one(made_up: ModuleType, tmp_path: Path) -> No
     own.mkdir()
     (own / "provenance.html").write_text("<p>Made at {{ header.name }}</p>")
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ("5.2",)})
-    build(made_up, run, tmp_path / "out", templates=own)
+    made_up.build(run, tmp_path / "out", templates=own)
     text = " ".join(Page((tmp_path / "out" / "report.html").read_text()).words)
     assert "Made at 2026-11-21T09-36-58-made-up" in text
     assert "Archive SHA-256" not in text
@@ -418,12 +360,12 @@ def test_a_wrong_template_is_told_and_the_old_report_stays(
     made_up: ModuleType, tmp_path: Path, template: str, message: str
 ) -> None:
     run = made_up.made_up_run(tmp_path, tests={})
-    before = contents(build(made_up, run, tmp_path / "out").path.parent)
+    before = contents(made_up.build(run, tmp_path / "out").path.parent)
     own = tmp_path / "own"
     own.mkdir()
     (own / "provenance.html").write_text(template)
     with pytest.raises(UsageError, match=re.escape(message)):
-        build(made_up, run, tmp_path / "out", templates=own)
+        made_up.build(run, tmp_path / "out", templates=own)
     assert contents(tmp_path / "out") == before
 
 
@@ -434,7 +376,7 @@ def test_templates_in_the_working_directory_are_not_used(
     (tmp_path / "templates").mkdir()
     (tmp_path / "templates" / "report.html").write_text("hijacked")
     monkeypatch.chdir(tmp_path)
-    found = build(made_up, made_up.made_up_run(tmp_path, tests={}), tmp_path / "out")
+    found = made_up.build(made_up.made_up_run(tmp_path, tests={}), tmp_path / "out")
     assert "hijacked" not in found.path.read_text()
 
 
@@ -454,7 +396,7 @@ none = [500]
 
 def test_a_laboratory_compares_with_its_own_numbers(made_up: ModuleType, tmp_path: Path) -> None:
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ("1",)}, published=OWN)
-    build(made_up, run, tmp_path / "out")
+    made_up.build(run, tmp_path / "out")
     (row,) = scoreboard(tmp_path / "out")
     assert (row["table"], row["unit"], row["published"]) == ("1", "urad", "500.0")
     assert float(row["deviation_percent"]) == pytest.approx(-2.318, abs=1e-3)
@@ -467,7 +409,7 @@ def test_nothing_published_is_a_report_without_a_scoreboard(
     run = made_up.made_up_run(
         tmp_path, tests={"stabilization": ("5.2",)}, normalised={"published": "none"}
     )
-    build(made_up, run, tmp_path / "out")
+    made_up.build(run, tmp_path / "out")
     assert not (tmp_path / "out/tables/scoreboard.csv").exists()
     assert "Scoreboard" not in (tmp_path / "out/report.html").read_text()
 
@@ -481,13 +423,13 @@ def test_a_continuous_bench_speaks_to_simulations_and_a_sampled_one_to_hardware(
         controller = bench.controller.model_copy(update={"sample_rate": 1000.0})
         bench = bench.model_copy(update={"controller": controller})
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ("6.1",)}, bench=bench)
-    build(made_up, run, tmp_path / "out")
+    made_up.build(run, tmp_path / "out")
     rows = [row for row in scoreboard(tmp_path / "out") if row["reproduced"]]
     assert {row["column"] for row in rows} == {column}
 
 
 def test_an_unknown_experiment_is_a_problem_not_an_end(made_up: ModuleType, tmp_path: Path) -> None:
-    found = build(made_up, made_up.made_up_run(tmp_path), tmp_path / "out", experiments={})
+    found = made_up.build(made_up.made_up_run(tmp_path), tmp_path / "out", experiments={})
     assert len(found.problems) == 3
     assert "no experiment is called 'stabilization' here" in found.problems[0]
 
@@ -506,7 +448,7 @@ def test_long_tables_fold_and_lose_nothing(made_up: ModuleType, tmp_path: Path) 
         made_up.EXPERIMENTS["velocity_map"], analyse=lambda data: Result(tuple(tables))
     )
     run = made_up.made_up_run(tmp_path, tests={"velocity_map": ()})
-    page = build(made_up, run, tmp_path / "out", experiments={"velocity_map": kind}).path
+    page = made_up.build(run, tmp_path / "out", experiments={"velocity_map": kind}).path
     text = page.read_text(encoding="utf-8")
     assert text.count('<tr><th scope="row" class="n">') == 18 + 19 + 12
     (further,) = re.findall(r'<pre class="rows" tabindex="0">(.*?)</pre>', text, re.DOTALL)
@@ -526,7 +468,7 @@ def test_the_scoreboard_shows_one_status_at_a_time(report: Report, page: Page) -
     choices = [a["id"] for a in page.all("input")]
     assert choices[0] == "every-status"
     assert len(choices) > 2
-    style = next(text for text in page.words if "#scoreboard" in text)
+    style = next(text for text in page.code if "#scoreboard" in text)
     for choice in choices[1:]:
         status = choice.removeprefix("only-")
         assert f"#scoreboard:has(#{choice}:checked)" in style
@@ -575,7 +517,7 @@ def test_a_figure_that_cannot_be_drawn_costs_only_itself(
 
     kinds = {"velocity_map": Experiment("v", "v", made_up.ShakeOptions, lambda o, b: (), analyse)}
     run = made_up.made_up_run(tmp_path, tests={"velocity_map": ("4.3",)})
-    found = build(made_up, run, tmp_path / "out", experiments=kinds)
+    found = made_up.build(run, tmp_path / "out", experiments=kinds)
     assert len(found.problems) == 1
     assert "wrong cannot be shown" in found.problems[0]
     assert (tmp_path / "out/figures/figure-4.11.svg").is_file()
@@ -589,7 +531,7 @@ def test_two_tests_with_one_published_figure_have_two_files(
         k: Experiment(k, k, made_up.ShakeOptions, lambda o, b: (), analyse) for k in ("one", "two")
     }
     run = made_up.made_up_run(tmp_path, tests={"one": ("4.3",), "two": ("4.3",)})
-    build(made_up, run, tmp_path / "out", experiments=kinds)
+    made_up.build(run, tmp_path / "out", experiments=kinds)
     files = {path.name for path in (tmp_path / "out").rglob("*.*")}
     assert {"figure-4.11.svg", "figure-4.11-two-map.svg", "table-4.3.csv"} <= files
     assert not any(name.startswith("table-4.3-") for name in files)
@@ -600,7 +542,7 @@ def test_thousands_of_failed_trials_stay_a_page(made_up: ModuleType, tmp_path: P
     run = made_up.made_up_run(tmp_path, tests={"stabilization": ("5.8",)})
     failed = dataclasses.replace(run.trials[0], ending=Ending(Outcome.DIVERGED, "rate is infinite"))
     many = dataclasses.replace(run, trials=(failed,) * 5000)
-    found = build(made_up, many, tmp_path / "out")
+    found = made_up.build(many, tmp_path / "out")
     text = found.path.read_text()
     assert text.count("rate is infinite") == 200 + 1  # and on top, once
     assert "4800 more are in the archive" in text

@@ -167,7 +167,7 @@ def test_what_processes_need_is_imported_before_they_begin() -> None:
         "assert len(shipped) > 10\n"
         "all(experiments()[name] for name in shipped)\n"
         "import matplotlib.figure, matplotlib.projections, scipy.stats\n"
-        "import campaign.report.drawing.margins, campaign.report.processes\n"
+        "import campaign.report.drawing.figures, campaign.report.processes\n"
         "print(sorted(set(sys.modules) - before))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -22,7 +22,6 @@ import pytest
 from campaign.estimate import Estimate, Origin
 from campaign.experiments.interface import Experiment
 from campaign.reason import Cause, Reason
-from campaign.report.build import build_report
 from campaign.report.formats.as_json import POINTS, plain, read_report, report_schema
 from campaign.result import Column, Finding, Result, Table
 from campaign.text import pretty_unit
@@ -99,11 +98,10 @@ def with_numbers(made_up: ModuleType) -> dict[str, Experiment]:
 def folder(made_up: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of the made-up run: a test that failed, a table of every kind of number."""
     folder = tmp_path_factory.mktemp("json")
-    report = build_report(
+    report = made_up.build(
         made_up.made_up_run(folder, notes="a <script>alert(1)</script> & \u2028 note"),
         folder / "report",
         experiments=with_numbers(made_up),
-        packaged_templates=made_up.TEMPLATES,
     )
     return report.path.parent
 
@@ -368,11 +366,10 @@ def test_it_reads_back_as_what_it_was_and_nothing_else_does(folder):
 
 @pytest.mark.slow
 def test_the_same_run_gives_the_same_text(made_up, folder, tmp_path):
-    again = build_report(
+    again = made_up.build(
         made_up.made_up_run(tmp_path, notes="a <script>alert(1)</script> & \u2028 note"),
         tmp_path / "other",
         experiments=with_numbers(made_up),
-        packaged_templates=made_up.TEMPLATES,
     )
     text = again.path.with_name("report.json").read_bytes()
     assert text == (folder / "report.json").read_bytes()

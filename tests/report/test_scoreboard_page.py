@@ -23,7 +23,6 @@ from campaign.published.scoreboard import Line, score
 from campaign.published.verdicts import reproduced
 from campaign.reason import Reason
 from campaign.recording import Outcome, SafeState
-from campaign.report.build import build_report
 from campaign.report.content.lines import shown_line
 from campaign.result import Finding
 
@@ -58,12 +57,7 @@ def test_an_altered_bench_and_what_was_found_twice_are_told(
     wanted = {"stabilization": ("5.2", "figure 5.14"), "velocity_map": ("5.2",)}
     run = made_up.made_up_run(tmp_path, tests=wanted, bench=made_up.bench(axis=AXIS))
     kind = made_up.EXPERIMENTS["stabilization"]
-    build_report(
-        run,
-        tmp_path / "out",
-        experiments={**made_up.EXPERIMENTS, "velocity_map": kind},
-        packaged_templates=made_up.TEMPLATES,
-    )
+    made_up.build(run, tmp_path / "out", experiments={**made_up.EXPERIMENTS, "velocity_map": kind})
     folder = tmp_path / "out"
     assert [row["status"] for row in rows(folder)] == ["altered"] * 3 + [""] * 12
     assert [row["verdict"] for row in rows(folder)[3:]] == ["not found"] * 12
@@ -83,12 +77,7 @@ def test_of_a_truth_no_fingerprint_is_asked_for(made_up: ModuleType, tmp_path: P
         dataclasses.replace(each, trial=each.trial.model_copy(update={"truth": "0" * 64}))
         for each in run.trials
     )
-    build_report(
-        dataclasses.replace(run, trials=trials),
-        tmp_path / "out",
-        experiments=made_up.EXPERIMENTS,
-        packaged_templates=made_up.TEMPLATES,
-    )
+    made_up.build(dataclasses.replace(run, trials=trials), tmp_path / "out")
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     text = " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page)).split())
     assert f"Altered: stabilization: {OF_A_TRUTH}." in text

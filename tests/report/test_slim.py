@@ -1,8 +1,9 @@
-"""A drawing in fewer bytes paints what it painted before."""
+"""A drawing in fewer bytes and shapes paints what it painted before."""
 
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterator
 from types import ModuleType
 from xml.etree import ElementTree as ET
@@ -11,8 +12,9 @@ import numpy as np
 import pytest
 
 from campaign.experiments.interface import TestData
-from campaign.report.drawing.figures import draw, inline
-from campaign.report.drawing.label_size import legible_width
+from campaign.report.drawing.canvas import inline
+from campaign.report.drawing.drawing_files import DrawingFiles
+from campaign.report.drawing.figures import draw
 from campaign.report.drawing.short_paths import CURVES, SIGNS, short_path
 from campaign.report.drawing.slim_svg import slim
 from campaign.result import Axis, Curve, Figure, Mark, Panel
@@ -69,14 +71,18 @@ def test_what_is_painted_stays(made_up: ModuleType) -> None:
         before = draw(figure)
         after = slim(before)
         if "<image" not in before:
-            assert len(after) < 0.62 * len(before), figure.key
-        old, new = list(painted(before)), list(painted(after))
-        assert [how for _, how, _ in old] == [how for _, how, _ in new]
-        for (shape, how, was), (_, _, is_) in zip(old, new, strict=True):
-            if shape in ("path", "small"):
-                assert follows(was, is_, ABOUT_SIGNS if shape == "small" else ABOUT), how
-            else:
-                assert was == pytest.approx(is_, abs=ABOUT), how
+            sizes = [len(zlib.compress(text.encode())) for text in (before, after)]
+            assert sizes[1] < 0.62 * sizes[0], figure.key
+        old, new = looks(before), looks(after)
+        assert old.keys() == new.keys()
+        signs = {how for shape, how, _ in painted(before) if shape == "small"}
+        for how, places in old.items():
+            about = ABOUT_SIGNS if how in signs else ABOUT
+            for was, is_ in zip(places, new[how], strict=True):
+                path = how[0] == "path"
+                assert follows(was, is_, about) if path else was == pytest.approx(is_, abs=about), (
+                    how
+                )
 
 
 @pytest.mark.slow
@@ -122,15 +128,81 @@ def test_paths_are_short(path: str, short: str) -> None:
     assert follows(points(path), points(short), ABOUT)
 
 
+SPACES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+SIGNS_THERE = """<defs>
+<path id="a" d="M 0 0&#10;L 0 3.5&#10;" style="stroke: #123456"/>
+<path id="b" d="M -2 0&#10;L 2 2&#10;L 2 -2&#10;z&#10;"/>
+<path id="c" d="M 0 2.25&#10;C 0.6 2.25 1 2 1.6 1.5&#10;z&#10;" style="stroke: #ffffff"/>
+<path id="d" d="M 0 1.256&#10;C 1.123 2 3 4 5 6&#10;"/>
+<path id="e" d="M 0 0&#10;L 100.256 1&#10;L 3 4&#10;z&#10;"/>
+<clipPath id="z"><rect x="0" y="0" width="9" height="9"/></clipPath>
+</defs>"""
+CURVE = '<path d="M 1 2&#10;L 3 4&#10;L 5 7" style="fill: none; stroke: #000000"/>'
+
+
+def drawn(*lines: str, group: str = '<g style="fill: #7a6a00">') -> list[str]:
+    """The lines that are drawn of these, behind the signs that they use."""
+    text = slim("\n".join((f"<svg {SPACES}>{SIGNS_THERE}{group}", *lines, "</g></svg>")))
+    return text.partition("round")[2].split("\n")[1:-3]
+
+
+def use(name: str, x: float, y: float = 1) -> str:
+    return f'<use xlink:href="#{name}" x="{x}" y="{y}"/>'
+
+
 def test_a_sign_is_drawn_finer_than_a_curve_and_a_band_is_a_curve() -> None:
-    shapes = [("a", "M 0 1.256\nC 1.123 2 3 4 5 6"), ("b", "M 0 0\nL 100.256 1\nL 3 4\nz")]
-    defined = "".join(f'<path id="{name}" d="{path}" style="fill: #123"/>' for name, path in shapes)
-    uses = "".join(f'<use xlink:href="#{name}" x="3.256" y="1"/>' for name, _ in shapes)
-    spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
-    small = slim(f"<svg {spaces}><defs>{defined}</defs><g>{uses}</g></svg>")
-    assert 'd="m0 1.26c1.12' in small
-    assert 'd="m0 0 100.3 1' in small
-    assert small.count('x="3.3"') == 2
+    sign, band = drawn(use("d", 3.256), CURVE, use("e", 3.256))[::2]
+    assert 'd="m3.26 2.26c1.12' in sign
+    assert 'd="m3.3 1 100.2 1' in band
+
+
+def test_marks_of_a_curve_are_one_path_where_they_were() -> None:
+    path = '<path d="m1 1 4 2v-4zm2 .5 4 2v-4z" style="fill:#7a6a00" />'
+    assert drawn(use("b", 3), use("b", 5, 1.5)) == [path]
+
+
+def test_ticks_and_grid_lines_are_one_path_each_past_their_words() -> None:
+    lines = [
+        line
+        for x in (10, 20)
+        for line in (
+            f'<path d="M {x} 150&#10;L {x} 5&#10;" style="stroke: #d9dde1"/>',
+            use("a", x),
+            f'<g><text x="{x}" y="9">{x}</text></g>',
+        )
+    ]
+    assert drawn(*lines, group="<g>") == [
+        '<path d="m10 150v-145m10 145v-145" style="stroke:#d9dde1" />',
+        '<path d="m10 1v3.5m10-3.5v3.5" style="stroke:#123456" />',
+        '<text x="10" y="9">10</text>',
+        '<text x="20" y="9">20</text>',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lines", "group"),
+    [
+        ([use("c", 1), use("c", 2)], '<g style="fill: #7a6a00">'),  # an edge of another colour
+        ([use("b", 1), use("b", 2)], '<g style="fill: #7a6a00; fill-opacity: 0.2">'),
+        ([f'<g class="st-a"><title>one</title>{use("b", 1)}</g>'] * 2, "<g>"),
+        (['<path d="M 1 1&#10;L 1 2" transform="rotate(9)"/>'] * 2, "<g>"),
+        ([use("b", 3), CURVE, use("b", 5)], "<g>"),  # marks go past no curve
+    ],
+)
+def test_what_would_look_otherwise_stays(lines: list[str], group: str) -> None:
+    assert len(drawn(*lines, group=group)) == len(lines)
+
+
+def test_a_mark_with_words_of_its_own_has_them_and_the_clip_of_its_group() -> None:
+    named = f'<g class="st-a" clip-path="url(#z)"><title>one</title>{use("c", 30)}</g>'
+    (told,) = drawn(named, group="<g>")
+    assert told.startswith('<path clip-path="url(#c0)" class="st-a" d="m30 3.25c')
+    assert "<title>one</title></path>" in told
+
+
+def test_what_is_turned_is_clipped_in_the_coordinates_of_its_group() -> None:
+    (told,) = drawn('<text transform="rotate(90)">a</text>', group='<g clip-path="url(#z)">')
+    assert told.startswith('<g clip-path="url(#c0)"><text transform="rotate(90)"')
 
 
 def test_what_is_left_out_of_a_path_lies_on_it() -> None:
@@ -150,11 +222,19 @@ def test_paths_that_matplotlib_does_not_write_stay(path: str) -> None:
 def test_the_width_at_which_labels_are_legible() -> None:
     """9 px over the smallest of 7.5 and 8 units, of a drawing that is 500 units wide."""
     svg = '<svg viewBox="0 0 500 200"><text style="font-size: 8px"/><g style="font-size:7.5px"/>'
-    assert legible_width(svg) == pytest.approx(600.0)
-    assert legible_width('<svg viewBox="0 0 500 200">') == 0.0
+    assert DrawingFiles(svg).least == 600
+    assert DrawingFiles('<svg viewBox="0 0 500 200">').least == 0
 
 
 # An SVG reader of this test's own: what is painted, with the style that is in force there.
+
+
+def looks(svg: str) -> dict[tuple[str, ...], list[Numbers]]:
+    """By look, where everything is that has it, in the order in which it is painted."""
+    found: dict[tuple[str, ...], list[Numbers]] = {}
+    for _, how, numbers in painted(svg):
+        found.setdefault(how, []).append(numbers)
+    return found
 
 
 def painted(svg: str) -> Iterator[tuple[str, tuple[str, ...], Numbers]]:
@@ -184,12 +264,15 @@ def _of(
     if tag == "use":
         (href,) = (v for k, v in element.items() if k.endswith("href"))
         target = named[href[1:]]
-        yield from _painted("sign", style | _css(target.get("style", "")), clips, at)
-        numbers = points(target.attrib["d"])
-        yield ("small" if max(map(abs, numbers)) <= 20 else "path"), (), numbers
+        own = style | _css(target.get("style", ""))
+        small = max(map(abs, points(target.attrib["d"]))) <= 20
+        for numbers in parts(target.attrib["d"]):
+            places = tuple(number + at[k % 2] for k, number in enumerate(numbers))
+            for _, how, there in _painted("path", own, clips, places):
+                yield "small" if small else "path", how, there
     elif tag == "path":
-        numbers = points(element.get("d", ""))
-        yield from _painted("path", style, clips, numbers) if numbers else ()
+        for numbers in parts(element.get("d", "")):
+            yield from _painted("path", style, clips, numbers)
     elif tag == "text":
         fonts = tuple(style.get(k, "") for k in ("font-size", "font-weight", "text-anchor"))
         turn = re.findall(r"rotate\((-?[\d.]+)", element.get("transform", ""))
@@ -215,7 +298,8 @@ def _painted(
     line = [name for name in style if name.startswith("stroke") and style["stroke"] != "none"]
     shown |= {name: style[name] for name in ("opacity", "fill-opacity", *line) if name in style}
     looks = tuple(f"{name}={value}" for name, value in sorted(shown.items()))
-    yield shape, (shape, *looks), (*numbers, *(end for clip in clips for end in clip))
+    frames = (f"{end:.1f}" for clip in clips for end in clip)
+    yield shape, (shape, *looks, *frames), numbers
 
 
 def _css(text: str) -> dict[str, str]:
@@ -248,16 +332,19 @@ def _distance(places: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndar
     return np.hypot(*(places - one - np.outer(share, along)).T)
 
 
-def points(path: str) -> Numbers:
-    """The places that a path comes by; a repeated one once, as it paints nothing."""
+def parts(path: str) -> list[Numbers]:
+    """The places that each line of a path comes by; a repeated one once, as it paints nothing."""
     here = start = (0.0, 0.0)
-    found: list[tuple[float, float]] = []
+    lines: list[list[tuple[float, float]]] = []
     for command, text in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
         numbers = [float(n) for n in re.findall(r"-?\d*\.?\d+", text)]
         if command in "zZ":
             here = start
-            found.append(here)
+            lines[-1].append(here)
             continue
+        if command in "mM":
+            lines.append([])
+        found = lines[-1]
         if command in "hv":
             numbers = [v for n in numbers for v in ((n, 0.0) if command == "h" else (0.0, n))]
         for place, (x, y) in enumerate(zip(numbers[::2], numbers[1::2], strict=True)):
@@ -270,4 +357,9 @@ def points(path: str) -> Numbers:
                 start = here
             if not found or command not in "lLhv" or np.hypot(*np.subtract(here, found[-1])) > 0.01:
                 found.append(here)
-    return tuple(number for place in found for number in place)
+    return [tuple(number for place in found for number in place) for found in lines]
+
+
+def points(path: str) -> Numbers:
+    """The places of all its lines."""
+    return tuple(number for line in parts(path) for number in line)

@@ -10,10 +10,9 @@ import pytest
 
 from campaign.published.draws import SEED
 from campaign.published.evidence import Evidence
-from campaign.published.scoreboard import Scoreboard, score
+from campaign.published.scoreboard import Scoreboard, score, to_csv
 from campaign.published.values import read_published
 from campaign.report.content.lines import shown_line
-from campaign.report.content.tables import published_csv
 from campaign.report.drawing.strips import draw_strips
 from campaign.result import Finding
 
@@ -73,6 +72,6 @@ def test_the_place_stands_beside_what_was_found() -> None:
     assert place is not None
     low, high = 100 * (place.low or 0.0), 100 * (place.high or 0.0)
     assert shown_line(line).place == f"above 45 % ({low:.0f} to {high:.0f} %) of 10 draws"
-    (row,) = csv.DictReader(io.StringIO(published_csv([line])))
+    (row,) = csv.DictReader(io.StringIO(to_csv([line])))
     assert float(row["place"]) == pytest.approx(0.45)
     assert row["draws"] == "10"

@@ -9,7 +9,6 @@ from types import ModuleType
 import pytest
 
 from campaign.errors import UsageError
-from campaign.report.build import build_report
 from campaign.report.page.templates import Templates
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
@@ -24,11 +23,9 @@ def page(made_up: ModuleType, tmp_path: Path):
         own.mkdir(exist_ok=True)
         for name, text in files.items():
             (own / name.replace("_", ".")).write_text(text, encoding="utf-8")
-        return build_report(
+        return made_up.build(
             made_up.made_up_run(tmp_path, tests={"stabilization": ("5.8",)}),
             tmp_path / "out",
-            experiments=made_up.EXPERIMENTS,
-            packaged_templates=made_up.TEMPLATES,
             templates=own,
         ).path.read_text(encoding="utf-8")
 
@@ -229,12 +226,8 @@ def test_the_manual_has_every_block_file_and_name(
         return fill(self, name, context)
 
     monkeypatch.setattr(Templates, "fill", noting)
-    build_report(
-        made_up.made_up_run(tmp_path, tests={"stabilization": ()}),
-        tmp_path / "out",
-        experiments=made_up.EXPERIMENTS,
-        packaged_templates=made_up.TEMPLATES,
-        trials=(1,),
+    made_up.build(
+        made_up.made_up_run(tmp_path, tests={"stabilization": ()}), tmp_path / "out", trials=(1,)
     )
     report, trial = manual.split("Names of `trial.html`:")
     told = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -29,11 +28,11 @@ from campaign.recording import (
     Recording,
     SafeState,
 )
-from campaign.report.build import Report, build_report
+from campaign.report.build import Report
 from campaign.report.content.settings import point_settings, settings_of, task_settings
 from campaign.report.content.trial_account import _metric, _recorded
 from campaign.report.content.trial_choice import chosen_trials, stretches
-from campaign.report.drawing.label_size import LEGIBLE
+from campaign.report.drawing.drawing_files import LEGIBLE
 from campaign.report.drawing.traces import (
     BOTTOM,
     FONT,
@@ -46,11 +45,12 @@ from campaign.report.drawing.traces import (
     Trace,
     draw_traces,
 )
-from campaign.report.page.trial_links import trial_links
+from campaign.report.page.names import trial_links
 from campaign.report.page.trial_page import charts, legible
 from campaign.report.palette import SERIES
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Task, Trial
+from tests.html_pages import Page
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
 
@@ -122,8 +122,7 @@ def archive(made: Path, tmp_path: Path) -> Path:
 
 
 def report(made_up: ModuleType, run: RunReader, output: Path, wanted: str, **more) -> Report:
-    options = {"experiments": made_up.EXPERIMENTS, "packaged_templates": made_up.TEMPLATES}
-    return build_report(run, output, **(options | more), trials=chosen_trials(run, wanted))
+    return made_up.build(run, output, trials=chosen_trials(run, wanted), **more)
 
 
 def build(made_up: ModuleType, run: RunReader, output: Path, wanted: str, **more) -> Path:
@@ -135,25 +134,9 @@ def folder(made_up: ModuleType, made: Path, tmp_path_factory: pytest.TempPathFac
     return build(made_up, open_run(made), tmp_path_factory.mktemp("pages") / "out", "all")
 
 
-class Page(HTMLParser):
-    """The tags of a page with their attributes, and its words."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(convert_charrefs=True)
-        self.tags: list[tuple[str, dict[str, str]]] = []
-        self.pieces: list[str] = []
-        self.feed(path.read_text(encoding="utf-8"))
-        self.words = " ".join(" ".join(self.pieces).split())
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, {name: value or "" for name, value in attrs}))
-
-    def handle_data(self, data: str) -> None:
-        self.pieces.append(data)
-
-
 def page(folder: Path, number: int) -> Page:
-    return Page(folder / "trials" / f"trial-{number:05d}.html")
+    path = folder / "trials" / f"trial-{number:05d}.html"
+    return Page(path.read_text(encoding="utf-8"))
 
 
 # --- charts ---------------------------------------------------------------------------------
@@ -273,7 +256,7 @@ def test_every_trial_has_its_page_and_each_leads_on(folder: Path) -> None:
         f"trial-0000{n}.html" for n in (1, 2, 3, 4)
     ]
     for number in (1, 2, 3, 4):
-        links = [a["href"] for tag, a in page(folder, number).tags if tag == "a"]
+        links = [a["href"] for tag, a in page(folder, number).elements if tag == "a"]
         assert "../report.html#test-1" in links
         beside = {f"trial-0000{n}.html" for n in (number - 1, number + 1) if 1 <= n <= 4}
         assert {link for link in links if link.startswith("trial-")} == beside
@@ -282,15 +265,15 @@ def test_every_trial_has_its_page_and_each_leads_on(folder: Path) -> None:
 
 def test_a_page_asks_nobody_and_obeys_nothing_in_it(folder: Path) -> None:
     for number in (1, 2, 3, 4):
-        for tag, attributes in page(folder, number).tags:
+        for tag, attributes in page(folder, number).elements:
             assert tag not in ("script", "iframe", "img", "object", "embed")
             assert not any(name.startswith("on") or name == "src" for name in attributes)
-    assert HOSTILE in page(folder, 1).words
+    assert HOSTILE in page(folder, 1).text
     assert "url(" not in (folder / "trials" / "trial-00001.html").read_text()
 
 
 def test_it_says_what_was_set_in_units_people_read(folder: Path) -> None:
-    words = page(folder, 1).words
+    words = page(folder, 1).text
     assert "Shaken axis: compensation none" in words
     assert "command sine of 18 deg/s, 0.24 Hz" in words
     assert "acceleration 18 deg/s²" in words
@@ -302,10 +285,10 @@ def test_it_says_what_was_set_in_units_people_read(folder: Path) -> None:
 
 
 def test_it_says_how_the_trial_ended(folder: Path) -> None:
-    words = page(folder, 2).words
+    words = page(folder, 2).text
     assert f"Outcome limit: current over {HOSTILE}" in words
     assert "Safe state afterwards confirmed" in words
-    lost = page(folder, 3).words
+    lost = page(folder, 3).text
     assert "Fault lost-connection" in lost
     assert "Safe state afterwards not confirmed" in lost
     assert "It recorded no samples." in lost
@@ -314,10 +297,10 @@ def test_it_says_how_the_trial_ended(folder: Path) -> None:
 
 def test_channels_share_a_chart_by_unit(folder: Path) -> None:
     found = page(folder, 1)
-    plots = [a["aria-label"] for tag, a in found.tags if a.get("class") == "plot"]
+    plots = [a["aria-label"] for tag, a in found.elements if a.get("class") == "plot"]
     assert plots == [f"deg/s over time: Rate, Relative rate {HOSTILE}", "N·m over time: Friction"]
-    assert "Friction friction_torque (only a simulator knows it)" in found.words
-    assert "Rate gyro_rate (only" not in found.words
+    assert "Friction friction_torque (only a simulator knows it)" in found.text
+    assert "Rate gyro_rate (only" not in found.text
 
 
 def test_channels_are_drawn_in_the_unit_that_stands_there(folder: Path) -> None:
@@ -327,7 +310,7 @@ def test_channels_are_drawn_in_the_unit_that_stands_there(folder: Path) -> None:
 
 
 def test_windows_and_events_are_told(folder: Path) -> None:
-    words = page(folder, 1).words
+    words = page(folder, 1).text
     assert "Shaded: measured, 4 to 6 s" in words
     assert f"Time (s) Event 5.000 {HOSTILE}" in words or f"Time (s) Event 5 {HOSTILE}" in words
 
@@ -369,13 +352,13 @@ def test_metrics_attempts_and_decisions_are_told(made_up: ModuleType, tmp_path: 
     decided = Decision(at=AT, trial=1, decision="retry", reason="a fault may be once")
     journal = "".join(f"{each.model_dump_json()}\n" for each in (*lines, decided))
     run = replace(run, trials=(first, *run.trials[1:]), journal=journal)
-    words = page(build(made_up, run, tmp_path / "out", "1,2"), 1).words
+    words = page(build(made_up, run, tmp_path / "out", "1,2"), 1).text
     assert "largest error 0.480 ± 0.080 mrad" in words
     assert "coulomb torque 30 N·m read once" in words or "30.00 N·m read once" in words
     assert "top rate 12.0 ± 1.0 deg/s" in words
     assert f"1 {AT} fault the cable confirmed 2 {AT} completed" in words
     assert "retry a fault may be once" in words
-    assert "Attempts" not in page(tmp_path / "out", 2).words
+    assert "Attempts" not in page(tmp_path / "out", 2).text
 
 
 def test_a_damaged_channel_is_named_and_the_others_are_shown(
@@ -383,7 +366,7 @@ def test_a_damaged_channel_is_named_and_the_others_are_shown(
 ) -> None:
     with h5py.File(archive, "r+") as file:
         file["trial_00001/data/gyro_rate"][7] += 1e-9
-    words = page(build(made_up, open_run(archive), tmp_path / "out", "1"), 1).words
+    words = page(build(made_up, open_run(archive), tmp_path / "out", "1"), 1).text
     assert "This trial is damaged" in words
     assert "trial-00001, gyro_rate: " in words
     assert "does not match its checksum" in words
@@ -415,9 +398,9 @@ def test_a_trial_that_cannot_be_read_has_a_page_that_says_so(
     run = open_run(archive)
     assert chosen_trials(run, "failed") == (2, 3, 4)
     found = page(build(made_up, run, tmp_path / "out", "4"), 4)
-    assert "This trial is damaged" in found.words
-    assert "trial-00004: " in found.words
-    assert not [tag for tag, _ in found.tags if tag == "svg"]
+    assert "This trial is damaged" in found.text
+    assert "trial-00004: " in found.text
+    assert not [tag for tag, _ in found.elements if tag == "svg"]
 
 
 def test_a_laboratory_has_its_own_trial_page(
@@ -428,8 +411,8 @@ def test_a_laboratory_has_its_own_trial_page(
     (tmp_path / "own" / "trial.html").write_text(text)
     run = open_run(made)
     found = page(build(made_up, run, tmp_path / "out", "1", templates=tmp_path / "own"), 1)
-    assert "Ask us." in found.words
-    assert "motor: resistance" not in found.words
+    assert "Ask us." in found.text
+    assert "motor: resistance" not in found.text
 
 
 def test_the_command_makes_them(made: Path, tmp_path: Path) -> None:
@@ -597,7 +580,7 @@ def test_a_share_of_the_time_is_told_in_percent() -> None:
 
 
 def test_charts_scroll_rather_than_shrink_their_labels(folder: Path) -> None:
-    sheets = [a for tag, a in page(folder, 1).tags if a.get("class") == "sheet"]
+    sheets = [a for tag, a in page(folder, 1).elements if a.get("class") == "sheet"]
     assert sheets
     for sheet in sheets:
         least = int(re.fullmatch(r"--least: (\d+)px", sheet["style"])[1])
@@ -609,6 +592,6 @@ def test_a_page_says_that_a_window_was_not_reached(made_up, made: Path, tmp_path
     late = (Window("measured", 20.0, 30.0),)
     run = replace(run, trials=tuple(replace(each, windows=late) for each in run.trials))
     first = page(build(made_up, run, tmp_path / "out", "1"), 1)
-    assert "Not reached: measured, 20 to 30 s; the recording ends at 9.99 s." in first.words
-    assert "Shaded:" not in first.words
-    assert not any(a.get("class") == "window" for _, a in first.tags)
+    assert "Not reached: measured, 20 to 30 s; the recording ends at 9.99 s." in first.text
+    assert "Shaded:" not in first.text
+    assert not any(a.get("class") == "window" for _, a in first.elements)

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from campaign.archive import RunHeader, RunStatus, RunWriter
-from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
 from campaign.protocol import as_tree, load_protocol, make_plan
 from campaign.resources import protocols_folder
-from campaign.trial import ChannelInfo, Ending, MemoryRecorder, Trial
+from campaign.trial import ChannelInfo, Trial
+from tests.comparison.laboratory import executed
 
 RAMPS = """
 title = "The platform's breakaway"
@@ -72,7 +72,7 @@ def archived(folder: Path, wanted: Mapping[str, Wanted], text: str = RAMPS) -> d
             trial.model_copy(update={"number": len(numbered) + n})
             for n, trial in enumerate(plan.trials, start=1)
         ]
-    done = _executed(numbered)
+    done = {each.trial.number: each for each in executed(numbered)}
     made, first = {}, 0
     for name, plan in plans.items():
         run = wanted[name]
@@ -94,8 +94,8 @@ def archived(folder: Path, wanted: Mapping[str, Wanted], text: str = RAMPS) -> d
         )
         writer = RunWriter.create(folder / "results", header, plan.trials)
         for place, trial in enumerate(plan.trials):
-            recorder, ending = done[first + place + 1]
-            recording = recorder.recording(ending)
+            simulated = done[first + place + 1]
+            recording = simulated.recording()
             writing = writer.begin(trial)
             infos = [channel.info for channel in recording.channels.values()]
             block = [channel.samples for channel in recording.channels.values()]
@@ -107,24 +107,7 @@ def archived(folder: Path, wanted: Mapping[str, Wanted], text: str = RAMPS) -> d
             writing.append(recording.time, np.stack(block))
             for event in recording.events:
                 writing.event(event)
-            writing.finish(ending, run.at.isoformat(), run.at.isoformat())
+            writing.finish(simulated.ending, run.at.isoformat(), run.at.isoformat())
         first += len(plan.trials)
         made[name] = writer.seal(RunStatus.COMPLETE, "", ended=run.at.isoformat())
     return made
-
-
-def _executed(trials: Sequence[Trial]) -> dict[int, tuple[MemoryRecorder, Ending]]:
-    backend = SimBackend(SimOptions())
-    groups: dict[object, list[Trial]] = {}
-    for trial in trials:
-        groups.setdefault(backend.group(trial), []).append(trial)
-    done = {}
-    for group in groups.values():
-        group.sort(key=lambda trial: trial.task.duration)
-        for first in range(0, len(group), backend.most_together):
-            batch = group[first : first + backend.most_together]
-            recorders = [MemoryRecorder() for _ in batch]
-            flags = [lambda: False] * len(batch)
-            for place, ending in backend.execute_together(batch, recorders, flags):
-                done[batch[place].number] = (recorders[place], ending)
-    return done

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
-from campaign.api.analysis import source_of, title_of
+from campaign.api.analysis import run_title
 from campaign.archive import RunReader
 from campaign.report.latex_text import latex
 
@@ -33,7 +33,7 @@ def citation_of(run: RunReader) -> Citation:
     citation says so: the digest is then of the journal as it stands.
     """
     header = run.header
-    title = title_of(header.title or header.protocol_name or header.name, source_of(run))
+    title = run_title(run)
     day = datetime.fromisoformat(header.created).date()
     program = " ".join(("campaign", header.versions.get("campaign", ""))).strip()
     state = "archive" if run.sealed else "in progress, journal"

@@ -11,9 +11,9 @@ from campaign.api.analysis import (
     AnalysedTest,
     TestAnalysis,
     analyse_run,
+    damage_of,
     published_of,
-    source_of,
-    title_of,
+    run_title,
 )
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.reading.damage import Damage
@@ -63,9 +63,7 @@ class Document:
 
     @property
     def title(self) -> str:
-        header = self.run.header
-        title = header.title or header.protocol_name or header.name
-        return title_of(title, source_of(self.run))
+        return run_title(self.run)
 
     @property
     def command(self) -> str:
@@ -127,9 +125,8 @@ def document_of(
     happened = incidents(run)  # before what is found is waited for
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
-    of_tests = (damage for test in tests for damage in test.damaged)
     _, of_pages = readable(run.path, [t for t in trials if t.trial.number in shown])
-    damaged = tuple(dict.fromkeys((*run.damaged, *of_tests, *happened.damaged, *of_pages)))
+    damaged = tuple(dict.fromkeys((*damage_of(run, tests), *happened.damaged, *of_pages)))
     scoreboard = score(published, [test.evidence() for test in tests])
     truths = {**held_tables(run, tests, published), **truth_tables(run, tests)}
     references = compared_with(run, tests, files)

@@ -39,7 +39,14 @@ def incidents(run: RunReader) -> Incidents:
     told = run.story
     drifts, problems, damaged = drifts_of(run)
     loops, loop_problems = low_margin_table(run)
-    found = [_decisions(told), _steps(told), _attempts(told), _stages(told), _faults(run), loops]
+    found = [
+        _decisions(told),
+        _steps(told),
+        attempts_table(told),
+        _stages(told),
+        _faults(run),
+        loops,
+    ]
     found += [drift_table(drift) for drift in drifts]
     return Incidents(
         tuple(drift_figure(drift) for drift in drifts),
@@ -81,7 +88,8 @@ def _steps(told: Lines) -> Table:
     return Table("operator-steps", "What was done by hand", columns, tuple(rows))
 
 
-def _attempts(told: Lines) -> Table:
+def attempts_table(told: Lines) -> Table:
+    """Every attempt of the trials that took more than one."""
     often = Counter(entry.trial for entry in told.attempts)
     rows: list[dict[str, Value]] = [
         {
@@ -135,7 +143,7 @@ def _faults(run: RunReader) -> Table:
         ending = trial.ending
         if ending.fault is None and not ending.telemetry:
             continue
-        telling = _scalars(ending.telemetry)
+        telling = scalars(ending.telemetry)
         names |= dict.fromkeys(telling)
         fault = ending.fault.value if ending.fault else ""
         rows.append({"trial": trial.trial.number, "fault": fault, "why": ending.reason, **telling})
@@ -153,12 +161,12 @@ def _label(name: str) -> str:
     return name.replace("_", " ").replace(".", ", ")
 
 
-def _scalars(telemetry: Mapping[str, object], prefix: str = "") -> dict[str, Value]:
+def scalars(telemetry: Mapping[str, object], prefix: str = "") -> dict[str, Value]:
     """The numbers, words and truths of nested tables by dotted name; lists are left out."""
     found: dict[str, Value] = {}
     for name, value in telemetry.items():
         if isinstance(value, Mapping):
-            found |= _scalars(value, f"{prefix}{name}.")
+            found |= scalars(value, f"{prefix}{name}.")
         elif value is None or isinstance(value, str | int | float | bool):
             found[prefix + name] = value
     return found

@@ -1,17 +1,19 @@
-"""Scoreboard lines as text."""
+"""The scoreboard as text: its lines, and what it comes to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from campaign.estimate import OF_ONE_TRIAL
-from campaign.published.headline import is_compared
+from campaign.published.headline import LIMITS, Headline, headline, is_compared
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
-from campaign.published.values import Cell, Published
+from campaign.published.values import Cell, Published, heading_of
 from campaign.published.verdicts import GOOD
 from campaign.report.palette import MUTED, STATUS
+from campaign.result import Cell as TableCell
+from campaign.result import Column, Table
 from campaign.text import interval, minus, number, percent, pretty_unit
 
 SIGNS = {
@@ -180,3 +182,77 @@ def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], 
         if line.status is Status.INCONSISTENT:
             found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
     return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())
+
+
+def agreement(scoreboard: Scoreboard) -> str:
+    """What the whole scoreboard comes to, in a few sentences; each published value counts once."""
+    found = headline(scoreboard)
+    if not found.compared:
+        return "No published number was measured in this run."
+    return " ".join(_sentences(found))
+
+
+def closeness(scoreboard: Scoreboard) -> Table | None:
+    """How many published values deviate by how much, by status; None where none is a number."""
+    counts = headline(scoreboard).counts
+    if not any(count.numbers for count in counts):
+        return None
+    limits = tuple(Column(f"within_{n}", f"≤ {n} %", exact=True) for n in LIMITS)
+    columns = (
+        Column("status", "Status"),
+        Column("compared", "Compared", exact=True),
+        Column("reproduced", "Reproduced", exact=True),
+        Column("numbers", "With a deviation", exact=True),
+        *limits,
+    )
+    rows: Iterator[dict[str, TableCell]] = (
+        {
+            "status": str(count.status),
+            "compared": count.compared,
+            "reproduced": count.good,
+            "numbers": count.numbers,
+            **{each.name: n for each, n in zip(limits, count.within, strict=True)},
+        }
+        for count in counts
+    )
+    title = "Deviation from the published values, by status: values within each limit"
+    return Table("closeness", title, columns, tuple(rows))
+
+
+def _cell_in_words(line: Line) -> str:
+    """`Figure 5.14 (stribeck velocity · rank)`."""
+    return f"{heading_of(line.cell.table)} ({cell_name(line.cell)})"
+
+
+def _sentences(found: Headline) -> Iterator[str]:
+    shares = ", ".join(f"{c.status} {c.good} of {c.compared}" for c in found.counts)
+    values = "published value" if found.compared == 1 else "published values"
+    yield f"{found.compared} {values} compared, each counted once, however often it is printed."
+    yield _bridge(found)
+    yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
+    missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
+    if missed:
+        yield f"Claims missed: {missed}."
+    rest = (
+        (len(found.not_reached), "not reached"),
+        (len(found.not_found), "not found"),
+        (len(found.not_run), "not run"),
+    )
+    if any(count for count, _ in rest):
+        counts = ", ".join(f"{count} {what}" for count, what in rest if count)
+        yield f"Besides: {counts}."
+
+
+def _bridge(found: Headline) -> str:
+    """How the numbers that are printed come to those that are compared."""
+    excluded = sum(count for _, count in found.excluded)
+    without = found.printed - found.repeats - excluded - found.compared
+    less = (
+        *([f"{found.repeats} repeat{'s' * (found.repeats > 1)}"] if found.repeats else []),
+        *(f"{count} {status}" for status, count in found.excluded),
+        *([f"{without} without a number to compare"] if without else []),
+    )
+    if not less:
+        return f"That is every one of the {found.printed} printed numbers."
+    listed = " and ".join(filter(None, (", ".join(less[:-1]), less[-1])))
+    return f"Of {found.printed} printed numbers {listed} are left out: {found.compared} are left."

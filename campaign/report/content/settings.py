@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
+from campaign.api.quantity_words import field_quantity
 from campaign.axis_kind import current_sides, each_in_axis_terms, in_axis_terms
 from campaign.channels import COMMAND, UNITS, AxisKind, info
 from campaign.channels import Quantity as PhysicalQuantity
@@ -30,7 +30,7 @@ def settings_of(options: BaseModel, without: Sequence[str] = ()) -> Pairs:
     """
     for name, field in type(options).model_fields.items():
         if name not in without:
-            quantity = _quantity(field)
+            quantity = field_quantity(field)
             told = _told(_words(name), getattr(options, name), quantity and quantity.here)
             yield from told
 
@@ -171,18 +171,5 @@ def _quantity_at(options: Any, path: str) -> Quantity | None:
         return None
     if rest:
         return _quantity_at(getattr(options, name), rest)
-    quantity = _quantity(field)
+    quantity = field_quantity(field)
     return quantity and quantity.of(sides)
-
-
-def _quantity(field: FieldInfo) -> Quantity | None:
-    return next(_quantities((*field.metadata, field.annotation)), None)
-
-
-def _quantities(hints: Sequence[Any]) -> Iterator[Quantity]:
-    """Physical quantities in a field's metadata, or inside a list or an optional type of it."""
-    for hint in hints:
-        if isinstance(hint, Quantity):
-            yield hint
-        else:
-            yield from _quantities((*getattr(hint, "__metadata__", ()), *get_args(hint)))

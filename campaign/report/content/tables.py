@@ -12,11 +12,7 @@ from urllib.parse import quote
 
 from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
-from campaign.published.headline import LIMITS, Headline, headline
-from campaign.published.scoreboard import Line, Scoreboard, place_columns
-from campaign.published.values import heading_of
 from campaign.reason import NONE
-from campaign.report.content.lines import cell_name
 from campaign.result import Cell, Column, Table, Value, bare
 from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
 from campaign.units import convert
@@ -301,113 +297,12 @@ def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
             )
 
 
-def published_csv(lines: Sequence[Line]) -> str:
-    """One published table: every cell with what was reproduced, unrounded, and the reason."""
-    headers = ("row", "column", "unit", "published", "reproduced", "deviation_percent", "status")
-    more = ("reason", "test", "low", "high", "verdict", "source")
-    draws = ("place", "place_low", "place_high", "draws")
-    rows = (
-        (
-            line.cell.row,
-            line.cell.column,
-            line.cell.unit,
-            _exact(line.cell.value),
-            _exact(line.reproduced),
-            _exact(line.deviation),
-            "" if line.status is None else str(line.status),
-            line.cell.reason,
-            line.test,
-            _exact(None if line.found is None else line.found.low),
-            _exact(None if line.found is None else line.found.high),
-            str(line.verdict),
-            line.source,
-            *place_columns(line),
-        )
-        for line in lines
-    )
-    return _csv((*headers, *more, *draws), rows)
-
-
 def data_link(text: str) -> str:
     """A CSV text as a `data:` address, for a download that needs no second file.
 
     As text, not as base64: served compressed, that is two thirds as long.
     """
     return "data:text/csv;charset=utf-8," + quote(text, safe="!$()*+,-./:;=?@_~")
-
-
-def agreement(scoreboard: Scoreboard) -> str:
-    """What the whole scoreboard comes to, in a few sentences; each published value counts once."""
-    found = headline(scoreboard)
-    if not found.compared:
-        return "No published number was measured in this run."
-    return " ".join(_sentences(found))
-
-
-def closeness(scoreboard: Scoreboard) -> Table | None:
-    """How many published values deviate by how much, by status; None where none is a number."""
-    counts = headline(scoreboard).counts
-    if not any(count.numbers for count in counts):
-        return None
-    limits = tuple(Column(f"within_{n}", f"≤ {n} %", exact=True) for n in LIMITS)
-    columns = (
-        Column("status", "Status"),
-        Column("compared", "Compared", exact=True),
-        Column("reproduced", "Reproduced", exact=True),
-        Column("numbers", "With a deviation", exact=True),
-        *limits,
-    )
-    rows: Iterator[dict[str, Cell]] = (
-        {
-            "status": str(count.status),
-            "compared": count.compared,
-            "reproduced": count.good,
-            "numbers": count.numbers,
-            **{each.name: n for each, n in zip(limits, count.within, strict=True)},
-        }
-        for count in counts
-    )
-    title = "Deviation from the published values, by status: values within each limit"
-    return Table("closeness", title, columns, tuple(rows))
-
-
-def _cell_in_words(line: Line) -> str:
-    """`Figure 5.14 (stribeck velocity · rank)`."""
-    return f"{heading_of(line.cell.table)} ({cell_name(line.cell)})"
-
-
-def _sentences(found: Headline) -> Iterator[str]:
-    shares = ", ".join(f"{c.status} {c.good} of {c.compared}" for c in found.counts)
-    values = "published value" if found.compared == 1 else "published values"
-    yield f"{found.compared} {values} compared, each counted once, however often it is printed."
-    yield _bridge(found)
-    yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
-    missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
-    if missed:
-        yield f"Claims missed: {missed}."
-    rest = (
-        (len(found.not_reached), "not reached"),
-        (len(found.not_found), "not found"),
-        (len(found.not_run), "not run"),
-    )
-    if any(count for count, _ in rest):
-        counts = ", ".join(f"{count} {what}" for count, what in rest if count)
-        yield f"Besides: {counts}."
-
-
-def _bridge(found: Headline) -> str:
-    """How the numbers that are printed come to those that are compared."""
-    excluded = sum(count for _, count in found.excluded)
-    without = found.printed - found.repeats - excluded - found.compared
-    less = (
-        *([f"{found.repeats} repeat{'s' * (found.repeats > 1)}"] if found.repeats else []),
-        *(f"{count} {status}" for status, count in found.excluded),
-        *([f"{without} without a number to compare"] if without else []),
-    )
-    if not less:
-        return f"That is every one of the {found.printed} printed numbers."
-    listed = " and ".join(filter(None, (", ".join(less[:-1]), less[-1])))
-    return f"Of {found.printed} printed numbers {listed} are left out: {found.compared} are left."
 
 
 def _unit(column: Column) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from campaign.api.analysis import AnalysedTest
+from campaign.api.quantity_words import plain
 from campaign.archive import ArchivedTrial, RunReader
 from campaign.archive.layout.journal import Decision, OperatorStep
 from campaign.archive.layout.journal_summary import Lines
@@ -19,6 +20,7 @@ from campaign.errors import ArchiveError, CampaignError
 from campaign.estimate import Estimate, Window
 from campaign.experiments.interface import Experiment, bench_of, options_of
 from campaign.recording import Recording
+from campaign.report.content.incidents import attempts_table, scalars
 from campaign.report.content.settings import (
     point_settings,
     settings_of,
@@ -27,7 +29,7 @@ from campaign.report.content.settings import (
 )
 from campaign.result import Column, Table, Value
 from campaign.text import interval, number, pretty_unit
-from campaign.trial import Role, Tree, Trial
+from campaign.trial import Role, Trial
 from campaign.units import convert
 
 SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s", "m/s^2": "mm/s^2"}
@@ -214,7 +216,11 @@ def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[st
             )
         ),
         "Bench": (("name", bench.name), *told) if bench else told,
-        "Work of the backend": tuple(_flat(archived.ending.telemetry)),
+        "Work of the backend": tuple(
+            (name.replace(".", ": ").replace("_", " "), plain(value))
+            for name, value in scalars(archived.ending.telemetry).items()
+            if value not in (None, "")
+        ),
     }
     return {name: pairs for name, pairs in groups.items() if pairs}
 
@@ -231,19 +237,6 @@ def _command(archived: ArchivedTrial) -> Any:
         return next((each for each in archived.channels() if each.name == COMMAND), None)
     except ArchiveError:
         return None
-
-
-def _flat(tree: Tree | Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Nested tables by dotted name; units are in the names."""
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}: ")
-        elif isinstance(value, bool):
-            yield f"{prefix}{name}".replace("_", " "), "yes" if value else "no"
-        elif isinstance(value, int | float):
-            yield f"{prefix}{name}".replace("_", " "), number(value, 6)
-        elif isinstance(value, str) and value:
-            yield f"{prefix}{name}".replace("_", " "), value
 
 
 def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) -> Iterator[Table]:
@@ -266,18 +259,12 @@ def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) 
         (Column("time", "Time", "s", "s", exact=True), Column("text", "Event")),
         tuple({"time": event.time, "text": event.text} for event in events),
     )
-    yield Table(
-        "attempts",
-        "Attempts",
-        (
-            Column("attempt", "Attempt", exact=True),
-            Column("at", "Ended"),
-            Column("outcome", "Outcome"),
-            Column("reason", "Reason"),
-            Column("safe", "Safe state"),
-        ),
-        tuple(_attempts(archived.trial.number, story)),
-        note="The last attempt is the trial; the earlier ones are kept and not analysed.",
+    attempts = attempts_table(story)
+    yield replace(
+        attempts,
+        title="Attempts",
+        columns=tuple(each for each in attempts.columns if each.name != "trial"),
+        rows=tuple(row for row in attempts.rows if row["trial"] == archived.trial.number),
     )
     yield Table(
         "decisions",
@@ -301,18 +288,6 @@ def _metric(found: Estimate) -> Mapping[str, Value]:
         "unit": pretty_unit(unit),
         "reason": str(found.reason),
     }
-
-
-def _attempts(trial: int, story: Lines) -> Iterator[Mapping[str, Value]]:
-    attempts = [each for each in story.attempts if each.trial == trial]
-    for each in attempts if len(attempts) > 1 else ():
-        yield {
-            "attempt": each.attempt,
-            "at": each.at,
-            "outcome": str(each.outcome),
-            "reason": each.reason,
-            "safe": str(each.safe_state),
-        }
 
 
 def _decisions(trial: int, story: Lines) -> Iterator[Mapping[str, Value]]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,26 +13,17 @@ from campaign.physics.complete import CompleteBench
 from campaign.physics.linear_friction import REGIMES, NoLoopError, Regime
 from campaign.physics.loop_margins import LoopMargins, Response, frequency_grid, margins_of
 from campaign.physics.open_loop import open_loop
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
-from campaign.report.palette import INK, MUTED, PAPER, Look, looks
+from campaign.report.drawing.drawing_files import DrawingFiles
+from campaign.report.drawing.figures import draw, draw_sheet
+from campaign.report.palette import PAPER
+from campaign.result import Axis, Curve, Figure, Mark, Panel
 from campaign.signals import Array
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
-
-HEIGHT = 5.0
-"""Inches."""
 TWO_PI = 2.0 * np.pi
 POINTS = 1500
-DEEPEST = -70.0
-"""dB; below, nothing of a loop matters."""
-HIGHEST = 60.0
-"""dB; above, it is only an integrator."""
-
-
-SHORT_PHASE, SHORT_GAIN = 40.0, 12.0
-"""deg and dB; a shorter arrow has its label below, where a falling curve leaves room."""
+DEEPEST, HIGHEST = -70.0, 60.0
+"""dB; below, nothing of a loop matters; above, it is only an integrator."""
+FREQUENCY = Axis("Frequency", "Hz", scale="log")
 
 
 @dataclass(frozen=True)
@@ -75,18 +65,50 @@ def traces_of(bench: CompleteBench, names: Sequence[str]) -> dict[Regime, list[T
 
 def bode_svg(bench: CompleteBench, names: Sequence[str]) -> str:
     """The picture as a complete SVG document for white paper."""
-    with canvas(WIDTH, HEIGHT) as sheet:
-        _draw(sheet, bench, traces_of(bench, names))
-        return to_svg(sheet)
+    return DrawingFiles.of(draw(bode_figure(bench, names))).svg
 
 
 def bode_png(bench: CompleteBench, names: Sequence[str]) -> bytes:
     """The picture as a PNG on white."""
-    with canvas(WIDTH, HEIGHT) as sheet:
-        _draw(sheet, bench, traces_of(bench, names))
-        out = io.BytesIO()
-        sheet.savefig(out, format="png", transparent=False, facecolor=PAPER.light)
-        return out.getvalue()
+    out = io.BytesIO()
+    sheet = draw_sheet(bode_figure(bench, names))
+    sheet.savefig(out, format="png", dpi=200, facecolor=PAPER.light)
+    return out.getvalue()
+
+
+def bode_figure(bench: CompleteBench, names: Sequence[str]) -> Figure:
+    """Magnitude above, phase below, a column per regime; margins of the least stable loop."""
+    traces = traces_of(bench, names)
+    levels = [trace.level for shown in traces.values() for trace in shown] or [np.zeros(1)]
+    lowest, highest = float(np.min(np.hstack(levels))), float(np.max(np.hstack(levels)))
+    limits = max(DEEPEST, lowest - 5.0), max(10.0, min(HIGHEST, highest))
+    above, below = [], []
+    for regime, shown in traces.items():
+        worst = min(shown, key=lambda trace: trace.margins.tightness)
+        gain, phase = _margins(worst) if worst.margins.stable else ((), ())
+        state = "least margin" if worst.margins.stable else "UNSTABLE"
+        title = f"{bench.name}, {regime}: {state} with {worst.compensation}"
+        above.append(
+            Panel(
+                FREQUENCY,
+                Axis("Magnitude of L", "dB", limits=limits),
+                tuple(_curve(trace, trace.level) for trace in shown),
+                title,
+                (Mark("", y=0.0), *gain),
+            )
+        )
+        below.append(
+            Panel(
+                FREQUENCY,
+                Axis("Phase of L", "deg"),
+                tuple(_curve(trace, trace.phase) for trace in shown),
+                f"Phase, {regime}",
+                (Mark("", y=-180.0), *phase),
+            )
+        )
+    title = f"Rate loop of {bench.name}, opened at the rate error"
+    panels, across = (*above, *below), max(1, len(traces))
+    return Figure("bode", title, title, title, panels, across=across, one_scale=True)
 
 
 def _range(loops: Sequence[LoopMargins]) -> tuple[float, float]:
@@ -107,122 +129,25 @@ def _trace(name: str, omega: Array, response: Response, margins: LoopMargins) ->
     return Trace(name, omega / TWO_PI, 20.0 * np.log10(np.abs(value)), phase, margins)
 
 
-def _draw(sheet: Canvas, bench: CompleteBench, traces: Mapping[Regime, Sequence[Trace]]) -> None:
-    """Magnitude above, phase below, a column per regime."""
-    heading = f"Rate loop of {bench.name}, opened at the rate error"
-    sheet.suptitle(heading, x=0.008, ha="left", fontsize=10, weight="bold")
-    axes = sheet.subplots(2, max(1, len(traces)), sharex=True, sharey="row", squeeze=False)
-    chosen = looks(
-        name
-        for name in ("none", *bench.compensation)
-        if any(name == trace.compensation for shown in traces.values() for trace in shown)
-    )
-    for name, look in chosen.items():  # the legend, in this order, whatever is drawn first
-        axes[0, 0].plot([], [], label=name, **_line(look))
-    for column, (regime, shown) in enumerate(traces.items()):
-        _draw_regime(axes[0, column], axes[1, column], regime, shown, chosen)
-    levels = [level for shown in traces.values() for trace in shown for level in trace.level]
-    lowest, highest = min(levels, default=0.0), max(levels, default=0.0)
-    axes[0, 0].set_ylim(max(DEEPEST, lowest - 5.0), max(10.0, min(HIGHEST, highest)))
-    axes[0, 0].set_ylabel("Magnitude of L (dB)")
-    axes[1, 0].set_ylabel("Phase of L (deg)")
-    for ax in axes[1]:
-        ax.set_xlabel("Frequency (Hz)")
-    sheet.legend(loc="outside lower left", ncols=min(6, max(1, len(chosen))), borderpad=0)
+def _curve(trace: Trace, values: Array) -> Curve:
+    return Curve(trace.frequency, values, trace.compensation, trace.compensation)
 
 
-def _draw_regime(
-    above: Axes, below: Axes, regime: Regime, shown: Sequence[Trace], chosen: Mapping[str, Look]
-) -> None:
-    from matplotlib.ticker import FuncFormatter, MultipleLocator
-
-    for trace in shown:
-        line = _line(chosen[trace.compensation])
-        above.plot(trace.frequency, trace.level, **line)
-        below.plot(trace.frequency, trace.phase, **line)
-    level: dict[str, Any] = {"color": INK.light, "linewidth": 0.7, "zorder": 1.4}
-    above.axhline(0.0, **level)
-    below.axhline(-180.0, **level)
-    above.set_xscale("log")
-    above.xaxis.set_major_formatter(FuncFormatter(lambda hertz, _: f"{hertz:g}"))
-    below.yaxis.set_major_locator(MultipleLocator(45.0))
-    worst = min(shown, key=lambda trace: trace.margins.tightness)
-    above.set_title(f"{regime.capitalize()}: {_verdict(worst)}")
-    if worst.margins.stable:
-        _draw_margins(above, below, worst, chosen[worst.compensation])
-
-
-def _line(look: Look) -> dict[str, Any]:
-    if not look.dash:
-        return {"color": look.light, "linewidth": 1.3}
-    # Above the solid lines, which then show through the gaps.
-    return {"color": look.light, "linewidth": 1.3, "dashes": look.dash, "zorder": 2.1}
-
-
-def _verdict(trace: Trace) -> str:
-    """The least margin in few words; its place is drawn."""
-    state = "least margin" if trace.margins.stable else "UNSTABLE"
-    return f"{state} with {trace.compensation}"
-
-
-def _draw_margins(above: Axes, below: Axes, trace: Trace, look: Look) -> None:
-    """Crossover and phase margin, and the gain margin where there is one."""
-    margins = trace.margins
-    guide: dict[str, Any] = {
-        "color": MUTED.light,
-        "linewidth": 0.7,
-        "dashes": (3, 2),
-        "zorder": 1.5,
-    }
+def _margins(trace: Trace) -> tuple[list[Mark], list[Mark]]:
+    """Marks of crossover, phase and gain margin: on the magnitude, and on the phase."""
+    margins, own = trace.margins, trace.compensation
+    above: list[Mark] = []
+    below: list[Mark] = []
     if margins.crossover is not None and margins.phase_margin is not None:
         at = margins.crossover / TWO_PI
-        for ax in (above, below):
-            ax.axvline(at, **guide)
         phase = float(np.interp(at, trace.frequency, trace.phase))
-        above.plot([at], [0.0], marker="o", markersize=4.5, color=look.light, zorder=3)
-        _arrow(below, (at, -180.0), (at, phase))
-        text = f"{math.degrees(margins.phase_margin):.0f}°\n{at:.3g} Hz"
-        middle = -180.0 + 0.45 * (phase + 180.0)
-        side = _free_side(trace.frequency, trace.phase, at, middle)
-        _label(below, text, (at, middle), side if phase + 180.0 > SHORT_PHASE else "below")
+        above += [Mark("", x=at), Mark("", x=at, y=0.0, point=True, series=own)]
+        below += [Mark(f"{math.degrees(margins.phase_margin):.0f}° at {at:.3g} Hz", x=at)]
+        below += [Mark("", x=at, y=phase, point=True, series=own)]
     if margins.gain_crossing is not None and margins.gain_margin_db is not None:
         at, decibel = margins.gain_crossing / TWO_PI, margins.gain_margin_db
         if trace.frequency[0] <= at <= trace.frequency[-1]:
-            for ax in (above, below):
-                ax.axvline(at, **guide)
-            below.plot([at], [-180.0], marker="o", markersize=4.5, color=look.light, zorder=3)
-            _arrow(above, (at, -decibel), (at, 0.0))
-            middle = -0.25 * decibel
-            side = _free_side(trace.frequency, trace.level, at, middle)
-            text = f"{decibel:.1f} dB\n{at:.3g} Hz"
-            _label(above, text, (at, middle), side if decibel > SHORT_GAIN else "below")
-
-
-def _free_side(frequency: Array, value: Array, at: float, middle: float) -> str:
-    """On which side of `at` the curve leaves more room around `middle`."""
-    places = at * np.array([0.25, 0.4, 0.65, 1.5, 2.5, 4.0])
-    room = np.abs(np.interp(places, frequency, value) - middle)
-    outside = places > frequency[-1]
-    room[outside] = 0.0
-    return "right" if np.min(room[3:]) > np.min(room[:3]) else "left"
-
-
-def _arrow(ax: Axes, begin: tuple[float, float], end: tuple[float, float]) -> None:
-    style = {"arrowstyle": "<->", "color": INK.light, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-    ax.annotate("", end, begin, arrowprops=style, zorder=3)
-
-
-def _label(ax: Axes, text: str, at: tuple[float, float], side: str) -> None:
-    """Beside an arrow, or below and left of it, on paper of its own that hides no curve."""
-    right = side == "right"
-    ax.annotate(
-        text,
-        at,
-        xytext=(6 if right else -6, -20 if side == "below" else 0),
-        textcoords="offset points",
-        ha="left" if right else "right",
-        va="center",
-        fontsize=8,
-        bbox={"facecolor": PAPER.light, "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
-        zorder=1.8,  # over the grid, under the curves
-    )
+            above += [Mark(f"{decibel:.1f} dB at {at:.3g} Hz", x=at)]
+            above += [Mark("", x=at, y=-decibel, point=True, series=own)]
+            below += [Mark("", x=at), Mark("", x=at, y=-180.0, point=True, series=own)]
+    return above, below

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from campaign.references.verdict import JudgedNumber, Verdict
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
-from campaign.report.palette import HAIRLINE, INK, MUTED, OTHERS, PAPER
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
+from campaign.report.drawing.rows import LEFT, set_rows, signed_decades, word, zero_line
+from campaign.report.palette import INK, MUTED, OTHERS, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +21,6 @@ LINEAR = 10.0
 """Percent up to which an axis of changes is linear where some are far larger."""
 FAR = 60.0
 """Percent beyond which changes count as far larger."""
-LABEL = 58
-"""Letters of a row's name."""
 
 
 def with_change(pairs: Sequence[tuple[JudgedNumber, str]]) -> list[tuple[JudgedNumber, str]]:
@@ -42,34 +41,21 @@ def draw_changes(shown: Sequence[tuple[JudgedNumber, str]]) -> str:
         limit = _limit([pair for pair, _ in shown])
         for row, (pair, name) in enumerate(shown):
             _draw_change(ax, pair, row, limit)
-            name_row(ax, row, name, bold=pair.verdict is Verdict.DIFFERENT)
+            name_row(ax, row, name, pair)
         if limit > FAR:
-            ax.set_xscale("symlog", linthresh=LINEAR, linscale=1.0)
-            _ticks(ax, limit)
-        ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
+            signed_decades(ax, limit, LINEAR, 1.0, "{:g}".format)
+        zero_line(ax)
         ax.set_xlim(-limit, limit)
-        rows(ax, len(shown))
+        set_rows(ax, (len(shown) - 0.4, -0.6), len(shown) - 1)
         ax.set_xlabel("Change, in percent of the reference")
         return to_svg(sheet)
 
 
-def name_row(ax: Axes, row: int, name: str, *, bold: bool) -> None:
-    """Its name, left of the axes."""
-    text: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "center"}
-    short = name if len(name) <= LABEL else f"{name[: LABEL - 1]}…"
-    colour = INK.light if bold else MUTED.light
-    weight = "bold" if bold else "normal"
-    ax.text(-0.015, row, short, fontsize=7.5, color=colour, weight=weight, **text)
-
-
-def rows(ax: Axes, count: int) -> None:
-    """Rows from top to bottom, with a line between each two."""
-    ax.set_ylim(count - 0.4, -0.6)
-    ax.yaxis.set_visible(False)
-    ax.spines["left"].set_visible(False)
-    ax.grid(axis="y", visible=False)
-    for row in range(count - 1):
-        ax.axhline(row + 0.5, color=HAIRLINE.light, linewidth=0.4, zorder=0)
+def name_row(ax: Axes, row: int, name: str, pair: JudgedNumber) -> None:
+    """Its name, left of the axes; bold where a difference was declared."""
+    declared = pair.verdict is Verdict.DIFFERENT
+    weight = "bold" if declared else "normal"
+    word(ax, LEFT, row, name, INK if declared else MUTED, weight=weight)
 
 
 def _limit(pairs: Sequence[JudgedNumber]) -> float:
@@ -103,12 +89,3 @@ def _draw_change(ax: Axes, pair: JudgedNumber, row: int, limit: float) -> None:
         markerfacecolor=face,
         markeredgewidth=1.0,
     )
-
-
-def _ticks(ax: Axes, limit: float) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    sizes = [10.0**n for n in range(1, 9) if 10.0**n <= limit]
-    ax.xaxis.set_major_locator(FixedLocator([*(-s for s in reversed(sizes)), 0.0, *sizes]))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda t, _: f"{t:g}".replace("-", "−")))

@@ -5,10 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.result import Figure
+
 Array = NDArray[np.float64]
 
 POINTS = 3000
 """Most points of a drawn line: about four per pixel column of a page."""
+FIGURE_POINTS = 40_000
+"""Most points of a figure's lines together; many curves share them."""
+
+
+def points_of_each(figure: Figure) -> int:
+    """Most points of each line of a figure; many lines share what a drawing can carry."""
+    total = sum(len(panel.curves) for panel in figure.panels)
+    return max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
 
 
 def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:

@@ -10,8 +10,7 @@ from itertools import repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.report.drawing.decimate import POINTS, decimate
-from campaign.report.drawing.figures import FIGURE_POINTS
+from campaign.report.drawing.decimate import decimate, points_of_each
 from campaign.result import Axis, Curve, Figure, Panel
 from campaign.units import convert
 
@@ -47,12 +46,6 @@ def _quoted(*cells: str) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return text.getvalue()
-
-
-def points_of_each(figure: Figure) -> int:
-    """Most points of each line of a figure; many lines share what a drawing can carry."""
-    total = sum(len(panel.curves) for panel in figure.panels)
-    return max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
 
 
 def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[str]:

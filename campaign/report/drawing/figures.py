@@ -1,26 +1,19 @@
-"""Drawing `result.Figure` as reproducible SVG.
-
-Text stays text and takes the page's font. Colours are written so that the page can exchange them
-for its dark ones; a file on its own is for white paper.
-"""
+"""Drawing `result.Figure`: panels on a sheet, and how large they are."""
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.report.drawing.cached_axes import settled
+from campaign.report.drawing.canvas import TITLE, TITLE_PAD, WIDTH, canvas, place_axes, to_svg
 from campaign.report.drawing.curves import (
     draw_bar,
     draw_bounds,
@@ -35,28 +28,23 @@ from campaign.report.drawing.curves import (
     series_name,
     spare_rounding_errors,
 )
-from campaign.report.drawing.decimate import POINTS
+from campaign.report.drawing.decimate import points_of_each
 from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import PanelMarks, draw_marks, place_labels
-from campaign.report.drawing.math_type import in_svg
-from campaign.report.drawing.pdf import keep_as_pdf
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
 from campaign.report.drawing.ticks import decade_letters, set_ticks
-from campaign.report.palette import HAIRLINE, INK, MUTED, Look, looks, variables
+from campaign.report.palette import MUTED, Look, looks
 from campaign.result import Axis, Figure, Panel
 from campaign.text import pretty_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_svg import RendererSVG
     from matplotlib.figure import Figure as Canvas
 
 Array = NDArray[np.float64]
 
-WIDTH = 180.0 / 25.4
-"""Inches: the width of both columns of a journal."""
 SINGLE = 88.0 / 25.4
-"""Inches: that of one."""
+"""Inches: the width of one column of a journal."""
 TALLEST = 230.0 / 25.4
 """That of a page of a journal, less a caption: rows of panels share it."""
 LOWEST = 1.4
@@ -65,64 +53,18 @@ LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
 """Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
 LINE, GAP = 14.0, 8.0
 """... and across it; and between a number and the next."""
-SHORTEST, TITLE, SMALL_TITLE = 12, 9.0, 7.0
-"""Letters that a line of a title has at least; its points, and those where a word has no room."""
+SHORTEST, SMALL_TITLE = 12, 7.0
+"""Letters that a line of a title has at least; its points where a word has no room."""
 NAME, AROUND = 0.134, 0.7
 """Inches of a named place along y, and of the title and labels above and below all of them."""
 LOW = 2.0
 """Inches of a row whose panels have nothing but named places along x."""
 Column = Literal["single", "double"]
 _column: ContextVar[Column] = ContextVar("_column", default="double")
-FIGURE_POINTS = 40_000
-"""Most points of a figure's lines together; many curves share them."""
-TITLE_PAD = 7.0
-"""Points between the axes and their title."""
 BESIDE = 0.05
 """Share of its width that a panel of named places is wider on either side: signs are whole."""
 ROOM = 0.14
 """Share of its height that a panel is higher on either side, for the labels of points in it."""
-
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "campaign",
-    "pdf.fonttype": 42,  # journals refuse Type 3
-    "font.family": ["DejaVu Sans"],
-    "font.size": 8.5,
-    "text.parse_math": False,  # a label is a name, whatever signs are in it
-    "axes.titlesize": TITLE,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.titlepad": TITLE_PAD,
-    "axes.labelsize": 8.5,
-    "axes.labelcolor": INK.light,
-    "axes.edgecolor": MUTED.light,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-5, 6),
-    "axes.xmargin": 0.02,
-    "grid.color": HAIRLINE.light,
-    "grid.linewidth": 0.6,
-    "xtick.color": MUTED.light,
-    "ytick.color": MUTED.light,
-    "xtick.labelcolor": INK.light,
-    "ytick.labelcolor": INK.light,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "text.color": INK.light,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "legend.handlelength": 2.6,
-    "lines.linewidth": 1.4,
-    "lines.scale_dashes": True,
-    "axes.titley": 1.0,  # not to be searched for, which takes as long as drawing
-    "savefig.transparent": True,
-    "savefig.dpi": 200,
-}
-METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
 def draw(
@@ -146,7 +88,7 @@ def draw_sheet(
 ) -> Canvas:
     """The same as a matplotlib figure, laid out; whatever style holds later, it stays as it is."""
     with _drawn(figure, published, chosen) as sheet:
-        _place(sheet)
+        place_axes(sheet)
         sheet.draw_without_rendering()  # ticks are made when they are drawn, in the style of then
         return sheet
 
@@ -163,8 +105,7 @@ def _drawn(
         across = _across(figure)
         down = -(-len(figure.panels) // across)
         axes = sheet.subplots(down, across, squeeze=False).ravel()
-        total = sum(len(panel.curves) for panel in figure.panels)
-        points = max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
+        points = points_of_each(figure)
         wide, high = _room(figure)
         letters, mpl.rcParams["axes.titlesize"] = _title_type(figure, wide)
         sets = []
@@ -195,104 +136,6 @@ def series_of(figure: Figure) -> list[str]:
     curves = [series_name(curve) for panel in figure.panels for curve in panel.curves]
     marks = [mark.series for panel in figure.panels for mark in panel.marks if mark.series]
     return [*curves, *marks]
-
-
-@contextmanager
-def style() -> Iterator[None]:
-    """Within the block matplotlib draws as the report does, whatever the user's style is."""
-    import matplotlib as mpl
-
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        yield
-
-
-@contextmanager
-def canvas(width: float, height: float) -> Iterator[Canvas]:
-    """An empty matplotlib figure (inches) under the report's own style."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    from campaign.report.drawing.margins import Margins
-    from campaign.report.drawing.sheet import Sheet
-
-    with style():
-        sheet = Sheet(figsize=(width, height), dpi=72)  # as an SVG document is drawn
-        FigureCanvasSVG(sheet).get_renderer = _measuring  # type: ignore[attr-defined]
-        sheet.set_layout_engine(Margins())
-        yield sheet
-
-
-@cache
-def _measuring() -> RendererSVG:
-    """What measures the texts of all sheets, and so remembers those that many have.
-
-    Without one, each question would begin a document anew. Its size means nothing to a text's.
-    """
-    from matplotlib.backends.backend_svg import RendererSVG
-
-    return RendererSVG(72.0, 72.0, io.StringIO(), image_dpi=72)  # type: ignore[no-untyped-call]
-
-
-def to_svg(sheet: Canvas) -> str:
-    """The SVG document of a canvas, with nothing in it that changes from run to run.
-
-    Coordinates are cut to a hundredth of a point; `slim` rounds those of curves further.
-    """
-    _place(sheet)
-    out = io.StringIO()
-    with settled(sheet.axes):
-        sheet.savefig(out, format="svg", metadata=METADATA)
-    keep_as_pdf(sheet)
-    text = re.sub(r"[ \t]+$", "", out.getvalue(), flags=re.MULTILINE)
-    text = re.sub(r'\b(d|x|y|points)="[^"]*"', lambda found: _DIGITS.sub(r"\1", found[0]), text)
-    return in_svg(_SIGNS.sub(_styled_once, text))
-
-
-def _place(sheet: Canvas) -> None:
-    """Place the axes for good: saving would draw all in vain, to have the layout computed.
-
-    Even with "none", which leaves a placeholder; only the default can be no engine at all.
-    """
-    engine = sheet.get_layout_engine()
-    if engine is not None:
-        engine.execute(sheet)
-        sheet.set_layout_engine(None)
-
-
-_DIGITS = re.compile(r"(\d\.\d\d)\d+")
-_SIGNS = re.compile(r'<g clip-path="([^"]*)">\s*((?:<use [^>]*/>\s*)+)</g>')
-_LOOK = re.compile(r' style="([^"]*)"')
-
-
-def _styled_once(group: re.Match[str]) -> str:
-    """The signs of one series with the style that all of them have told once."""
-    styles = set(_LOOK.findall(group[2]))
-    if len(styles) != 1:
-        return group[0]
-    signs = _LOOK.sub("", group[2])
-    return f'<g clip-path="{group[1]}" style="{styles.pop()}">\n{signs}</g>'
-
-
-def inline(svg: str, prefix: str, title: str, alt: str) -> str:
-    """The SVG for the middle of a page: own ids, the page's colours, and words for who cannot see.
-
-    `prefix` must be unique on the page and safe in an id.
-    """
-    from markupsafe import escape
-
-    body = svg[svg.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{prefix}-', body)
-    body = body.replace('href="#', f'href="#{prefix}-').replace("url(#", f"url(#{prefix}-")
-    body = _with_variables(body)
-    head = (
-        f'<svg role="img" aria-labelledby="{prefix}-title {prefix}-alt" class="plot"'
-        f" {_view_box(body)} >"
-        f'<title id="{prefix}-title">{escape(title)}</title>'
-        f'<desc id="{prefix}-alt">{escape(alt)}</desc>'
-    )
-    return head + body[body.index(">") + 1 :]
 
 
 def _titles_say_it(figure: Figure) -> bool:
@@ -483,19 +326,3 @@ def axis_label(axis: Axis) -> str:
     if unit and axis.label.endswith(")"):
         return f"{axis.label[:-1]}, {pretty_unit(unit)})"
     return f"{axis.label} ({pretty_unit(unit)})" if unit else axis.label
-
-
-def _with_variables(svg: str) -> str:
-    """Every palette colour as a CSS variable with itself as the fallback."""
-    by_colour: dict[str, str] = {}
-    for name, (light, _) in variables().items():
-        by_colour.setdefault(light, name)
-    pattern = "|".join(re.escape(colour) for colour in sorted(by_colour))
-    return re.sub(
-        rf"(?<=[ :])({pattern})(?=[;\"])", lambda m: f"var(--{by_colour[m[1]]}, {m[1]})", svg
-    )
-
-
-def _view_box(svg: str) -> str:
-    found = re.search(r'viewBox="[-0-9. ]+"', svg[: svg.index(">")])
-    return found[0] if found else ""

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
-    from campaign.report.drawing.margins import Margins
-
 SIZE = 8.0
 """Points: the smallest text of a figure."""
 ROW = 10.5
@@ -155,31 +153,21 @@ def _text(
 
 def place_labels(sheet: Canvas, panels: Sequence[PanelMarks]) -> None:
     """Give every label its place, and make room for those outside of their axes."""
-    from campaign.report.drawing.margins import Margins
-
-    if not any(each.above or each.beside or each.points for each in panels):
+    margins = sheet.get_layout_engine()
+    if not any(each.above or each.beside or each.points for each in panels) or margins is None:
         return
-    margins = Margins()
     margins.execute(sheet)
     for each in panels:
         _stack_above(sheet, each)
-    _lay_out(sheet, margins, [each.ax for each in panels if each.above])
-    outside = [each.ax for each in panels if _place_points(sheet, each)]
+    margins.execute(sheet)
+    outside = [each for each in panels if _place_points(sheet, each)]
     if outside:
-        _lay_out(sheet, margins, outside)  # axes have given way to labels in the margin
+        margins.execute(sheet)  # axes have given way to labels in the margin
         for each in panels:
             _place_points(sheet, each)
     for each in panels:
         _spread_beside(sheet, each)
     sheet.set_layout_engine("none")  # what was placed stays where it is
-
-
-def _lay_out(sheet: Canvas, margins: Margins, changed: Sequence[Axes]) -> None:
-    """Make room once more, where the labels of some axes have changed."""
-    for ax in changed:
-        margins.forget(ax)
-    if changed:
-        margins.execute(sheet)
 
 
 def _extent(text: Annotation) -> Bbox:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import escape
@@ -19,7 +19,15 @@ from markupsafe import escape
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import cell_name, shown_line
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
+from campaign.report.drawing.rows import (
+    LEFT,
+    RIGHT,
+    set_rows,
+    signed_decades,
+    word,
+    zero_line,
+)
 from campaign.report.palette import HAIRLINE, INK, MUTED, STATUS, Look
 from campaign.text import percent
 
@@ -41,6 +49,8 @@ LINEAR = 1.0
 """Percent up to which the deviation axis is linear; beyond, it is logarithmic."""
 SMALL = 6.3
 """Points, of the smallest words: 9.7 pixels on a page that shows it 768 pixels wide."""
+WORD = 0.06
+"""Inches from the axes to the middle of a word above them."""
 SHORT = 30
 """Characters that the name of the farthest cell may have."""
 SIGN = 4.2
@@ -107,7 +117,7 @@ def _draw_cells(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
     size = min(7.5, 54.0 * pitch)
     y = 0.0
     for row in rows:
-        _word(ax, -0.015, y + 0.4 * gap, row.name, "right", INK, size=8.0, weight="bold")
+        word(ax, LEFT, y + 0.4 * gap, row.name, INK, 8.0, weight="bold")
         ax.axhline(y, color=HAIRLINE.light, linewidth=0.6, zorder=0)
         y += gap
         for line in row.lines:
@@ -117,22 +127,16 @@ def _draw_cells(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
                 ends, [y + 0.3] * 2, color=look.light, linewidth=1.0, alpha=0.55, gid=_gid(line)
             )
             _sign(ax, line, y + 0.3, 5.0)
-            _word(ax, -0.015, y + 0.3, cell_name(line.cell), "right", MUTED, size=size)
+            word(ax, LEFT, y + 0.3, cell_name(line.cell), MUTED, size)
             y += 1.0
-    ax.set_ylim(y, 0.0)
+    set_rows(ax, (y, 0.0))
 
 
 def _draw_tables(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
     """A row for each table: its cells side by side, the farthest by name; `pitch` in inches."""
-    ax.set_ylim(len(rows) - 0.5, -0.5)
-    above: dict[str, Any] = {
-        "fontsize": SMALL,
-        "color": MUTED.light,
-        "va": "bottom",
-        "transform": ax.transAxes,
-    }
-    ax.text(-0.015, 1.0, "table (cells)", ha="right", **above)
-    ax.text(1.015, 1.0, "its farthest cell", ha="left", **above)
+    set_rows(ax, (len(rows) - 0.5, -0.5))
+    word(ax, LEFT, -0.5 - WORD / pitch, "table (cells)", MUTED, SMALL)
+    word(ax, RIGHT, -0.5 - WORD / pitch, "its farthest cell", MUTED, SMALL)
     # Signs that would cover each other go to lanes of their own, as many as the row is high.
     lanes = max(1, int(72.0 * pitch / (SIGN + 0.8)))
     for y, row in enumerate(rows):
@@ -141,8 +145,8 @@ def _draw_tables(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
             _sign(ax, line, y + 0.86 * lane / lanes, SIGN)
         count = len(row.lines)
         name = f"{row.name} ({count})" if count > 1 else row.name
-        _word(ax, -0.015, y, name, "right", INK)
-        _word(ax, 1.015, y, _told(row.farthest), "left", _look(row.farthest))
+        word(ax, LEFT, y, name, INK, SMALL)
+        word(ax, RIGHT, y, _told(row.farthest), _look(row.farthest), SMALL)
 
 
 def _lanes(ax: Axes, lines: Sequence[Line], lanes: int) -> list[int]:
@@ -186,21 +190,6 @@ def _sign(ax: Axes, line: Line, y: float, size: float) -> None:
     )
 
 
-def _word(
-    ax: Axes, x: float, y: float, text: str, side: str, look: Look, size: float = SMALL, **more: Any
-) -> None:
-    """A word beside the axes, x in shares of their width."""
-    along = ax.get_yaxis_transform()
-    style: dict[str, Any] = {
-        "fontsize": size,
-        "color": look.light,
-        "ha": side,
-        "va": "center",
-        "clip_on": False,
-    }
-    ax.text(x, y, text, transform=along, **style, **more)
-
-
 def _look(line: Line) -> Look:
     return STATUS[line.status or Status.SIMULATED]
 
@@ -230,24 +219,12 @@ def _tooltip(line: Line) -> str:
 
 
 def _draw_axis(ax: Axes, lines: Sequence[Line]) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
     largest = max(abs(line.deviation or 0.0) for line in lines)
-    powers = [10.0**n for n in range(9) if 10.0**n <= 3 * max(largest, 10.0)]
-    ax.set_xscale("symlog", linthresh=LINEAR, linscale=0.6)
     limit = max(1.3 * largest, 15.0)
+    signed_decades(ax, limit, LINEAR, 0.6, lambda tick: f"{tick:+g} %" if tick else "0")
     ax.set_xlim(-limit, limit)
-    ticks = [t for t in [*(-p for p in reversed(powers)), 0.0, *powers] if abs(t) <= limit]
-    ax.xaxis.set_major_locator(FixedLocator(ticks))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.xaxis.set_major_formatter(
-        FuncFormatter(lambda t, _: f"{t:+g} %".replace("-", "−") if t else "0")
-    )
     ax.set_xlabel("Deviation of the reproduced from the published value")
-    ax.yaxis.set_visible(False)
-    ax.spines["left"].set_visible(False)
-    ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
-    ax.grid(axis="y", visible=False)
+    zero_line(ax)
 
 
 def _draw_legend(ax: Axes, lines: Sequence[Line]) -> None:

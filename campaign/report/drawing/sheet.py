@@ -19,7 +19,7 @@ class Sheet(Figure):
 
     def _repr_svg_(self) -> str:
         """In a notebook: the drawing, with the bytes of the report's file."""
-        from campaign.report.drawing.figures import style, to_svg
+        from campaign.report.drawing.canvas import style, to_svg
         from campaign.report.drawing.slim_svg import slim
 
         with style():

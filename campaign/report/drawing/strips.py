@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from campaign.published.scoreboard import Line, Scoreboard
 from campaign.published.status import Status
 from campaign.report.content.lines import cell_name
-from campaign.report.drawing.figures import WIDTH, canvas, to_svg
+from campaign.report.drawing.canvas import WIDTH, canvas, to_svg
+from campaign.report.drawing.rows import LEFT, RIGHT, set_rows, word, zero_line
 from campaign.report.palette import INK, MUTED, STATUS
 from campaign.text import number
 
@@ -31,12 +32,9 @@ def draw_strips(scoreboard: Scoreboard) -> str | None:
         ax = sheet.subplots()
         for row, line in enumerate(lines):
             _draw_strip(ax, line, row)
-        ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
-        ax.set_ylim(len(lines) - 0.4, -0.6)
+        zero_line(ax)
+        set_rows(ax, (len(lines) - 0.4, -0.6))
         ax.set_xlabel("Draws, in percent from the published value")
-        ax.yaxis.set_visible(False)
-        ax.spines["left"].set_visible(False)
-        ax.grid(axis="y", visible=False)
         _draw_legend(ax)
         return to_svg(sheet)
 
@@ -63,12 +61,9 @@ def _draw_strip(ax: Axes, line: Line, row: int) -> None:
     )
     if line.reproduced is not None:
         ax.plot([percent(line.reproduced)], [row], marker="o", markersize=4, **dots)
-    side: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "va": "center"}
-    name = f"{line.cell.table} · {cell_name(line.cell)}"
-    ax.text(-0.015, row, name, fontsize=7.5, color=MUTED.light, ha="right", **side)
+    word(ax, LEFT, row, f"{line.cell.table} · {cell_name(line.cell)}", MUTED)
     if line.place is not None:
-        share = f"{number(100 * line.place.value, 2)} %"
-        ax.text(1.015, row, share, fontsize=7.5, color=MUTED.light, ha="left", **side)
+        word(ax, RIGHT, row, f"{number(100 * line.place.value, 2)} %", MUTED)
 
 
 def _draw_legend(ax: Axes) -> None:
@@ -84,12 +79,4 @@ def _draw_legend(ax: Axes) -> None:
     ]
     names = ["a draw", "median", "95 % of further draws", "published"]
     ax.figure.legend(handles, names, loc="outside upper left", ncols=4, borderpad=0)
-    ax.text(
-        1.015,
-        1.0,
-        "draws below",
-        fontsize=7.5,
-        color=MUTED.light,
-        va="bottom",
-        transform=ax.transAxes,
-    )
+    word(ax, RIGHT, -0.8, "draws below", MUTED)

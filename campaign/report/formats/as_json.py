@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter
@@ -42,6 +42,20 @@ def report_json(layout: Layout) -> str:
 def article_json(article: Article) -> str:
     """The text of a comparison's, trends' or an identification's JSON."""
     return _text(article_data(article))
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def _as(model: type[M], /, *sources: object, **more: Any) -> M:
+    """A model of `more` and of what the first of `sources` that has it says under the same name."""
+    fields = {
+        name: plain(getattr(source, name))
+        for source in reversed(sources)
+        for name in model.model_fields
+        if hasattr(source, name) and name not in more
+    }
+    return model.model_validate(fields | more)
 
 
 def article_data(article: Article) -> data.ArticleData:
@@ -112,16 +126,7 @@ def report_data(layout: Layout) -> data.ReportData:
             figures=tuple(map(_figure, layout.incident_figures)),
             tables=tuple(map(_table, layout.incident_tables)),
         ),
-        failed=tuple(
-            data.FailedTrial(
-                number=each.trial.number,
-                label=each.trial.label,
-                outcome=each.ending.outcome.value,
-                reason=each.ending.reason,
-                safe_state=each.ending.safe_state.value,
-            )
-            for each in document.failed
-        ),
+        failed=tuple(_as(data.FailedTrial, each.trial, each.ending) for each in document.failed),
         problems=layout.problems,
         damaged=tuple(in_words(damage) for damage in document.damaged),
         provenance=_provenance(document),
@@ -152,22 +157,13 @@ def plain(value: Any) -> Any:
 
 
 def _run(document: Document) -> data.Run:
-    run, header = document.run, document.run.header
-    return data.Run(
-        name=run.name,
+    run = document.run
+    return _as(
+        data.Run,
+        run,
+        run.header,
         file=run.path.name,
         title=document.title,
-        description=header.description,
-        created=header.created,
-        ended=run.ended,
-        status=run.status.value,
-        reason=run.reason,
-        safe_state=run.safe_state.value,
-        backend=header.backend,
-        source=header.source,
-        operator=header.operator,
-        notes=header.notes,
-        tags=header.tags,
         planned=len(run.plan),
         executed=len(run.trials),
         not_completed=len(document.failed),
@@ -179,19 +175,14 @@ def _run(document: Document) -> data.Run:
 def _test(section: Section) -> data.Test:
     test, found = section.test, section.test.result
     with axis_terms(test.sides):
-        return data.Test(
-            name=test.name,
-            kind=test.kind,
-            title=test.title,
-            description=test.description,
-            anchor=section.anchor,
-            reproduces=test.reproduces,
-            problems=section.problems,
+        return _as(
+            data.Test,
+            section,
+            test,
+            found,
             trials=tuple(each.trial.number for each in test.trials),
-            options=plain(test.options),
             conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
             key_numbers=tuple(map(_finding, found.key_numbers)),
-            notes=found.notes,
             findings=tuple(map(_finding, found.findings)),
             comparisons=tuple(map(_comparison, section.comparisons)),
             figures=tuple(map(_figure, section.figures)),
@@ -203,38 +194,21 @@ def _test(section: Section) -> data.Test:
 
 
 def _finding(finding: result.Finding) -> data.Finding:
-    return data.Finding(
-        number=number(finding.known),
-        conditions=plain(finding.conditions),
-        recomputed=finding.recomputed,
-    )
+    return _as(data.Finding, finding, number=number(finding.known))
 
 
 def _table(shown: ShownTable) -> data.Table:
     table = shown.data
     if table is None:
         raise TypeError(f"{shown.anchor}: a table without its data")
-    return data.Table(
-        key=table.key,
-        title=table.title,
+    return _as(
+        data.Table,
+        table,
+        shown,
         place=shown.number,
-        anchor=shown.anchor,
         file=shown.download.file,
-        note=table.note,
         remarks=tuple(tables.remarks(table)),
-        published=shown.published,
-        columns=tuple(
-            data.Column(
-                name=each.name,
-                label=each.label,
-                unit=each.unit,
-                display=each.display or each.unit,
-                factor=_factor(each.unit, each.display),
-                exact=each.exact,
-                reason=str(each.reason),
-            )
-            for each in table.columns
-        ),
+        columns=tuple(_as(data.Column, each, **_display(each)) for each in table.columns),
         rows=tuple(
             {each.name: _cell(row.get(each.name)) for each in table.columns} for row in table.rows
         ),
@@ -247,14 +221,11 @@ def _cell(cell: result.Cell) -> Any:
 
 def _figure(shown: ShownFigure) -> data.Figure:
     figure = shown.data
-    return data.Figure(
+    return _as(
+        data.Figure,
+        shown,
         key="" if figure is None else figure.key,
-        title=shown.title,
         place=shown.number,
-        anchor=shown.anchor,
-        file=shown.file,
-        caption=shown.caption,
-        published=shown.published,
         trials=shown.trial_numbers,
         panels=() if figure is None else tuple(map(_panel, figure.panels)),
     )
@@ -263,24 +234,10 @@ def _figure(shown: ShownFigure) -> data.Figure:
 def _panel(panel: result.Panel) -> data.Panel:
     return data.Panel(
         title=panel.title,
-        x=_axis(panel.x),
-        y=_axis(panel.y),
+        x=_as(data.Axis, panel.x, **_display(panel.x)),
+        y=_as(data.Axis, panel.y, **_display(panel.y)),
         curves=tuple(map(_curve, panel.curves)),
-        marks=tuple(
-            data.Mark(label=m.label, x=plain(m.x), y=plain(m.y), until=plain(m.until))
-            for m in panel.marks
-        ),
-    )
-
-
-def _axis(axis: result.Axis) -> data.Axis:
-    return data.Axis(
-        label=axis.label,
-        unit=axis.unit,
-        display=axis.display or axis.unit,
-        factor=_factor(axis.unit, axis.display),
-        scale=axis.scale,
-        limits=None if axis.limits is None else plain(axis.limits),
+        marks=tuple(_as(data.Mark, each) for each in panel.marks),
     )
 
 
@@ -295,10 +252,9 @@ def _curve(curve: result.Curve) -> data.Curve:
         rounded = (float(f"{each:.{DIGITS}g}") for each in shown)
         return tuple(each if math.isfinite(each) else None for each in rounded)
 
-    return data.Curve(
-        label=curve.label,
-        series=curve.series,
-        style=curve.style,
+    return _as(
+        data.Curve,
+        curve,
         points=len(x),
         x=shortened(x),
         y=shortened(y),
@@ -310,12 +266,11 @@ def _curve(curve: result.Curve) -> data.Curve:
 
 def _comparison(shown: Comparison) -> data.Comparison:
     of_table = {line.table for line in shown.lines}
-    return data.Comparison(
+    return _as(
+        data.Comparison,
+        shown,
         table=next(iter(of_table), ""),
-        heading=shown.heading,
-        title=shown.title,
         place=shown.number,
-        anchor=shown.anchor,
         file=shown.download.file,
     )
 
@@ -325,13 +280,11 @@ def _scoreboard(layout: Layout) -> data.Scoreboard:
     board, counted = document.scoreboard, headline(document.scoreboard)
     pictures = [each for each in (layout.picture, layout.strips) if each is not None]
     return data.Scoreboard(
-        agreement=tables.agreement(board),
+        agreement=lines.agreement(board),
         counts=tuple(
-            data.Count(
-                status=str(each.status),
-                compared=each.compared,
-                good=each.good,
-                numbers=each.numbers,
+            _as(
+                data.Count,
+                each,
                 within_percent=dict(zip(map(str, LIMITS), each.within, strict=True)),
             )
             for each in counted.counts
@@ -356,26 +309,18 @@ def _scoreboard(layout: Layout) -> data.Scoreboard:
 
 def _line(line: Line) -> data.Line:
     cell, found = line.cell, line.found
-    return data.Line(
-        table=cell.table,
-        row=cell.row,
-        column=cell.column,
+    return _as(
+        data.Line,
+        line,
+        cell,
         cell=lines.cell_name(cell),
-        unit=cell.unit,
         published=plain(cell.value),
-        printed=cell.printed,
-        relation=cell.relation,
-        reproduced=plain(line.reproduced),
         low=None if found is None else plain(found.low),
         high=None if found is None else plain(found.high),
         kind="" if found is None else found.kind,
         deviation_percent=plain(line.deviation),
-        verdict=str(line.verdict),
         status="" if line.status is None else str(line.status),
-        test=line.test,
-        source=line.source,
         notes=tuple(note for note in (cell.reason, *cell.notes) if note),
-        draws=plain(line.draws),
         place=None if line.place is None else number(line.place),
     )
 
@@ -383,28 +328,23 @@ def _line(line: Line) -> data.Line:
 def _provenance(document: Document) -> data.Provenance:
     run, header = document.run, document.run.header
     plants: Iterable[Mapping[str, Any]] = header.truth.plants.values()
-    return data.Provenance(
+    return _as(
+        data.Provenance,
+        header,
         sha256=run.sha256,
         seal=run.root,
-        fingerprint=header.fingerprint,
         command=document.command,
         seeds=document.seeds,
-        git_revision=header.git_revision,
-        backend_options=plain(header.backend_options),
-        overrides=header.overrides,
-        only=header.only,
-        versions=header.versions,
-        plugins=tuple(plain(each) for each in header.plugins),
-        host=header.host,
         measured_by=document.measured_by,
         truths=tuple(dict.fromkeys(str(plant.get("name", "")) for plant in plants)),
-        sources=header.sources,
         truth_sources=header.truth.sources,
         program=__version__,
         code=code_of(document.tests),
     )
 
 
-def _factor(unit: str, display: str) -> float:
-    """What a number in `unit` is multiplied by to be in `display`, which may be the same."""
-    return 1.0 if not display or display == unit else float(factor(unit, display))
+def _display(shown: result.Column | result.Axis) -> dict[str, Any]:
+    """The unit that a reader is shown, and what a number is multiplied by to be in it."""
+    display = shown.display or shown.unit
+    same = display == shown.unit
+    return {"display": display, "factor": 1.0 if same else float(factor(shown.unit, display))}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
-from campaign.plain_text import on_a_page
 from campaign.report.formats.interface import Format, WrittenPage
 from campaign.report.formats.latex_tables import grid_lines
 from campaign.report.latex_text import breakable, latex
+from campaign.report.output import write_files
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.pieces import (
     Facts,
@@ -17,8 +17,8 @@ from campaign.report.page.pieces import (
     Paragraph,
     Piece,
     Source,
+    all_plain,
     caption,
-    plain,
 )
 
 MAIN = "main.tex"
@@ -57,21 +57,19 @@ WRAPPER = r"""% Typesets report.tex alone: pdflatex main, twice. Write your own 
 def write(written: WrittenPage) -> None:
     """Add `report.tex`, `main.tex`, `report.bib` and the figures as PDF."""
     pdfs, name = written.pdfs, written.name
-    pieces = (each for piece in written.pieces for each in plain(piece))
-    body = "\n\n".join(map("\n".join, _in_their_sections(pieces, written)))
+    body = "\n\n".join(map("\n".join, _in_their_sections(written)))
     texts = {f"{name}.tex": f"{HEAD}\n{body}\n", MAIN: WRAPPER.replace("NAME", name)}
     if written.bibtex:
         texts[f"{name}.bib"] = written.bibtex
-    for name, text in texts.items():
-        (written.folder / name).write_text(on_a_page(text), encoding="utf-8", newline="\n")
+    write_files(written.folder, texts.items())
     for name, page in pdfs.items():
         (written.folder / name).write_bytes(page)
 
 
-def _in_their_sections(pieces: Iterable[Piece], written: WrittenPage) -> Iterator[list[str]]:
+def _in_their_sections(written: WrittenPage) -> Iterator[list[str]]:
     """The lines of each piece; before a heading, what floats finds its place."""
     floating = False
-    for piece in pieces:
+    for piece in all_plain(written.pieces):
         lines = list(_lines(piece, written))
         if isinstance(piece, Heading):
             if piece.level > 2 and floating:

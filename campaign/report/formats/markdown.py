@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from campaign.plain_text import on_a_page
 from campaign.report.formats.interface import Format, WrittenPage
+from campaign.report.output import write_files
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.pieces import (
     Facts,
@@ -16,8 +16,8 @@ from campaign.report.page.pieces import (
     Paragraph,
     Piece,
     Source,
+    all_plain,
     caption,
-    plain,
 )
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]<>|~$^#@&])")
@@ -31,11 +31,8 @@ _FIRST = re.compile(r"^([-+=:%]|\d+(?=[.)]))")
 
 def write(written: WrittenPage) -> None:
     """Add `NAME.md`."""
-    pieces = (each for piece in written.pieces for each in plain(piece))
-    text = "\n\n".join(map(_written, pieces)) + "\n"
-    (written.folder / f"{written.name}.md").write_text(
-        on_a_page(text), encoding="utf-8", newline="\n"
-    )
+    text = "\n\n".join(map(_written, all_plain(written.pieces))) + "\n"
+    write_files(written.folder, [(f"{written.name}.md", text)])
 
 
 def escaped(text: str) -> str:

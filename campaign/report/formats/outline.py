@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.report.content import lines, tables
+from campaign.report.content import lines
 from campaign.report.content.citation import citation_of
 from campaign.report.content.document import Document
 from campaign.report.content.first_screen import Answer
@@ -43,7 +43,7 @@ def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
     yield from _opening(layout)
     if layout.scoreboard_download is not None:
         yield Heading(2, "Scoreboard", "scoreboard")
-        yield Paragraph(tables.agreement(document.scoreboard))
+        yield Paragraph(lines.agreement(document.scoreboard))
         yield from (shown for shown in (layout.picture, layout.strips) if shown is not None)
         if layout.closeness is not None:
             yield layout.closeness

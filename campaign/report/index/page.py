@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from html import unescape
@@ -19,8 +16,9 @@ from campaign.archive.layout.header import PARTIAL
 from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
 from campaign.report.index.report_summary import summary_of_report
-from campaign.report.output import MARKER
-from campaign.report.page.packaged_templates import fill_packaged
+from campaign.report.output import MARKER, replace_file
+from campaign.report.page.policy import hashed
+from campaign.report.page.templates import Templates
 from campaign.report.palette import variables
 
 NAME = "index.html"
@@ -70,13 +68,9 @@ def write_index(results: Path, packaged_templates: Path) -> Path:
     path = results / NAME
     _refuse_foreign(path)
     text = on_a_page(render(results, packaged_templates))
-    part = path.with_name(f".{NAME}.{os.getpid()}.part")
     try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(path)
+        replace_file(path, text.encode())
     except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
     return path
 
@@ -87,8 +81,8 @@ def render(results: Path, packaged_templates: Path) -> str:
 
     entries = [entry_of(run) for run in reversed(list_runs(results))]
     colours = {"colours": variables()}
-    style = fill_packaged("style.css", colours, packaged_templates)
-    style += fill_packaged("index.css", {}, packaged_templates)
+    templates = Templates(packaged_templates, None)
+    style = templates.fill("style.css", colours) + templates.fill("index.css", {})
     script = (packaged_templates / "index.js").read_text(encoding="utf-8")
     context = {
         "generator": Markup(OURS),  # noqa: S704 (packaged)
@@ -98,10 +92,10 @@ def render(results: Path, packaged_templates: Path) -> str:
         "comparisons": tuple(_comparisons(results)),
         "style": Markup(style),  # noqa: S704 (packaged)
         "script": Markup(script),  # noqa: S704 (packaged)
-        "style_hash": _hash(style),
-        "script_hash": _hash(script),
+        "style_hash": hashed(style),
+        "script_hash": hashed(script),
     }
-    return fill_packaged("index.html", context, packaged_templates)
+    return templates.fill("index.html", context)
 
 
 def entry_of(run: RunSummary) -> Entry:
@@ -182,12 +176,6 @@ def _address(path: Path, base: Path) -> str:
     """Relative, and no more than an address whatever the names have in them."""
     relative = path.relative_to(base).as_posix()
     return "./" + quote(os.fsencode(relative))
-
-
-def _hash(text: str) -> str:
-    """As a Content-Security-Policy names an inline text."""
-    digest = hashlib.sha256(text.encode()).digest()
-    return "sha256-" + base64.b64encode(digest).decode("ascii")
 
 
 def _refuse_foreign(path: Path) -> None:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from campaign.report.page.folder import Folder
+from campaign.api.analysis import one_line
+from campaign.report.page.drawings import Drawing
+from campaign.report.page.folder import Folder, ShownFigure
 from campaign.report.page.pieces import Facts, Heading, Items, Paragraph, Piece
+from campaign.report.palette import Look
+from campaign.result import Figure
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,36 @@ class Article:
         for part in self.parts:
             yield Heading(2, part.heading, part.anchor)
             yield from part.pieces
+
+
+@dataclass
+class PageParts:
+    """What is collected while a page is laid out."""
+
+    folder: Folder = field(default_factory=Folder)
+    problems: list[str] = field(default_factory=list)
+
+    def attempt(self, what: str, make: Callable[[], T]) -> T | None:
+        """What `make` makes; one bad figure must not cost the page."""
+        try:
+            return make()
+        except Exception as error:  # noqa: BLE001 (it may be a plug-in's)
+            self.problems.append(f"{what} cannot be shown: {one_line(error)}")
+            return None
+
+    def drawn(
+        self, figure: Figure, prefix: str = "", looks: Mapping[str, Look] | None = None
+    ) -> ShownFigure | None:
+        """A figure of the page; None, and a problem, where it cannot be drawn.
+
+        prefix: of its file's name. looks: of the page's series; its own where they are not given.
+        """
+
+        def shown() -> ShownFigure:
+            made, name = Drawing(figure, looks=looks).made(), f"{prefix}{figure.key}"
+            return self.folder.figure(figure, made, (), name, trials=figure.trials, looks=looks)
+
+        return self.attempt(f"{prefix}{figure.key}", shown)
 
 
 def damage_text(what: str, damaged: Sequence[object]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -11,11 +10,9 @@ from campaign.api.analysis import AnalysedTest
 from campaign.plain_text import on_a_page
 from campaign.report.content import tables
 from campaign.report.content.lines import ShownLine
+from campaign.report.drawing.canvas import inline
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.figures import inline
-from campaign.report.drawing.label_size import legible_width, view_box
 from campaign.report.drawing.pdf import taken
-from campaign.report.page.merged_marks import merged
 from campaign.report.page.names import Names
 from campaign.report.palette import Look
 from campaign.result import Figure, Table
@@ -217,10 +214,18 @@ class Folder:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(merged(svg), anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
-        shown = ShownFigure(self.figures, anchor, title, caption, markup, file)
-        box, least = view_box(svg) or shown.box, math.ceil(legible_width(svg))
-        return replace(shown, command=command, box=box, least=least)
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        return ShownFigure(
+            self.figures,
+            anchor,
+            title,
+            caption,
+            markup,
+            file,
+            command=command,
+            box=drawn.box,
+            least=drawn.least,
+        )
 
     def shown_table(
         self, table: Table, published: tuple[str, ...], *names: str, page: Table | None = None

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.report.drawing.curves import drawn_interval, drawn_points, scale_of
-from campaign.report.drawing.figure_csv import points_of_each
+from campaign.report.drawing.decimate import points_of_each
 from campaign.report.drawing.figures import axis_label, series_of
 from campaign.report.page.folder import ShownFigure
 from campaign.report.palette import Look, looks

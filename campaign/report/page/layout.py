@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from shlex import quote
-from typing import Any
 
-from campaign.api.analysis import NOT_EXECUTED, AnalysedTest, one_line
+from campaign.api.analysis import NOT_EXECUTED, AnalysedTest
 from campaign.axis_kind import axis_terms
-from campaign.published.scoreboard import Scoreboard, to_csv
+from campaign.published.scoreboard import COLUMNS, Scoreboard, to_csv
 from campaign.published.values import Published, PublishedTable
-from campaign.report.content import tables
 from campaign.report.content.conditions import conditions_of, summary_of
 from campaign.report.content.document import Document
 from campaign.report.content.lines import ScoredTable, scored_tables, shown_line
+from campaign.report.content.lines import closeness as closeness_table
 from campaign.report.content.published_columns import as_compared, with_published
 from campaign.report.content.references import ReferenceComparison
 from campaign.report.content.run_problems import without_trials
 from campaign.report.content.symbols import SYMBOLS, Symbol, symbols_for
 from campaign.report.content.written_units import TestUnits, units_of
 from campaign.report.drawing.drawing_files import DrawingFiles
-from campaign.report.drawing.strips import draw_strips
-from campaign.report.page.changes import changes_figure
+from campaign.report.page.article import PageParts
 from campaign.report.page.drawings import (
     OVERVIEW,
     Drawable,
@@ -42,30 +41,21 @@ from campaign.report.page.folder import (
     ShownTable,
 )
 from campaign.report.page.names import figure_name, stood_for
+from campaign.report.page.pictures import changes_figure, draws, overview
 from campaign.result import Figure, Table
 from campaign.trial import Role
 
-DrawAll = Callable[[Mapping[Key, Drawable]], Callable[[Key], DrawingFiles | None]]
-"""Begins to make drawings; returns what waits for one of them, None when it cannot be made so."""
+OF_A_TABLE = (*COLUMNS[1:8], "reason", "test", *COLUMNS[8:])
+"""Columns of the file of one published table."""
+Drawn = Callable[[Key], DrawingFiles | None]
+"""Waits for a drawing that was begun; None when it cannot be made so."""
+DrawAll = Callable[[Mapping[Key, Drawable]], Drawn]
+"""Begins to make drawings."""
 
 
-def draw_on_demand(drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
+def draw_on_demand(drawings: Mapping[Key, Drawable]) -> Drawn:
     """Nothing is drawn beforehand: each drawing is made where it is laid out."""
     return lambda key: None
-
-
-@dataclass(frozen=True)
-class _Made:
-    """Drawings, and those of them that are drawn."""
-
-    drawings: Mapping[Key, Drawing]
-    drawn: Callable[[Key], DrawingFiles | None]
-
-    def of(self, test: AnalysedTest, figure: Figure) -> tuple[Drawing, DrawingFiles]:
-        """Raises whatever drawing raises."""
-        key = test.name, figure.key
-        drawing = self.drawings.get(key) or Drawing(figure)
-        return drawing, self.drawn(key) or drawing.made()
 
 
 @dataclass(frozen=True)
@@ -155,8 +145,7 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
     command = command or f"campaign report {quote(document.run.header.name)}"
     drawings, top = drawings_of(document.tests, document.published), Overview(scoreboard)
     drawn = draw_all({**drawings, OVERVIEW: top})
-    made = _Made(drawings, drawn)
-    makers = _makers(document, folder, command, made)
+    makers = _makers(document, folder, command, drawings, drawn)
     _make_first(document, makers)
     download = scoreboard_download(scoreboard, folder) if scoreboard.lines else None
     picture, strips = (
@@ -166,7 +155,7 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
             draws(scoreboard, folder),
         )
     )
-    close = tables.closeness(scoreboard)
+    close = closeness_table(scoreboard)
     closeness = None if close is None else folder.shown_table(close, (), close.key)
     sections = _sections(document, makers)
     happened = document.incidents
@@ -203,12 +192,27 @@ def _problems(section: Section) -> Iterator[str]:
     yield from section.test.account
 
 
-def _makers(document: Document, folder: Folder, command: str, made: _Made) -> Mapping[str, _Maker]:
+def _makers(
+    document: Document,
+    folder: Folder,
+    command: str,
+    drawings: Mapping[Key, Drawing],
+    drawn: Drawn,
+) -> Mapping[str, _Maker]:
     """By test, who makes its figures and tables."""
     units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
     return {
-        t.name: _Maker(t, units[t.name], folder, again, made, document.published)
-        for t in document.tests
+        test.name: _Maker(
+            folder=folder,
+            problems=[test.problem] if test.problem else [],
+            test=test,
+            units=units[test.name],
+            command=again,
+            drawings=drawings,
+            awaited=drawn,
+            published=document.published,
+        )
+        for test in document.tests
     }
 
 
@@ -218,7 +222,8 @@ def _make_first(document: Document, makers: Mapping[str, _Maker]) -> None:
     for test in document.tests:
         for figure in test.result.figures:
             if (test.name, figure.key) == wanted:
-                _attempt([], figure.key, partial(makers[test.name].figure, figure))
+                with suppress(Exception):
+                    makers[test.name].figure(figure)
 
 
 def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section, ...]:
@@ -247,44 +252,11 @@ def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
     return folder.shown_table(table, (), f"incidents-{table.key}")
 
 
-def overview(
-    scoreboard: Scoreboard, folder: Folder, drawn: DrawingFiles | None
-) -> ShownFigure | None:
-    """The picture on top of the page."""
-    if drawn is None:
-        return None
-    return folder.picture(
-        drawn,
-        "Deviation from the published values",
-        "One sign per published number: how far the reproduced value is from it, and what the"
-        " comparison is worth; pointing at a sign shows which number it is. The axis is linear up"
-        " to ±1 % and logarithmic beyond.",
-        tables.agreement(scoreboard),
-        "scoreboard",
-    )
-
-
-def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
-    """Where published values stand among the draws of a random bench."""
-    svg = draw_strips(scoreboard)
-    if svg is None:
-        return None
-    return folder.picture(
-        DrawingFiles.of(svg),
-        "Published values among the draws of a random bench",
-        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
-        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
-        " published value, one draw itself; the share of draws below it stands on the right.",
-        "One strip of ticks per published number, around a line at the published value.",
-        "draws",
-    )
-
-
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
     """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
     download = folder.table(to_csv(scoreboard.lines), "scoreboard")
     if scoreboard.further:
-        folder.table(to_csv(scoreboard.further, tests=True), "scoreboard-runs")
+        folder.table(to_csv(scoreboard.further, (*COLUMNS, "test")), "scoreboard-runs")
     return download
 
 
@@ -292,17 +264,12 @@ Expected = tuple[Table | None, Sequence[ReferenceComparison | None]]
 """What is true of a test, and its references: the bench file first."""
 
 
-def _changes(
-    problems: list[str], compared: ReferenceComparison, maker: _Maker
-) -> ShownFigure | None:
+def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None:
     """The picture of a comparison of two numbers or more."""
     if len(compared.pairs) < 2:
         return None
     key = f"{maker.test.name}-{compared.table.key}"
-    shown: ShownFigure | None = _attempt(
-        problems, key, lambda: changes_figure(compared.pairs, maker.folder, key)
-    )
-    return shown
+    return maker.attempt(key, lambda: changes_figure(compared.pairs, maker.folder, key))
 
 
 def _section(
@@ -312,48 +279,35 @@ def _section(
     published: Sequence[PublishedTable],
     expected: Expected,
 ) -> Section:
-    with axis_terms(maker.test.sides):
-        return _section_of_axis(place, maker, scoreboard, published, expected)
-
-
-def _section_of_axis(
-    place: int,
-    maker: _Maker,
-    scoreboard: Scoreboard,
-    published: Sequence[PublishedTable],
-    expected: Expected,
-) -> Section:
     test, folder = maker.test, maker.folder
     left_out = tuple(_left_out(test))
-    problems = [test.problem] if test.problem else []
-    comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
     truth, references = expected
-    prediction, *others = (None if each is None else maker.table(each.table) for each in references)
-    changes = [_changes(problems, each, maker) for each in references if each is not None]
-    figures = [
-        shown
-        for figure in test.result.figures
-        if (shown := _attempt(problems, figure.key, lambda f=figure: maker.figure(f)))  # type: ignore[misc]
-    ]
-    shown_tables = [
-        shown
-        for table in test.result.tables
-        if (shown := _attempt(problems, table.key, lambda t=table: maker.table(t)))  # type: ignore[misc]
-    ]
-    return Section(
-        anchor=f"test-{place}",
-        test=test,
-        conditions=tuple(conditions_of(test, maker.units)),
-        figures=(*filter(None, changes), *figures),
-        tables=tuple(shown_tables),
-        comparisons=tuple(comparisons),
-        problems=(*left_out, *problems),
-        left_out=left_out,
-        truth=None if truth is None else maker.table(truth),
-        prediction=prediction,
-        references=tuple(filter(None, others)),
-        summary=summary_of(test),
-    )
+    with axis_terms(test.sides):
+        comparisons = [_comparison(table, scoreboard, folder) for table in published if table.cells]
+        prediction, *others = (
+            None if each is None else maker.table(each.table) for each in references
+        )
+        changes = [_changes(each, maker) for each in references if each is not None]
+        figures = [
+            maker.attempt(each.key, partial(maker.figure, each)) for each in test.result.figures
+        ]
+        shown_tables = [
+            maker.attempt(each.key, partial(maker.table, each)) for each in test.result.tables
+        ]
+        return Section(
+            anchor=f"test-{place}",
+            test=test,
+            conditions=tuple(conditions_of(test, maker.units)),
+            figures=tuple(filter(None, (*changes, *figures))),
+            tables=tuple(filter(None, shown_tables)),
+            comparisons=tuple(comparisons),
+            problems=(*left_out, *maker.problems),
+            left_out=left_out,
+            truth=None if truth is None else maker.table(truth),
+            prediction=prediction,
+            references=tuple(filter(None, others)),
+            summary=summary_of(test),
+        )
 
 
 def _left_out(test: AnalysedTest) -> Iterator[str]:
@@ -364,29 +318,22 @@ def _left_out(test: AnalysedTest) -> Iterator[str]:
         yield f"{damage.trial or test.name} {is_what}: {damage}"
 
 
-def _attempt(problems: list[str], key: str, make: Callable[[], Any]) -> Any:
-    try:
-        return make()
-    except Exception as error:  # noqa: BLE001 (one bad figure must not cost the report)
-        problems.append(f"{key} cannot be shown: {one_line(error)}")
-        return None
-
-
-@dataclass(frozen=True)
-class _Maker:
-    """Makes the figures and tables of one test.
+@dataclass(kw_only=True)
+class _Maker(PageParts):
+    """Makes the figures and tables of one test; `problems`: why there are not all of them.
 
     Attributes:
         command: what draws one of its figures again.
+        drawings: of all tests, and what waits for one that is drawn elsewhere.
         published: what the run is compared with, by table.
         shown: its figures that are made already, by their keys.
     """
 
     test: AnalysedTest
     units: TestUnits
-    folder: Folder
     command: str
-    made: _Made
+    drawings: Mapping[Key, Drawing]
+    awaited: Drawn
     published: Published
     shown: dict[str, ShownFigure] = field(default_factory=dict)
 
@@ -398,10 +345,11 @@ class _Maker:
     def _new_figure(self, figure: Figure) -> ShownFigure:
         test = self.test
         numbers = stood_for(figure.thesis, test.reproduces, "figure ")
-        drawing, drawn = self.made.of(test, figure)
+        key = test.name, figure.key
+        drawing = self.drawings.get(key) or Drawing(figure)
         return self.folder.figure(
             drawing.figure,
-            drawn,
+            self.awaited(key) or drawing.made(),
             numbers,
             *figure_name(numbers, test.name, figure.key),
             trials=tuple(figure.trials or _measurements(test)),
@@ -441,10 +389,5 @@ def _comparison(table: PublishedTable, scoreboard: Scoreboard, folder: Folder) -
         title=table.title,
         source=table.source,
         lines=tuple(shown_line(line) for line in lines),
-        download=folder.table(tables.published_csv(lines), table.slug),
+        download=folder.table(to_csv(lines, OF_A_TABLE), table.slug),
     )
-
-
-def anchors(sections: Sequence[Section]) -> Mapping[str, str]:
-    """Test name to the anchor of its section."""
-    return {section.test.name: section.anchor for section in sections}

@@ -1,9 +1,14 @@
-"""Names on the page and in the folder: safe, unique, stable."""
+"""Names on the page and in the folder: safe, unique, stable; links to the pages of trials."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
+
+FOLDER = "trials"
+"""Of the report's folder, with the trials' own pages."""
+
+TrialLink = Callable[[int], str | None]
 
 
 class Names:
@@ -35,3 +40,17 @@ def figure_name(thesis: Sequence[str], test: str, key: str) -> tuple[str, ...]:
     """Candidates for a figure: the published number it stands for, then its own key."""
     own = f"{test}-{key}"
     return (f"figure-{thesis[0]}", f"figure-{thesis[0]}-{own}") if thesis else (own,)
+
+
+def trial_file(number: int) -> str:
+    """The page of a trial within the report's folder."""
+    return f"{FOLDER}/trial-{number:05d}.html"
+
+
+def trial_links(written: Collection[int]) -> TrialLink:
+    """A function from a trial's number to the link from the report's page; None without a page.
+
+    `written`: the trials that have a page.
+    """
+    there = frozenset(written)
+    return lambda number: trial_file(number) if number in there else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -123,8 +123,13 @@ def grid_of(shown: ShownTable) -> Grid:
     )
 
 
+def all_plain(pieces: Iterable[Piece]) -> tuple[Piece, ...]:
+    """Pieces as formats write them that know neither folds nor downloads."""
+    return tuple(each for piece in pieces for each in plain(piece))
+
+
 def plain(piece: Piece) -> tuple[Piece, ...]:
-    """A piece as formats write it that know neither folds nor downloads."""
+    """A piece as such formats write it."""
     match piece:
         case ShownTable():
             return (grid_of(piece),)
@@ -132,8 +137,7 @@ def plain(piece: Piece) -> tuple[Piece, ...]:
             told = (f"{text} {download.file}" for text, download in piece.told)
             return (Paragraph("; ".join(told) + "."),)
         case FoldedSection():
-            inner = (each for inner in piece.pieces for each in plain(inner))
-            return Paragraph(f"{piece.summary}:"), *inner
+            return Paragraph(f"{piece.summary}:"), *all_plain(piece.pieces)
         case _:
             return (piece,)
 

@@ -16,11 +16,11 @@ from campaign.estimation.relative_rate import relative_rate
 from campaign.recording import Channel, Recording
 from campaign.report.content import tables
 from campaign.report.content.trial_account import TrialAccount, account_of, lost_account
-from campaign.report.drawing.label_size import LEGIBLE
+from campaign.report.drawing.drawing_files import LEGIBLE
 from campaign.report.drawing.traces import FONT, WIDTH, Stretch, Trace, draw_traces, key
 from campaign.report.page.layout import Layout
+from campaign.report.page.names import FOLDER, trial_file
 from campaign.report.page.templates import Templates
-from campaign.report.page.trial_links import FOLDER, trial_file
 from campaign.report.palette import looks, variables
 from campaign.text import number, pretty_unit
 from campaign.units import convert

@@ -1,0 +1,65 @@
+"""Pictures of a page that no analysis made: scoreboard, draws, changes against references."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from campaign.published.scoreboard import Scoreboard
+from campaign.references.verdict import JudgedNumber, Verdict
+from campaign.report.content.lines import agreement
+from campaign.report.drawing.changes_picture import draw_changes, with_change
+from campaign.report.drawing.drawing_files import DrawingFiles
+from campaign.report.drawing.strips import draw_strips
+from campaign.report.page.folder import Folder, ShownFigure
+
+
+def changes_figure(
+    pairs: Sequence[tuple[JudgedNumber, str]], folder: Folder, key: str
+) -> ShownFigure | None:
+    """Pairs with their names, those declared different first; None without a change to draw."""
+    pairs = sorted(pairs, key=lambda each: each[0].verdict is not Verdict.DIFFERENT)
+    shown = with_change(pairs)
+    if not shown:
+        return None
+    declared = [name for pair, name in pairs if pair.verdict is Verdict.DIFFERENT]
+    return folder.picture(
+        DrawingFiles.of(draw_changes(shown)),
+        "Changes in percent",
+        "Each sign is a number with a reference, the bar the 95 % interval of its change. Filled: "
+        "declared different. Hollow: no difference is shown, or it is not judged (diamonds).",
+        f"Declared different: {'; '.join(declared)}." if declared else "No difference is declared.",
+        key,
+    )
+
+
+def overview(
+    scoreboard: Scoreboard, folder: Folder, drawn: DrawingFiles | None
+) -> ShownFigure | None:
+    """The picture on top of the page."""
+    if drawn is None:
+        return None
+    return folder.picture(
+        drawn,
+        "Deviation from the published values",
+        "One sign per published number: how far the reproduced value is from it, and what the"
+        " comparison is worth; pointing at a sign shows which number it is. The axis is linear up"
+        " to ±1 % and logarithmic beyond.",
+        agreement(scoreboard),
+        "scoreboard",
+    )
+
+
+def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
+    """Where published values stand among the draws of a random bench."""
+    svg = draw_strips(scoreboard)
+    if svg is None:
+        return None
+    return folder.picture(
+        DrawingFiles.of(svg),
+        "Published values among the draws of a random bench",
+        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
+        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
+        " published value, one draw itself; the share of draws below it stands on the right.",
+        "One strip of ticks per published number, around a line at the published value.",
+        "draws",
+    )
