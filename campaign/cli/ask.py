@@ -18,7 +18,7 @@ from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unl
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.protocol import PlannedTest
-from campaign.protocol.loop_check import sought_instability
+from campaign.protocol.limit_check import sought_instability
 from campaign.protocol.stages import most_of
 from campaign.trial import Trial
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from campaign.cli.output import print_line
-from campaign.errors import UsageError
+from campaign.errors import UsageError, writing
 from campaign.options import Options
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
@@ -95,11 +95,9 @@ def show_models(
     for each in met:
         told = f"half the step changes it by {number(100 * each.change, 2)} % at most"
         print_line(f"{each.model.name}: {each.model.summary}; {told}")
-    try:
+    with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
         path.with_suffix(".csv").write_text(_csv(met, asked), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
     return path
 
 

@@ -5,7 +5,6 @@ What makes a page is imported within the functions: other processes analyse in t
 
 from __future__ import annotations
 
-import webbrowser
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -14,7 +13,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, cast
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.cli.output import print_note, print_table
+from campaign.cli.output import open_page, print_note, print_table
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
 from campaign.report.processes import (
@@ -120,8 +119,8 @@ def _page(
         command = f"{DEBUG}=1 campaign report {reference(path)}{anew}"
         print_note(f"to see where an analysis failed:\n  {command}")
     print_note(f"written: {'; '.join([*_told(report.files), *filter(None, kept)])}")
-    if open_it and not webbrowser.open(report.path.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
+    if open_it:
+        open_page(report.path)
     return report.path, worst_exit_code(codes)
 
 

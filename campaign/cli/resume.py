@@ -19,10 +19,9 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
-from campaign.cli.session import Session, conduct, print_warning
+from campaign.cli.session import Session, conduct, print_warning, require_watch
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
-from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.resume import (
@@ -41,7 +40,7 @@ from campaign.execution.stop import under_guardian
 from campaign.options import Options
 from campaign.policy import Policy
 from campaign.protocol import PlannedStage, PlannedTest, check_limits, check_loops
-from campaign.protocol.bench_file import names_file
+from campaign.protocol.further_files import names_file
 from campaign.trial import Tree, Trial
 
 

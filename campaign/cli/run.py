@@ -14,15 +14,14 @@ from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import PreparedRun, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
-from campaign.cli.session import Session, conduct
+from campaign.cli.session import Session, conduct, require_watch
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
-from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.execution.stop import under_guardian
 from campaign.protocol import as_tree, check_limits, check_loops
-from campaign.protocol.bench_file import names_file
+from campaign.protocol.further_files import names_file
 from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
 

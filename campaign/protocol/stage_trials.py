@@ -18,8 +18,7 @@ from campaign.protocol.expand import (
     place_hash,
     samples_of,
 )
-from campaign.protocol.limit_check import in_display_units, one_count
-from campaign.protocol.loop_check import in_words
+from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.schema import ExperimentKind
 from campaign.protocol.stages import PlannedStage
 from campaign.protocol.swept_value_text import point_text

@@ -265,4 +265,4 @@ def test_clocks_that_do_not_cover_each_other_are_refused(tmp_path: Path, begin: 
     """A value that nobody measured is not held: neither before the first nor behind the last."""
     told = refused(tmp_path, *slower(tmp_path, begin, step))
     assert "slow.csv has times from" in told
-    assert "and the trial is from 0 to 0.199 s" in told
+    assert "s, the trial 0 to 0.199 s; cut it" in told
