@@ -16,8 +16,7 @@ from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
 from campaign.device.faults import FaultSpec, parse_faults
 from campaign.device.latch import new_memory
 from campaign.device.line import PtyStream, TcpLine
-from campaign.device.log import DeviceLog
-from campaign.device.machine import Setup
+from campaign.device.machine import DeviceLog, Setup
 from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
 from campaign.errors import ExitCode, UsageError, writing

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -97,7 +96,10 @@ def show_models(
         print_line(f"{each.model.name}: {each.model.summary}; {told}")
     with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
-        path.with_suffix(".csv").write_text(_csv(met, asked), encoding="utf-8", newline="\n")
+        table = _table(met, asked)
+        table.to_csv(
+            path.with_suffix(".csv"), index=False, float_format="%.9g", lineterminator="\n"
+        )
     return path
 
 
@@ -215,10 +217,6 @@ def _figure(met: Sequence[ModelCycle], motion: MotionOptions) -> Figure:
     )
 
 
-def _csv(met: Sequence[ModelCycle], motion: MotionOptions) -> str:
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["time_s", "rate_rad_per_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])
-    columns = (*_motion(motion), *(each.friction for each in met))
-    rows.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
-    return text.getvalue()
+def _table(met: Sequence[ModelCycle], motion: MotionOptions) -> pd.DataFrame:
+    columns = dict(zip(("time_s", "rate_rad_per_s", "angle_rad"), _motion(motion), strict=True))
+    return pd.DataFrame(columns | {f"{m.model.name}_N_m": m.friction for m in met})

@@ -85,8 +85,8 @@ def _print(
     details: bool,
 ) -> None:
     plan = prepared.plan
-    if plan.title:
-        print_line(plan.title)
+    if plan.protocol.title:
+        print_line(plan.protocol.title)
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
@@ -94,7 +94,7 @@ def _print(
     )
     if (most := plan.following).trials:
         print_line(f"later stages add {in_short(most)}, in the size above")
-    for line in policy_lines(plan.policy):
+    for line in policy_lines(plan.protocol.policy):
         print_line(line)
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:

@@ -91,7 +91,7 @@ def prepare(request: Request) -> PreparedRun:
 
 def _check_keep(plan: Plan, kind: BackendKind) -> None:
     """Raise UsageError where samples that are not kept would be missed."""
-    keep = plan.policy.keep
+    keep = plan.protocol.policy.keep
     if keep == "all":
         return
     if kind.source is not Source.SIMULATION:
