@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-import campaign
 from campaign.errors import Problem
 from campaign.protocol.positions import Aim, Keys, Position, Positions
 
@@ -165,7 +164,7 @@ def _other_schema(source: Source, kind: Kind) -> Problem | None:
     if type(given) is int and given == SCHEMA[kind]:
         return None
     message = (
-        f"campaign {campaign.__version__} reads {kind}s of schema {SCHEMA[kind]}, not {given!r}; "
+        f"this program reads {kind}s of schema {SCHEMA[kind]}, not {given!r}; "
         "use the program of that schema, or write the keys of today and leave this line out"
     )
     return source.problem(("schema",), "value", message)
