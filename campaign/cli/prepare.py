@@ -233,7 +233,7 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
     return (
         f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}; "
         f"the backend {kind.name!r} does not record it\n"
-        f"record it, take another backend, or leave out {trial.test!r}; nothing was moved"
+        f"record it, take another backend, or leave out the test {trial.test!r}; nothing was moved"
     )
 
 
