@@ -136,9 +136,9 @@ def _check_recordings(protocol: Protocol, kind: BackendKind) -> None:
     for test in protocol.tests:
         if test.entry.recording:
             message = (
-                f"the test '{test.entry.name}' was executed elsewhere; `campaign import "
-                f"{protocol.path}` makes a run of its recordings (`campaign plan --backend "
-                f"{IMPORT}` shows it)"
+                f"the test '{test.entry.name}' was executed elsewhere: `campaign import "
+                f"{protocol.path}` makes a run of it, `campaign plan {protocol.path} --backend "
+                f"{IMPORT}` shows it"
             )
             raise ProtocolError([test.origin.problem(("recording",), "key", message)])
 
