@@ -165,7 +165,7 @@ def _other_schema(source: Source, kind: Kind) -> Problem | None:
         return None
     message = (
         f"this program reads {kind}s of schema {SCHEMA[kind]}, not {given!r}; "
-        "use the program of that schema, or write the keys of today and leave this line out"
+        "use the program of that schema, or write today's keys without this line"
     )
     return source.problem(("schema",), "value", message)
 

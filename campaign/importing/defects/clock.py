@@ -210,8 +210,8 @@ def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
         if anew := restarts(clock):
             raise ValueError(
                 f"time begins anew in row {_told(np.array(anew) + first)}: {len(anew) + 1} "
-                "recordings; 'restarts = true' in [[test.recording]] makes a trial of each, or "
-                "'each' with a column that numbers them"
+                "recordings; in [[test.recording]] write 'restarts = true', or 'each' with a "
+                "column that numbers them"
             )
         if not repairs and (coarse := _coarse(clock)):
             raise ValueError(coarse)
