@@ -20,7 +20,8 @@ from __future__ import annotations
 
 import os
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -74,6 +75,15 @@ class CampaignError(Exception):
 
 class UsageError(CampaignError):
     """A command, option, name or file that cannot be used as given."""
+
+
+@contextmanager
+def writing(what: object) -> Iterator[None]:
+    """Something is written in the block; UsageError names `what` where that is not possible."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{what}: cannot be written: {error.strerror or error}") from None
 
 
 class NoResultError(CampaignError):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from campaign.errors import CampaignError, UsageError
+from campaign.errors import CampaignError, UsageError, writing
 
 SHIPPED = ("protocols", "templates")
 
@@ -57,12 +57,10 @@ def copy_shipped(destination: Path) -> tuple[Path, ...]:
             f"{taken[0]} is there already{_and_more(len(taken) - 1)}; "
             "nothing was written: name a new folder, or move the old files away"
         )
-    try:
+    with writing(destination):
         for source, copy in copies.items():
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, copy)
-    except OSError as error:
-        raise UsageError(f"{destination}: cannot be written: {error.strerror}") from None
     return tuple(copies.values())
 
 

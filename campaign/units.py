@@ -111,13 +111,15 @@ class Quantity:
         return float(unit.factor / si.factor)
 
     def _meant(self, unit: str) -> str:
-        """Which unit of this quantity `unit`, which is none, may be meant to be."""
+        """Which of its units `unit`, which is none, may be meant to be; as `accepts` spells it."""
         for near in respelled(unit):
+            meant = parse_unit(near)
             try:
-                self._factor(parse_unit(near))
+                self._factor(meant)
             except LookupError:
                 continue
-            return f"did you mean {near!r}?"
+            listed = (each for each in self.accepts if parse_unit(each) == meant)
+            return f"did you mean {next(listed, near)!r}?"
         return ""
 
     @property

@@ -16,6 +16,7 @@ from campaign.cli import output
 from campaign.cli.kinds import show_kind
 from campaign.cli.output import PlainConsole, bytes_text, print_line, print_table
 from campaign.cli.prepare import find_protocol
+from campaign.cli.schemas import init_folder
 from campaign.cli.status import Answers
 from campaign.errors import (
     ArchiveError,
@@ -100,13 +101,24 @@ def leave_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> int:
     return int(end.value.code)
 
 
-def test_a_file_comes_before_a_shipped_protocol_of_the_same_name(tmp_path: Path, monkeypatch):
+def test_a_name_means_the_file_then_the_one_in_protocols_then_the_shipped_one(
+    tmp_path: Path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
-    assert find_protocol("quickstart") == protocols_folder() / "quickstart.toml"
+    shipped, own = protocols_folder() / "quickstart.toml", Path("protocols/quickstart.toml")
+    assert find_protocol("quickstart") == find_protocol("quickstart.toml") == shipped
+    init_folder(Path())
+    Path("quickstart").mkdir()  # a folder is no protocol
+    capsys.readouterr()
+    assert find_protocol("quickstart") == own
+    assert capsys.readouterr().err == f"protocol: {own}\n"
+    Path("quickstart").rmdir()
     Path("quickstart").touch()
     assert find_protocol("quickstart") == Path("quickstart")
-    with pytest.raises(UsageError, match="no such file"):
-        find_protocol("elsewhere/quickstart.toml")
+    assert find_protocol(str(own)) == own
+    assert capsys.readouterr().err == ""  # a path says itself which file it is
+    with pytest.raises(UsageError, match=r"no such file.*did you mean 'quickstart'"):
+        find_protocol("elsewhere/quickstarts.toml")
 
 
 def test_without_a_terminal_a_table_is_tab_separated_and_one_line_per_row(capsys):
@@ -155,6 +167,18 @@ def test_a_long_word_among_many_is_whole(monkeypatch: pytest.MonkeyPatch, width:
     print_table(("what against what", "share", "what to do"), [row])
     assert {*" ".join(row).split()} <= {*shown.getvalue().split()}
     assert max(map(len, shown.getvalue().splitlines())) <= width
+
+
+@pytest.mark.parametrize("width", range(24, 64, 3))
+def test_an_uncertainty_is_in_one_line_with_its_number(
+    monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    shown = on_a_terminal(monkeypatch, width)
+    told = "the LuGre compensation reduces the error by a factor of 3.87 ± 0.03 in all tests"
+    print_line(told)
+    print_table(("what", "change of the error"), [(told, f"larger, {told}"), ("a", "b")])
+    assert "±" in shown.getvalue()
+    assert all("3.87 ± 0.03" in line for line in shown.getvalue().splitlines() if "±" in line)
 
 
 @pytest.mark.parametrize("width", [20, 60])

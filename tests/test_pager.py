@@ -10,7 +10,7 @@ from contextlib import suppress
 import pytest
 
 from campaign.cli import output
-from campaign.cli.main import PAGED
+from campaign.cli.app import PAGED
 from campaign.cli.output import paged, print_line
 
 

@@ -129,6 +129,7 @@ def test_what_data_sheets_print(quantity: Quantity, text: str, value: float):
         (units.FREQUENCY, "1" * 99 + " Hz", "over 100 characters"),
         (units.FREQUENCY, "1 √Hz", "'√' stands in no unit"),
         (units.FREQUENCY, "1 hz", "did you mean 'Hz'"),
+        (units.FREQUENCY, "1 Hertz", "allowed are Hz, .*did you mean 'Hz'"),  # as it is listed
         (units.FREQUENCY, "1 1/s", "not a unit of frequency"),
         (units.FREQUENCY, "1 rad/s", "not a unit of frequency"),
         (units.FREQUENCY, "1e400 Hz", "not a finite number"),
@@ -162,7 +163,7 @@ def test_what_is_refused_and_why(quantity: Quantity, text: str, message: str):
     ("quantity", "text", "meant"),
     [
         (units.TORQUE_CONSTANT, "1 NM/A", "N m/A"),
-        (units.TORQUE_CONSTANT, "1 N-M/a", "N-m/A"),
+        (units.TORQUE_CONSTANT, "1 N-M/a", "N m/A"),
         (units.TORQUE_CONSTANT, "1 mNM/A", "mN m/A"),
         (units.FREQUENCY, "1 KHZ", "kHz"),
         (units.FREQUENCY, "1 MHZ", "MHz"),

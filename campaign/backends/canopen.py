@@ -15,7 +15,6 @@ from campaign.axis_kind import AxisKind, sides_in
 from campaign.backends.interface import BackendKind, Source, StopFlag
 from campaign.canopen_drive import objects as od
 from campaign.canopen_drive.address import BITRATE, address_of
-from campaign.canopen_drive.bus_load import PROMISED, beyond_bus, bus_load
 from campaign.canopen_drive.client import Client, Start, start_process
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.ends import End
@@ -30,6 +29,9 @@ from campaign.canopen_drive.player import (
 from campaign.canopen_drive.proof import RATE as PROOF_RATE
 from campaign.canopen_drive.proof import Proof
 from campaign.canopen_drive.settings import (
+    PROMISED,
+    beyond_bus,
+    bus_load,
     compare_eds,
     present,
     set_limits,

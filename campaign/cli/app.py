@@ -1,44 +1,25 @@
 """Options of the program, and the commands that plan and execute.
 
-What is asked of archives is in `archive_commands`, of a rig by its runs in `rig_commands`, what is
-done once in `setup_commands`, and what is done at a bench in `bench_commands`: each adds its
-commands to those of the one before. `GROUPS` says under which heading `--help` lists each.
+What is asked of runs is in `archive_commands`, what is done at a bench or once per installation in
+`bench_commands`: each adds its commands to those of the one before. `GROUPS` says under which
+heading `--help` lists each. Everything heavy is imported inside the commands.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 import campaign
-from campaign.cli.parameters import (
-    RESULTS,
-    BackendOption,
-    ClearStopOption,
-    ExecutorOption,
-    FromOption,
-    HandoverOption,
-    JsonOption,
-    LargeOption,
-    OnlyOption,
-    PortOption,
-    ProtocolArgument,
-    ReportOption,
-    ResultsOption,
-    RunArgument,
-    SetOption,
-    SignOption,
-    TlsOption,
-    TruthOption,
-    WatchOption,
-    WorkersOption,
-    YesOption,
-    output_option,
-    workers_option,
-)
+from campaign.cli import parameters as given
+from campaign.cli.output import paged, print_line, redirect_prints
+from campaign.cli.parameters import RESULTS, flag, option, several
+from campaign.errors import ExitCode
 
 GROUPS = {
     "Experiments": ("init", "plan", "run", "resume", "rerun", "import"),
@@ -50,6 +31,11 @@ GROUPS = {
     "Installation": ("doctor", "warmup", "new"),
 }
 """Commands as the help lists them, by heading."""
+PAGED = frozenset({"check", "compare", "identify", "kinds", "list", "plan", "show", "trend"})
+
+Ended = ExitCode | Path | tuple[Path | Sequence[Path], ExitCode] | None
+"""What a command returns: its exit code, what it wrote, or both."""
+Command = TypeVar("Command", bound=Callable[..., Ended])
 
 
 class GroupedCommands(TyperGroup):
@@ -62,6 +48,28 @@ class GroupedCommands(TyperGroup):
             if own:
                 with formatter.section(heading):
                     formatter.write_dl(own)
+
+
+class QuietCommand(TyperCommand):
+    """A command whose standard output is for what it prints itself, and for no plug-in.
+
+    Its last lines are the paths that it returns.
+    """
+
+    def invoke(self, ctx: Any) -> None:
+        with self._paging(ctx), redirect_prints():
+            ended: Ended = super().invoke(ctx)
+            if isinstance(ended, Path):
+                ended = ended, ExitCode.DONE
+            written, code = ended if isinstance(ended, tuple) else ((), ended or ExitCode.DONE)
+            for path in [written] if isinstance(written, Path) else written:
+                print_line(str(path))
+            ctx.exit(code)
+
+    def _paging(self, ctx: Any) -> AbstractContextManager[None]:
+        """A pager for commands that only tell something."""
+        as_it_comes = ctx.parent.params.get("no_pager") or ctx.params.get("as_json")
+        return paged() if self.name in PAGED and not as_it_comes else nullcontext()
 
 
 app = typer.Typer(
@@ -79,6 +87,16 @@ app = typer.Typer(
 )
 
 
+def command(name: str | None = None) -> Callable[[Command], Command]:
+    """Adds a function to the program; the list of commands has all of its docstring's sentence."""
+
+    def add(function: Command) -> Command:
+        told = (function.__doc__ or "").split("\n\n")[0]
+        return app.command(name, cls=QuietCommand, short_help=told)(function)
+
+    return add
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         from campaign.execution.provenance import own_versions
@@ -94,79 +112,70 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
     no_pager: Annotated[
-        bool, typer.Option("--no-pager", help="Show long output as it comes, not by PAGER (less).")
+        bool, flag("--no-pager", "Show long output as it comes, not by PAGER (less).")
     ] = False,
 ) -> None:
     pass
 
 
-@app.command()
+@command()
 def plan(
-    protocol: ProtocolArgument,
-    as_json: JsonOption = False,
+    protocol: given.Protocol,
+    as_json: given.Json = False,
     details: Annotated[
-        bool, typer.Option("--details", help="Limits, loops, chosen options, notes of each test.")
+        bool, flag("--details", "Limits, loops, chosen options, notes of each test.")
     ] = False,
-    only: OnlyOption = None,
-    changes: SetOption = None,
-    backend: BackendOption = "sim",
-    results: ResultsOption = RESULTS,
-    port: PortOption = None,
-    source: FromOption = None,
-    handover: HandoverOption = None,
-    allow_large: LargeOption = False,
-    truth: TruthOption = "",
-) -> None:
+    only: given.Only = None,
+    changes: given.Set = None,
+    backend: given.Backend = "sim",
+    results: given.Results = RESULTS,
+    port: given.Port = None,
+    source: given.From = None,
+    handover: given.Handover = None,
+    allow_large: given.Large = False,
+    truth: given.Truth = "",
+) -> Ended:
     """Show the trials, their time and limits, and what would be written; execute nothing."""
     from campaign.cli.plan import show_plan
     from campaign.cli.prepare import Request, short_settings
 
     settings = (*(changes or ()), *short_settings(port, source, results, handover))
     request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
-    raise typer.Exit(show_plan(request, results, as_json=as_json, details=details))
+    return show_plan(request, results, as_json=as_json, details=details)
 
 
-@app.command()
+@command()
 def run(
-    protocol: ProtocolArgument,
-    backend: BackendOption = "sim",
-    results: ResultsOption = RESULTS,
-    only: OnlyOption = None,
-    changes: SetOption = None,
-    workers: WorkersOption = None,
-    executor: ExecutorOption = "",
-    tls: TlsOption = None,
-    report: ReportOption = False,
-    port: PortOption = None,
-    source: FromOption = None,
-    handover: HandoverOption = None,
-    operator: Annotated[
-        str, typer.Option("--operator", metavar="NAME", help="Who is responsible for the run.")
-    ] = "",
-    note: Annotated[
-        str, typer.Option("--note", metavar="TEXT", help="Anything worth keeping with the run.")
-    ] = "",
-    tags: Annotated[
-        list[str] | None,
-        typer.Option("--tag", metavar="WORD", help="To find the run by; may be given again."),
-    ] = None,
-    yes: YesOption = False,
-    clear_stop: ClearStopOption = None,
-    sign: SignOption = None,
-    allow_large: LargeOption = False,
-    truth: TruthOption = "",
+    protocol: given.Protocol,
+    backend: given.Backend = "sim",
+    results: given.Results = RESULTS,
+    only: given.Only = None,
+    changes: given.Set = None,
+    workers: given.Workers = None,
+    executor: given.Executor = "",
+    tls: given.Tls = None,
+    report: given.Report = False,
+    port: given.Port = None,
+    source: given.From = None,
+    handover: given.Handover = None,
+    operator: Annotated[str, option("--operator", "NAME", "Who is responsible for the run.")] = "",
+    note: Annotated[str, option("--note", "TEXT", "Anything worth keeping with the run.")] = "",
+    tags: Annotated[list[str] | None, several("--tag", "WORD", "To find the run by")] = None,
+    yes: given.Yes = False,
+    clear_stop: given.ClearStop = None,
+    sign: given.Sign = None,
+    allow_large: given.Large = False,
+    truth: given.Truth = "",
     check_step: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--check-step",
-            help="Simulate each trial once more at half its step, and say what that changes.",
+            "Simulate each trial once more at half its step, and say what that changes.",
         ),
     ] = False,
-    profile: Annotated[
-        bool, typer.Option("--profile", help="Say at the end where the time went.")
-    ] = False,
-    watch: WatchOption = False,
-) -> None:
+    profile: Annotated[bool, flag("--profile", "Say at the end where the time went.")] = False,
+    watch: given.Watch = False,
+) -> Ended:
     """Execute a protocol and archive it; the archive's path is the last line of the output."""
     from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
@@ -179,101 +188,93 @@ def run(
 
     settings = (*(changes or ()), *short_settings(port, source, results, handover))
     settings += (SETTING,) if check_step else ()
-    request = Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth)
-    remarks = Remarks(operator, note, tuple(tags or ()))
-    raise typer.Exit(
-        run_protocol(
-            request,
-            results,
-            workers=workers,
-            where=ExecutorChoice(executor, tls),
-            report=report,
-            yes=yes,
-            clear_stop=clear_stop,
-            remarks=remarks,
-            sign=sign,
-            stopwatch=stopwatch,
-            watch=watch,
-        )
+    return run_protocol(
+        Request(protocol, tuple(only or ()), settings, backend, allow_large, truth=truth),
+        results,
+        workers=workers,
+        where=ExecutorChoice(executor, tls),
+        report=report,
+        yes=yes,
+        clear_stop=clear_stop,
+        remarks=Remarks(operator, note, tuple(tags or ())),
+        sign=sign,
+        stopwatch=stopwatch,
+        watch=watch,
     )
 
 
-@app.command()
+@command()
 def resume(
-    run: RunArgument,
-    results: ResultsOption = RESULTS,
+    run: given.Run,
+    results: given.Results = RESULTS,
     accept_changes: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--accept-changes",
-            help="Go on although protocol, bench, backend or versions have changed since.",
+            "Go on although protocol, bench, backend or versions have changed since.",
         ),
     ] = False,
-    workers: WorkersOption = None,
-    executor: ExecutorOption = "",
-    tls: TlsOption = None,
-    report: ReportOption = False,
-    port: PortOption = None,
-    yes: YesOption = False,
-    clear_stop: ClearStopOption = None,
-    sign: SignOption = None,
-    watch: WatchOption = False,
-) -> None:
+    workers: given.Workers = None,
+    executor: given.Executor = "",
+    tls: given.Tls = None,
+    report: given.Report = False,
+    port: given.Port = None,
+    yes: given.Yes = False,
+    clear_stop: given.ClearStop = None,
+    sign: given.Sign = None,
+    watch: given.Watch = False,
+) -> Ended:
     """Go on with a run that was interrupted, killed or ended by a fault; repeat nothing done."""
     from campaign.cli.cluster import ExecutorChoice
     from campaign.cli.resume import resume_run
 
-    raise typer.Exit(
-        resume_run(
-            run,
-            results,
-            accept_changes=accept_changes,
-            workers=workers,
-            where=ExecutorChoice(executor, tls),
-            report=report,
-            port=port,
-            yes=yes,
-            clear_stop=clear_stop,
-            sign=sign,
-            watch=watch,
-        )
+    return resume_run(
+        run,
+        results,
+        accept_changes=accept_changes,
+        workers=workers,
+        where=ExecutorChoice(executor, tls),
+        report=report,
+        port=port,
+        yes=yes,
+        clear_stop=clear_stop,
+        sign=sign,
+        watch=watch,
     )
 
 
-@app.command()
+@command()
 def rerun(
-    run: RunArgument,
+    run: given.Run,
     trial: Annotated[str, typer.Argument(metavar="TRIAL", help="Its number, or its name.")],
-    results: ResultsOption = RESULTS,
-) -> None:
+    results: given.Results = RESULTS,
+) -> Ended:
     """Execute one archived trial again on the simulated bench, and compare it bit by bit."""
     from campaign.cli.rerun import rerun_trial
 
-    raise typer.Exit(rerun_trial(run, trial, results))
+    return rerun_trial(run, trial, results)
 
 
-@app.command("import")
+@command("import")
 def import_(
     files: Annotated[
         list[str],
-        typer.Argument(
-            metavar="MAPPING",
-            help="A TOML file that says what columns are and which files are which trials; with "
+        given.argument(
+            "MAPPING",
+            "A TOML file that says what columns are and which files are which trials; with "
             "--guess the recordings themselves.",
-            show_default=False,
         ),
     ],
-    results: ResultsOption = RESULTS,
-    only: OnlyOption = None,
-    changes: SetOption = None,
-    workers: WorkersOption = None,
-    report: ReportOption = False,
+    results: given.Results = RESULTS,
+    only: given.Only = None,
+    changes: given.Set = None,
+    workers: given.Workers = None,
+    report: given.Report = False,
     guess: Annotated[
-        bool,
-        typer.Option("--guess", help="Print a first mapping of these files, to be corrected."),
+        bool, flag("--guess", "Print a first mapping of these files, to be corrected.")
     ] = False,
-    sign: SignOption = None,
-) -> None:
+    sign: given.Sign = None,
+) -> Ended:
     """Make a run of recordings from elsewhere; the archive's path is the last line of the output.
 
     A mapping is a protocol whose tests were executed by another program: docs/import.md.
@@ -281,69 +282,63 @@ def import_(
     from campaign.cli.import_command import guess_mapping, import_recordings
 
     if guess:
-        raise typer.Exit(guess_mapping([Path(each) for each in files]))
-    raise typer.Exit(
-        import_recordings(
-            files,
-            results,
-            only=tuple(only or ()),
-            changes=tuple(changes or ()),
-            workers=workers,
-            report=report,
-            sign=sign,
-        )
+        return guess_mapping([Path(each) for each in files])
+    return import_recordings(
+        files,
+        results,
+        only=tuple(only or ()),
+        changes=tuple(changes or ()),
+        workers=workers,
+        report=report,
+        sign=sign,
     )
 
 
-@app.command()
+@command()
 def calibrate(
-    protocol: ProtocolArgument,
-    results: ResultsOption = RESULTS,
+    protocol: given.Protocol,
+    results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        output_option(
+        option(
+            "--output",
             "FILE",
             "Where the result goes, with the bench beside it; a new file in --results when absent.",
         ),
     ] = None,
-    workers: Annotated[
-        int | None,
-        workers_option("Simulations at once"),
-    ] = None,
+    workers: Annotated[int | None, given.workers_option("Simulations at once")] = None,
     leave_out: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--leave-one-out/--no-leave-one-out",
-            help="Refit without each frequency in turn, to see how well it is predicted.",
+            "Refit without each frequency in turn, to see how well it is predicted.",
         ),
     ] = True,
     fit: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--fit/--no-fit",
-            help="Without: the bench stays as it is, and intervals and covariance are worked out.",
+            "Without: the bench stays as it is, and intervals and covariance are worked out.",
         ),
     ] = True,
     propagate: Annotated[
         str,
-        typer.Option(
+        option(
             "--propagate",
-            metavar="PROTOCOL",
-            help="Carry the covariance to the published cells of this protocol, not of its own.",
+            "PROTOCOL",
+            "Carry the covariance to the published cells of this protocol, not of its own.",
         ),
     ] = "",
-) -> None:
+) -> Ended:
     """Fit a simulated bench to published cells; the result's path is the last line of output."""
     from campaign.cli.calibrate import calibrate_protocol
 
-    raise typer.Exit(
-        calibrate_protocol(
-            protocol,
-            results,
-            output,
-            workers=workers,
-            leave_out=leave_out,
-            fit=fit,
-            propagated=propagate,
-        )
+    return calibrate_protocol(
+        protocol,
+        results,
+        output,
+        workers=workers,
+        leave_out=leave_out,
+        fit=fit,
+        propagated=propagate,
     )

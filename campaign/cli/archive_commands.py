@@ -1,243 +1,322 @@
-"""Commands that read archived runs: report, compare, index, export, list, show."""
+"""Commands that read archived runs: report, compare, identify, trend, index, export, list, show."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from campaign.cli.app import app
-from campaign.cli.output import print_line
-from campaign.cli.parameters import (
-    RESULTS,
-    FormatOption,
-    JsonOption,
-    NewestRunArgument,
-    OpenOption,
-    ResultsOption,
-    RunArgument,
-    TemplatesOption,
-    output_option,
-)
+from campaign.cli import parameters as given
+from campaign.cli.app import Ended, app, command
+from campaign.cli.parameters import RESULTS, argument, flag, option, several
 from campaign.errors import UsageError
 
 __all__ = ["app"]
 
 
-@app.command()
+@command()
 def report(
-    run: NewestRunArgument = None,
-    results: ResultsOption = RESULTS,
+    run: given.NewestRun = None,
+    results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        output_option("DIR", "Where to write it; RUN-report beside the archive when absent."),
+        option("--output", "DIR", "Where to write it; RUN-report beside the archive when absent."),
     ] = None,
-    templates: TemplatesOption = None,
-    open_it: OpenOption = False,
+    templates: given.Templates = None,
+    open_it: given.Open = False,
     measure_anew: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--measure-anew",
-            help="Measure the recordings by this program, not as they were when executed.",
+            "Measure the recordings by this program, not as they were when executed.",
         ),
     ] = False,
     only_figure: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--only-figure",
-            metavar="TEST/KEY",
-            help="Only this figure, or all, SVG and CSV; into RUN-figures, or --output. Its "
+            "TEST/KEY",
+            "Only this figure, or all, SVG and CSV; into RUN-figures, or --output. Its "
             "caption on the page names it.",
-            show_default=False,
         ),
     ] = None,
     column: Annotated[
         str,
-        typer.Option(
+        option(
             "--column",
-            metavar="single|double",
-            help="With --only-figure: 88 or 180 mm wide, with PDF, for a paper.",
+            "single|double",
+            "With --only-figure: 88 or 180 mm wide, with PDF, for a paper.",
         ),
     ] = "",
-    formats: FormatOption = None,
+    formats: given.Format = None,
     trials: Annotated[
         str,
-        typer.Option(
+        option(
             "--trials",
-            metavar="WHICH",
-            help="Trials that get a page of their own: failed, all, N..M, or N,M.",
-            show_default=False,
+            "WHICH",
+            "Trials that get a page of their own: failed, all, N..M, or N,M.",
         ),
     ] = "",
     zoom: Annotated[
-        bool,
-        typer.Option("--interactive", help="Lines of the page can be zoomed into and read off."),
+        bool, flag("--interactive", "Lines of the page can be zoomed into and read off.")
     ] = False,
     references: Annotated[
         list[Path] | None,
-        typer.Option(
+        several(
             "--reference",
-            metavar="CSV",
-            help="Reference values to compare with (quantity, value, unit, low, high, test, "
-            "conditions); may be given again.",
+            "CSV",
+            "Reference values to compare with (quantity, value, unit, low, high, test, conditions)",
         ),
     ] = None,
-) -> None:
+) -> Ended:
     """Write report.html, its tables and its figures, from an archive alone."""
     from campaign.cli.report import draw_figures, report_run
 
-    if only_figure is not None:
-        of_the_page = {
-            "--templates": templates,
-            "--open": open_it,
-            "--format": formats,
-            "--trials": trials,
-            "--interactive": zoom,
-            "--reference": references,
-        }
-        useless = [option for option, value in of_the_page.items() if value]
-        drawings, code = draw_figures(
+    if only_figure is None:
+        if column:
+            raise UsageError("--column is for --only-figure TEST/KEY, or --only-figure all")
+        return report_run(
             run,
             results,
             output,
-            only_figure,
+            templates,
+            open_it=open_it,
             measure_anew=measure_anew,
-            useless=useless,
-            column=column,
+            formats=formats or (),
+            trials=trials,
+            zoom=zoom,
+            references=references or (),
         )
-        for drawing in drawings:
-            print_line(str(drawing))
-        raise typer.Exit(code)
-    if column:
-        raise UsageError("--column is for --only-figure TEST/KEY, or --only-figure all")
-    page, code = report_run(
+    of_the_page = {
+        "--templates": templates,
+        "--open": open_it,
+        "--format": formats,
+        "--trials": trials,
+        "--interactive": zoom,
+        "--reference": references,
+    }
+    useless = [name for name, value in of_the_page.items() if value]
+    return draw_figures(
         run,
         results,
         output,
-        templates,
-        open_it=open_it,
+        only_figure,
         measure_anew=measure_anew,
-        formats=formats or (),
-        trials=trials,
-        zoom=zoom,
-        references=references or (),
+        useless=useless,
+        column=column,
     )
-    print_line(str(page))
-    raise typer.Exit(code)
 
 
-@app.command()
+@command()
 def compare(
     runs: Annotated[
         list[str],
-        typer.Argument(
-            metavar="RUN RUN...",
-            help="The reference, and what is compared with it: paths, names, or their beginnings.",
-            show_default=False,
+        argument(
+            "RUN RUN...",
+            "The reference, and what is compared with it: paths, names, or their beginnings.",
         ),
     ],
-    results: ResultsOption = RESULTS,
+    results: given.Results = RESULTS,
     output: Annotated[
         Path | None,
-        output_option("DIR", "Where to write it; beside the reference when absent."),
+        option("--output", "DIR", "Where to write it; beside the reference when absent."),
     ] = None,
     exchanged: Annotated[
         list[str] | None,
-        typer.Option(
+        several(
             "--exchanged",
-            metavar="SOURCE",
-            help="What is not the same in all runs although the benches say so, as `torque "
-            "constant` of a motor that was exchanged; may be given again.",
+            "SOURCE",
+            "What differs although the benches state one value, such as `torque constant` of "
+            "another motor",
         ),
     ] = None,
-    templates: TemplatesOption = None,
-    formats: FormatOption = None,
-    open_it: OpenOption = False,
-) -> None:
+    templates: given.Templates = None,
+    formats: given.Format = None,
+    open_it: given.Open = False,
+) -> Ended:
     """Say which numbers of runs differ from those of the first, and how sure that is."""
     from campaign.cli.compare import compare_archives
 
-    page, code = compare_archives(
+    return compare_archives(
         runs, results, output, exchanged or (), templates, formats or (), open_it=open_it
     )
-    print_line(str(page))
-    raise typer.Exit(code)
 
 
-@app.command()
-def index(
-    results: Annotated[
-        Path | None,
-        typer.Argument(metavar="[RESULTS]", help="As --results.", show_default=False),
+@command()
+def identify(
+    run: Annotated[
+        str | None,
+        argument(
+            "[RUN[:TEST]]",
+            "A run, or one test of it: path, name, or its beginning; the newest when absent.",
+        ),
     ] = None,
-    folder: ResultsOption = RESULTS,
-    open_it: OpenOption = False,
-) -> None:
-    """Write index.html into a results folder: one searchable page over all its runs."""
-    from campaign.cli.index import index_results
-
-    print_line(str(index_results(results or folder, open_it=open_it)))
-
-
-@app.command()
-def export(
-    run: RunArgument,
-    to: Annotated[
-        str, typer.Option("--to", metavar="FORMAT", help="csv, parquet, mat, or a plug-in's.")
-    ],
-    results: ResultsOption = RESULTS,
+    results: given.Results = RESULTS,
+    model: Annotated[
+        list[str] | None,
+        several("--model", "NAME", "Only this method (`campaign kinds` lists them)"),
+    ] = None,
+    validate: Annotated[
+        str | None,
+        option("--validate", "RUN[:TEST]", "Predict this one, to which nothing is fitted."),
+    ] = None,
+    compare_with: Annotated[
+        str | None,
+        option(
+            "--compare",
+            "RUN[:TEST]",
+            "Fit the same model to this one, and say what has changed.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
-        output_option("DIR", "A new folder; RUN-FORMAT beside the archive when absent."),
+        option("--output", "BENCH.toml", "Write the rig's bench file with what was identified."),
     ] = None,
-    tests: Annotated[
+    page: Annotated[
+        Path | None,
+        option(
+            "--page",
+            "DIR",
+            "Where the page goes; RUN-identification beside the archive when absent.",
+        ),
+    ] = None,
+    changes: given.Set = None,
+    templates: given.Templates = None,
+    formats: given.Format = None,
+    open_it: given.Open = False,
+) -> Ended:
+    """Identify a rig from its recordings: parameters, intervals, and what they rest on."""
+    from campaign.cli.identify import identify_run
+
+    return identify_run(
+        run,
+        results,
+        models=model or (),
+        validate=validate,
+        compare=compare_with,
+        bench=output,
+        page=page,
+        settings=changes or (),
+        templates=templates,
+        formats=formats or (),
+        open_it=open_it,
+    )
+
+
+@command()
+def trend(
+    runs: Annotated[
+        list[str],
+        argument(
+            "RUN RUN RUN...",
+            "Three runs of one rig or more, in any order: paths, names, or their beginnings.",
+        ),
+    ],
+    results: given.Results = RESULTS,
+    over: Annotated[
+        str,
+        option(
+            "--over",
+            "WHAT",
+            "Over what: time, order, temperature (a channel, or a tag temperature=23.5), "
+            "a tag NAME=NUMBER, or a number that the runs found.",
+        ),
+    ] = "time",
+    model: Annotated[
         list[str] | None,
-        typer.Option("--test", metavar="TEST", help="Only this test; may be given again."),
+        several(
+            "--model",
+            "NAME",
+            "Follow what this method identifies, too (`campaign kinds` lists them)",
+        ),
     ] = None,
-    trials: Annotated[
-        list[int] | None,
-        typer.Option("--trial", metavar="N", help="Only this trial; may be given again."),
+    exchanged: Annotated[
+        list[str] | None,
+        several(
+            "--exchanged",
+            "SOURCE@RUN",
+            "What another piece has from this run on, such as the `torque constant` of an "
+            "exchanged motor",
+        ),
     ] = None,
-) -> None:
+    output: Annotated[
+        Path | None,
+        option("--output", "DIR", "Where to write it; beside the last run when absent."),
+    ] = None,
+    templates: given.Templates = None,
+    formats: given.Format = None,
+    open_it: given.Open = False,
+) -> Ended:
+    """Say which numbers of a rig drift or jump over its runs, or follow the temperature."""
+    from campaign.cli.trend import trend_of_archives
+
+    return trend_of_archives(
+        runs,
+        results,
+        output,
+        over,
+        model or (),
+        exchanged or (),
+        templates,
+        formats or (),
+        open_it=open_it,
+    )
+
+
+@command()
+def index(
+    results: Annotated[Path | None, argument("[RESULTS]", "As --results.")] = None,
+    folder: given.Results = RESULTS,
+    open_it: given.Open = False,
+) -> Ended:
+    """Write index.html into a results folder: one searchable page over all its runs."""
+    from campaign.cli.output import open_page
+    from campaign.report.index.page import write_index
+    from campaign.resources import templates_folder
+
+    page = write_index(results or folder, templates_folder())
+    if open_it:
+        open_page(page)
+    return page
+
+
+@command()
+def export(
+    run: given.Run,
+    to: Annotated[str, option("--to", "FORMAT", "csv, parquet, mat, or a plug-in's.")],
+    results: given.Results = RESULTS,
+    output: Annotated[
+        Path | None,
+        option("--output", "DIR", "A new folder; RUN-FORMAT beside the archive when absent."),
+    ] = None,
+    tests: Annotated[list[str] | None, several("--test", "TEST", "Only this test")] = None,
+    trials: Annotated[list[int] | None, several("--trial", "N", "Only this trial")] = None,
+) -> Ended:
     """Write recordings as files of other programs, with a table of the trials beside them."""
     from campaign.cli.export import export_archive
 
-    folder, code = export_archive(run, results, to, output, tests or (), trials or ())
-    print_line(str(folder))
-    raise typer.Exit(code)
+    return export_archive(run, results, to, output, tests or (), trials or ())
 
 
-@app.command("list")
+@command("list")
 def list_command(
-    results: ResultsOption = RESULTS,
+    results: given.Results = RESULTS,
     protocol: Annotated[
-        list[str] | None,
-        typer.Option("--protocol", metavar="NAME", help="Runs of it; a pattern will do."),
+        list[str] | None, option("--protocol", "NAME", "Runs of it; a pattern will do.")
     ] = None,
-    since: Annotated[
-        str, typer.Option("--since", metavar="DATE", help="Begun then or later.")
-    ] = "",
-    until: Annotated[str, typer.Option("--until", metavar="DATE", help="Begun by then.")] = "",
-    backend: Annotated[
-        list[str] | None, typer.Option("--backend", metavar="NAME", help="Executed by it.")
-    ] = None,
+    since: Annotated[str, option("--since", "DATE", "Begun then or later.")] = "",
+    until: Annotated[str, option("--until", "DATE", "Begun by then.")] = "",
+    backend: Annotated[list[str] | None, option("--backend", "NAME", "Executed by it.")] = None,
     bench: Annotated[
-        list[str] | None,
-        typer.Option("--bench", metavar="NAME", help="With a test on it; a pattern will do."),
+        list[str] | None, option("--bench", "NAME", "With a test on it; a pattern will do.")
     ] = None,
     status: Annotated[
-        list[str] | None,
-        typer.Option("--status", metavar="STATUS", help="As `complete` or `failed trials`."),
+        list[str] | None, option("--status", "STATUS", "As `complete` or `failed trials`.")
     ] = None,
-    tag: Annotated[
-        list[str] | None, typer.Option("--tag", metavar="TAG", help="With every tag given.")
-    ] = None,
-    as_json: JsonOption = False,
+    tag: Annotated[list[str] | None, option("--tag", "TAG", "With every tag given.")] = None,
+    as_json: given.Json = False,
 ) -> None:
     """List the archived runs, the newest first; options but --since and --until may be repeated."""
-    from campaign.cli.archives import list_archives
-    from campaign.cli.selection import Selection, statuses
+    from campaign.cli.archives import Selection, list_archives, statuses
 
     selection = Selection(
         protocols=tuple(protocol or ()),
@@ -251,81 +330,66 @@ def list_command(
     list_archives(results, selection, as_json=as_json)
 
 
-@app.command()
+@command()
 def show(
-    run: NewestRunArgument = None,
-    results: ResultsOption = RESULTS,
+    run: given.NewestRun = None,
+    results: given.Results = RESULTS,
     metrics: Annotated[
-        bool,
-        typer.Option("--metrics", help="Also what each recording says by itself, with intervals."),
+        bool, flag("--metrics", "Also what each recording says by itself, with intervals.")
     ] = False,
-    as_json: JsonOption = False,
-) -> None:
+    as_json: given.Json = False,
+) -> Ended:
     """Show what a run was, how it ended, and all that did not go as planned."""
     from campaign.cli.show import show_archive
 
-    raise typer.Exit(show_archive(run, results, as_json=as_json, metrics=metrics))
+    return show_archive(run, results, as_json=as_json, metrics=metrics)
 
 
-@app.command()
+@command()
 def verify(
     runs: Annotated[
         list[str],
-        typer.Argument(
-            metavar="RUN...",
-            help="A path, a run's name, a unique beginning of it, or a pattern such as '2026-*'.",
-            show_default=False,
+        argument(
+            "RUN...",
+            "A path, a run's name, a unique beginning of it, or a pattern such as '2026-*'.",
         ),
     ],
-    results: ResultsOption = RESULTS,
+    results: given.Results = RESULTS,
     signer: Annotated[
         str | None,
-        typer.Option(
-            "--signer",
-            metavar="NAME",
-            help="Who must have signed; needs --allowed-signers.",
-            show_default=False,
-        ),
+        option("--signer", "NAME", "Who must have signed; needs --allowed-signers."),
     ] = None,
     allowed_signers: Annotated[
         Path | None,
-        typer.Option(
-            "--allowed-signers",
-            metavar="FILE",
-            help="Which keys are whose, as ssh-keygen(1) describes it.",
-            show_default=False,
-        ),
+        option("--allowed-signers", "FILE", "Which keys are whose, as ssh-keygen(1) describes it."),
     ] = None,
-    as_json: JsonOption = False,
-) -> None:
+    as_json: given.Json = False,
+) -> Ended:
     """Check every byte of archives against checksums, journal, format and fingerprints.
 
     Anyone who changes a run can compute its checksums anew: only a signature shows that.
     """
-    from campaign.cli.signature import wanted_signature
-    from campaign.cli.verify import verify_archives
+    from campaign.cli.verify import verify_archives, wanted_signature
 
     wanted = wanted_signature(signer, allowed_signers)
-    raise typer.Exit(verify_archives(runs, results, as_json=as_json, wanted=wanted))
+    return verify_archives(runs, results, as_json=as_json, wanted=wanted)
 
 
-@app.command()
+@command()
 def sign(
-    run: RunArgument,
+    run: given.Run,
     key: Annotated[
         Path,
-        typer.Option(
+        option(
             "--key",
-            metavar="FILE",
-            help="A private key of OpenSSH, or a public one whose other half the agent has.",
+            "FILE",
+            "A private key of OpenSSH, or a public one whose other half the agent has.",
         ),
     ],
-    results: ResultsOption = RESULTS,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Set a signature that is there aside.")
-    ] = False,
-) -> None:
+    results: given.Results = RESULTS,
+    replace: Annotated[bool, flag("--replace", "Set a signature that is there aside.")] = False,
+) -> Ended:
     """Sign a sealed run that is sound: a file RUN.nxs.sig beside it proves who, not when."""
     from campaign.cli.sign import sign_archive
 
-    raise typer.Exit(sign_archive(run, results, key, replace=replace))
+    return sign_archive(run, results, key, replace=replace)

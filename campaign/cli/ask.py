@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 
 from campaign.backends.interface import BackendKind
@@ -18,7 +19,7 @@ from campaign.execution.operator_prompts import UNATTENDED, Attendance, wait_unl
 from campaign.options import Options
 from campaign.plain_text import storable
 from campaign.protocol import PlannedTest
-from campaign.protocol.loop_check import sought_instability
+from campaign.protocol.limit_check import sought_instability
 from campaign.protocol.stages import most_of
 from campaign.trial import Trial
 
@@ -103,27 +104,29 @@ def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance
     if not (kind.live or kind.by_hand):
         return UNATTENDED
     if yes:
-        return Attendance(AssumingOperator(), wait_unless)
+        return Attendance(AbsentOperator(ASSUMED), wait_unless)
     if kind.by_hand and not has_terminal():
-        return Attendance(ReadingOperator(), wait_unless)
+        return Attendance(AbsentOperator(ON_ITS_PAGE, shows=False), wait_unless)
     return Attendance(ConsoleOperator(display.hidden), wait_unless)
 
 
-class AssumingOperator:
-    """Stands in for a person where a script said `--yes`; the record says so."""
+@dataclass(frozen=True)
+class AbsentOperator:
+    """Nobody is asked: a script said `--yes`, or the person reads the steps elsewhere.
+
+    Attributes:
+        answer: for the record.
+        shows: whether the steps are printed.
+    """
+
+    answer: str
+    shows: bool = True
 
     def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
-        """Shows the step, and takes it for done."""
-        print_note(f"before {trial.name}: {step}: {ASSUMED}")
-        return ASSUMED
-
-
-class ReadingOperator:
-    """Who executes trials elsewhere, and reads there what to do; nobody is at this terminal."""
-
-    def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
-        """Nobody is asked here."""
-        return ON_ITS_PAGE
+        """Takes the step for done; the record has the answer."""
+        if self.shows:
+            print_note(f"before {trial.name}: {step}: {self.answer}")
+        return self.answer
 
 
 class ConsoleOperator:

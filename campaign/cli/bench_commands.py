@@ -1,4 +1,4 @@
-"""Commands at a bench: status, emulated controller, stop."""
+"""Commands at a bench, about kinds and files, and those that are given once per installation."""
 
 from __future__ import annotations
 
@@ -7,173 +7,257 @@ from typing import Annotated
 
 import typer
 
-from campaign.cli.output import print_line
-from campaign.cli.parameters import (
-    BaudOption,
-    BenchArgument,
-    ControllerOption,
-    JsonOption,
-    PatienceOption,
-    output_option,
-)
-from campaign.cli.setup_commands import app
+from campaign.cli import parameters as given
+from campaign.cli.app import Ended, command
+from campaign.cli.archive_commands import app
+from campaign.cli.completion import complete_kind
+from campaign.cli.parameters import RESULTS, argument, flag, option, several
+from campaign.errors import ExitCode
 
 __all__ = ["app"]
 
 
-@app.command()
+@command()
+def kinds(
+    name: Annotated[
+        str | None,
+        argument("[NAME]", "One of them, with its options.", autocompletion=complete_kind),
+    ] = None,
+) -> None:
+    """List experiments, friction models, compensation methods and backends."""
+    from campaign.cli.kinds import list_kinds, show_kind
+
+    if name is None:
+        list_kinds()
+    else:
+        show_kind(name)
+
+
+@command()
+def model(
+    names: Annotated[
+        list[str],
+        typer.Argument(metavar="NAME...", help="Friction models or specimens of `campaign kinds`."),
+    ],
+    rate: Annotated[str, option("--rate", "RATE", "Amplitude of the rate.")] = "1 deg/s",
+    frequency: Annotated[str, option("--frequency", "FREQUENCY", "Of the rate.")] = "1 Hz",
+    changes: Annotated[list[str] | None, several("--set", "PARAMETER=VALUE", "A parameter")] = None,
+    bench: Annotated[
+        str, option("--bench", "BENCH", "Its first friction interface gives the others.")
+    ] = "simulink",
+    output: Annotated[Path | None, option("--output", "FILE.svg", "Where to draw.")] = None,
+) -> Ended:
+    """Draw friction models alone, at a sinusoidal rate; CSV beside the picture."""
+    from campaign.cli.model import show_models
+
+    motion = {"rate": rate, "frequency": frequency}
+    return show_models(names, motion, changes or (), bench, output)
+
+
+@command()
+def schema(
+    of: Annotated[
+        str,
+        typer.Argument(metavar="protocol|bench|mapping|report", help="Which files it describes."),
+    ],
+) -> None:
+    """Print a JSON Schema, by which editors complete and check TOML."""
+    from campaign.cli.schemas import print_schema
+
+    print_schema(of)
+
+
+@command()
+def new(
+    kind: Annotated[
+        str,
+        typer.Argument(metavar="experiment|model|method|backend|format", help="What it provides."),
+    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the package and its kind.")],
+    output: Annotated[Path, option("--output", "DIR", "Where its folder is made.")] = Path(),
+) -> None:
+    """Write a package of your own: a kind that works, with a test."""
+    from campaign.cli.new_package import new_package
+
+    new_package(kind, name, output)
+
+
+@command()
+def warmup() -> Ended:
+    """Compile the engine now, once per installation, instead of in the first run."""
+    from campaign.cli.compile_engine import warm_up
+
+    return warm_up()
+
+
+@command()
+def doctor(results: given.Results = RESULTS, as_json: given.Json = False) -> Ended:
+    """Say what this installation is, what is wrong with it, and what to do."""
+    from campaign.cli.doctor import examine
+
+    return examine(results, as_json=as_json)
+
+
+@command()
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Made when it is not there.")],
+    bench: Annotated[
+        str,
+        option(
+            "--bench",
+            "BENCH",
+            "Write protocols for this bench instead: a TOML file, or a shipped bench's name.",
+        ),
+    ] = "",
+    everything: Annotated[
+        bool, flag("--all", "Beside those of a bench, copy all that is shipped, too.")
+    ] = False,
+) -> None:
+    """Copy the shipped protocols, benches and templates into DIR, or write a bench its own."""
+    if bench:
+        from campaign.cli.rig_protocols import init_for_bench
+
+        init_for_bench(folder, bench)
+    if everything or not bench:
+        from campaign.cli.schemas import init_folder
+
+        init_folder(folder)
+
+
+@command()
 def check(
-    bench: BenchArgument,
+    bench: given.Bench,
     output: Annotated[
         Path | None,
-        output_option(
-            "FILE", "The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent."
+        option(
+            "--output",
+            "FILE",
+            "The Bode picture, .svg or .png; BENCH-check.svg in this folder when absent.",
         ),
     ] = None,
-    as_json: JsonOption = False,
-) -> None:
+    as_json: given.Json = False,
+) -> Ended:
     """Show the loops of a bench, their margins, and whether its sizes fit each other."""
     from campaign.cli.check import check_bench
 
-    raise typer.Exit(check_bench(bench, output, as_json=as_json))
+    return check_bench(bench, output, as_json=as_json)
 
 
-@app.command()
+@command()
 def fingerprint(
-    bench: BenchArgument,
+    bench: given.Bench,
     check: Annotated[
-        bool, typer.Option("--check", help="Only say whether the bench is the one described.")
+        bool, flag("--check", "Only say whether the bench is the one described.")
     ] = False,
-) -> None:
+) -> Ended:
     """State in a bench's file that what is known of it is said of the bench as it is now."""
     from campaign.cli.fingerprint import fingerprint_bench
 
-    raise typer.Exit(fingerprint_bench(bench, check=check))
+    return fingerprint_bench(bench, check=check)
 
 
-@app.command()
+@command()
 def device(
     bench: Annotated[
         str,
-        typer.Option(
+        option(
             "--bench",
-            metavar="BENCH",
-            help="The bench behind the controller: a TOML file, or a shipped bench's name.",
+            "BENCH",
+            "The bench behind the controller: a TOML file, or a shipped bench's name.",
         ),
     ],
-    pty: Annotated[bool, typer.Option("--pty", help="Serve a pseudo-terminal.")] = False,
+    pty: Annotated[bool, flag("--pty", "Serve a pseudo-terminal.")] = False,
     tcp: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--tcp",
-            metavar="HOST:PORT",
-            help="Serve TCP there, port 0 for any; without --pty and --tcp 127.0.0.1:0.",
-            show_default=False,
+            "HOST:PORT",
+            "Serve TCP there, port 0 for any; without --pty and --tcp 127.0.0.1:0.",
         ),
     ] = None,
-    speed: Annotated[
-        str,
-        typer.Option("--speed", metavar="X", help="Times the wall clock, or max."),
-    ] = "1",
+    speed: Annotated[str, option("--speed", "X", "Times the wall clock, or max.")] = "1",
     faults: Annotated[
         list[str] | None,
-        typer.Option(
+        several(
             "--fault",
-            metavar="NAME[=VALUE][@trial=N][@time=S]",
-            help="What shall go wrong, e.g. drop=1e-4 or reboot@trial=2; may be given again.",
+            "NAME[=VALUE][@trial=N][@time=S]",
+            "What shall go wrong, e.g. drop=1e-4 or reboot@trial=2",
         ),
     ] = None,
-    fault_seed: Annotated[
-        int, typer.Option("--fault-seed", metavar="N", min=0, help="Of what fails by chance.")
-    ] = 0,
+    fault_seed: Annotated[int, option("--fault-seed", "N", "Of what fails by chance.", min=0)] = 0,
     heartbeat_timeout: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--heartbeat-timeout",
-            metavar="S",
+            "S",
+            "Silence after which it switches off; 0.1 s, at --speed max 3 s if absent.",
             min=0.01,
             max=60.0,
-            help="Silence after which it switches off; 0.1 s, at --speed max 3 s if absent.",
-            show_default=False,
         ),
     ] = None,
     latch: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--latch",
-            metavar="FILE",
-            help="Where it remembers that it was stopped; a new file if absent; none: nowhere.",
-            show_default=False,
+            "FILE",
+            "Where it remembers that it was stopped; a new file if absent; none: nowhere.",
         ),
     ] = None,
     new_latch: Annotated[
-        bool,
-        typer.Option("--new-latch", help="First start: make the --latch FILE, not latched."),
+        bool, flag("--new-latch", "First start: make the --latch FILE, not latched.")
     ] = False,
     log: Annotated[
-        Path | None,
-        typer.Option(
-            "--log", metavar="FILE", help="Note drive, stops and hosts there.", show_default=False
-        ),
+        Path | None, option("--log", "FILE", "Note drive, stops and hosts there.")
     ] = None,
-) -> None:
+) -> Ended:
     """Be a servo controller with a simulated bench, to rehearse against; Ctrl-C ends it."""
     from campaign.cli.device import run_device
 
-    raise typer.Exit(
-        run_device(
-            bench,
-            tcp=tcp,
-            pty=pty,
-            speed=speed,
-            heartbeat_timeout=heartbeat_timeout,
-            faults=faults or (),
-            fault_seed=fault_seed,
-            latch=latch,
-            new_latch=new_latch,
-            log=log,
-        )
+    return run_device(
+        bench,
+        tcp=tcp,
+        pty=pty,
+        speed=speed,
+        heartbeat_timeout=heartbeat_timeout,
+        faults=faults or (),
+        fault_seed=fault_seed,
+        latch=latch,
+        new_latch=new_latch,
+        log=log,
     )
 
 
-@app.command()
+@command()
 def stop(
-    port: ControllerOption,
-    baud: BaudOption = 2_000_000,
-    patience: PatienceOption = 10.0,
-) -> None:
+    port: given.Controller, baud: given.Baud = 2_000_000, patience: given.Patience = 10.0
+) -> Ended:
     """Panic stop: drive off, and off it stays; works whoever has the port, and while that hangs."""
     from campaign.cli.stop import stop_bench
 
-    raise typer.Exit(stop_bench(port, baud, patience))
+    return stop_bench(port, baud, patience)
 
 
-@app.command()
+@command()
 def status(
-    port: ControllerOption,
-    baud: BaudOption = 2_000_000,
-    patience: PatienceOption = 3.0,
-    as_json: JsonOption = False,
-) -> None:
+    port: given.Controller,
+    baud: given.Baud = 2_000_000,
+    patience: given.Patience = 3.0,
+    as_json: given.Json = False,
+) -> Ended:
     """Show how a controller is, who holds it, and whether somebody has stopped it."""
     from campaign.cli.status import show_status
 
-    raise typer.Exit(show_status(port, baud, patience, as_json=as_json))
+    return show_status(port, baud, patience, as_json=as_json)
 
 
-@app.command("export-compensation")
+@command("export-compensation")
 def export_compensation_command(
-    bench: BenchArgument,
+    bench: given.Bench,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the bench's [compensation].")],
-    target: Annotated[
-        str, typer.Option("--to", metavar="c|c-single|st|matlab|json", help="In which form.")
-    ] = "c",
-    output: Annotated[
-        Path, typer.Option("--output", metavar="DIR", help="Where to write it.")
-    ] = Path(),
-) -> None:
+    target: Annotated[str, option("--to", "c|c-single|st|matlab|json", "In which form.")] = "c",
+    output: Annotated[Path, option("--output", "DIR", "Where to write it.")] = Path(),
+) -> Ended:
     """Write a compensation of a bench as code for a controller, with test vectors."""
     from campaign.cli.export_compensation import export_compensation
 
-    for path in export_compensation(bench, name, target, output):
-        print_line(str(path))
+    return export_compensation(bench, name, target, output), ExitCode.DONE

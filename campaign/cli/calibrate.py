@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from rich.console import Console
-from rich.text import Text
-
-from campaign.archive.layout.files import why, write_atomically
+from campaign.archive.layout.files import write_atomically
 from campaign.calibration.document import bench_text, interruption, result_text
 from campaign.calibration.known_values import known_entries
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
 from campaign.calibration.targets import shortest
-from campaign.cli.output import error_console, print_line, print_note, print_table
+from campaign.cli.output import print_line, print_note, print_table, waiting
 from campaign.cli.prepare import find_protocol
-from campaign.errors import ExitCode, UsageError
-from campaign.estimation.multi_start import Display, Progress, agreeing
+from campaign.errors import ExitCode, UsageError, writing
+from campaign.estimation.multi_start import Progress, agreeing
 from campaign.experiments import experiments
 from campaign.interrupts import unwinding
 from campaign.physics.complete import PURPOSES
@@ -29,7 +24,6 @@ from campaign.protocol.missing_values import check_benches
 from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
 
-PLAIN_INTERVAL = 10.0  # s between plain lines of one phase
 SHOWN_PROBLEMS = 5  # of the simulation; the result has them all
 
 
@@ -61,20 +55,21 @@ def calibrate_protocol(
     # Hours later is too late to learn that the bench's file cannot be edited.
     unknown = {path: {"origin": "fitted"} for p in space.parameters for path, _ in p.fields}
     bench_text(source, space, space.present, {"fitted": fitted, "values": unknown})
-    with _display(error_console()) as display:
+    with waiting("evaluating the bench as it is") as show:
         outcome = calibrate(
             problem,
             experiments(),
             workers=workers or os.cpu_count() or 1,
-            display=display,
+            display=lambda progress: show(progress.phase, _line(progress)),
             leave_out=leave_out,
             fit=fit,
             propagated=other,
         )
     known = known_entries(outcome, fitted, document)
     calibrated = bench_text(source, space, outcome.values, known)
-    _write(bench, calibrated)
-    _write(result, result_text(outcome, bench.name, calibrated))
+    for path, text in ((bench, calibrated), (result, result_text(outcome, bench.name, calibrated))):
+        with writing(path):
+            write_atomically(path, text)
     _say(outcome)
     print_note(f"bench: {bench}")
     print_line(str(result))
@@ -109,39 +104,11 @@ def _files(path: Path, results: Path, output: Path | None) -> tuple[Path, Path]:
             if not any(file.exists() for file in pair):
                 break
             number += 1
-    try:
+    with writing(pair[0].parent):
         pair[0].parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"{pair[0].parent}: {why(error)}") from None
     if pair[0].is_dir() or not os.access(pair[0].parent, os.W_OK):
         raise UsageError(f"{pair[0]}: cannot be written; name another file with --output")
     return pair
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        write_atomically(path, text)
-    except OSError as error:
-        raise UsageError(f"{path}: {why(error)}") from None
-
-
-@contextmanager
-def _display(console: Console) -> Iterator[Display]:
-    """A line redrawn in place on a terminal; elsewhere one per phase, and one now and then."""
-    if console.is_terminal and not console.is_dumb_terminal:
-        with console.status("evaluating the bench as it is") as status:
-            yield lambda progress: status.update(Text(_line(progress)))
-        return
-    phase, printed = "", 0.0
-
-    def display(progress: Progress) -> None:
-        nonlocal phase, printed
-        now = time.monotonic()
-        if progress.phase != phase or now - printed >= PLAIN_INTERVAL:
-            phase, printed = progress.phase, now
-            console.print(Text(_line(progress)), soft_wrap=True)
-
-    yield display
 
 
 def _line(progress: Progress) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from campaign.cli.output import on_a_terminal, print_json, print_line, print_note, print_table
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ExitCode, UsageError, writing
 from campaign.physics.bench import Bench
 from campaign.physics.bench_facts import Fact, facts_of
 from campaign.physics.complete import PURPOSES, CompleteBench, complete, lacking
@@ -114,13 +114,11 @@ def _write_picture(bench: CompleteBench, path: Path) -> None:
     if suffix not in (".svg", ".png"):
         raise UsageError(f"--output {path}: a picture's name ends in .svg or .png")
     names = ("none", *bench.compensation)
-    try:
+    with writing(f"--output {path}"):
         if suffix == ".png":
             path.write_bytes(bode_png(bench, names))
         else:
             path.write_text(bode_svg(bench, names), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"--output {path}: cannot be written: {error.strerror}") from None
 
 
 def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
-import webbrowser
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import print_line, print_note, print_table
+from campaign.cli.output import open_page, print_line, print_note, print_table
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.page import write_comparison
 from campaign.comparison.run_comparison import Against, Comparison, compare_runs
@@ -31,8 +29,6 @@ from campaign.report.formats import chosen_formats
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit
 
-WIDTH = 80
-"""Columns of a terminal that is not wide."""
 STEM = 90
 """Letters of a run's name that a folder is called by."""
 BENCH_LINES = 8
@@ -66,8 +62,8 @@ def compare_archives(
     for side in comparison.sides:
         for problem in side.problems:
             print_note(problem, style="yellow")
-    if open_it and not webbrowser.open(page.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
+    if open_it:
+        open_page(page)
     codes = [say_damaged(side.run.path, side.damaged) for side in comparison.sides]
     return page, worst_exit_code(codes)
 
@@ -84,19 +80,16 @@ def _tell(against: Against, comparison: Comparison) -> None:
     reference, other = against.reference, against.other
     print_line(f"{reference.letter}  {reference.run.name}  {reference.title}")
     print_line(f"{other.letter}  {other.run.name}  {other.title}")
-    for line in textwrap.wrap(" ".join(sentences(against, comparison.tested)), WIDTH):
-        print_line(line)
+    print_line(" ".join(sentences(against, comparison.tested)))
     benches = list(bench_lines(against))
     for told in benches[:BENCH_LINES]:
-        for line in textwrap.wrap(told, WIDTH, subsequent_indent="  "):
-            print_line(line)
+        print_line(told, 2)
     if len(benches) > BENCH_LINES:
         print_line(f"and {len(benches) - BENCH_LINES} more of the bench, on the page")
     if against.equal:
         return
     for why in islice(not_judged(against.pairs), REASONS):
-        for line in textwrap.wrap(f"not judged, {why}", WIDTH, subsequent_indent="  "):
-            print_line(line)
+        print_line(f"not judged, {why}", 2)
     shown = list(_order(against))
     if shown:
         heads = ("finding", reference.letter, other.letter, "change", "")

@@ -26,10 +26,12 @@ def complete_run(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_protocol(context: typer.Context, incomplete: str) -> list[str]:
-    """Shipped protocols by name, and files and folders that lie there."""
+    """Protocols by name, shipped or in `protocols/`, and files and folders that lie there."""
     from campaign.resources import shipped_protocols
 
-    names = [name for name in shipped_protocols() if name.startswith(incomplete)]
+    own = (path.stem for path in Path("protocols").glob("*.toml"))
+    known = sorted({*shipped_protocols(), *own})
+    names = [name for name in known if name.startswith(incomplete)]
     with suppress(OSError):
         return names + list(_files(incomplete))
     return names

@@ -16,11 +16,10 @@ from campaign.device.controller import HEARTBEAT_TIMEOUT, PATIENCE
 from campaign.device.faults import FaultSpec, parse_faults
 from campaign.device.latch import new_memory
 from campaign.device.line import PtyStream, TcpLine
-from campaign.device.log import DeviceLog
-from campaign.device.machine import Setup
+from campaign.device.machine import DeviceLog, Setup
 from campaign.device.server import Server
 from campaign.device.warm_up import warm_up
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ExitCode, UsageError, writing
 from campaign.interrupts import unwinding
 from campaign.protocol.bench_file import simulable
 
@@ -107,21 +106,18 @@ def _latch_file(named: str | None, *, new: bool) -> Iterator[Path | None]:
 
 
 def _make(file: Path) -> None:
-    try:
-        new_memory(file)
-    except FileExistsError:
-        raise UsageError(
-            f"--new-latch: {file} exists and may hold a stop; start without --new-latch"
-        ) from None
-    except OSError as error:
-        raise UsageError(f"--latch {file}: cannot be written: {error.strerror}") from None
+    with writing(f"--latch {file}"):
+        try:
+            new_memory(file)
+        except FileExistsError:
+            raise UsageError(
+                f"--new-latch: {file} exists and may hold a stop; start without --new-latch"
+            ) from None
 
 
 def _log(file: Path | None) -> DeviceLog:
-    try:
+    with writing(f"--log {file}"):
         return DeviceLog(file)
-    except OSError as error:
-        raise UsageError(f"--log {file}: cannot be written: {error.strerror}") from None
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

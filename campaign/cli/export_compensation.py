@@ -13,11 +13,11 @@ from campaign.cli.check import CheckedLoop, loops_checked
 from campaign.cli.output import print_line, print_note
 from campaign.controller_code.compensation import SampledCompensation, trial_inputs
 from campaign.controller_code.targets import targets
-from campaign.errors import UsageError
+from campaign.errors import UsageError, writing
 from campaign.physics.bench_knowledge import KnownValue
 from campaign.physics.complete import CompleteBench
 from campaign.protocol.bench_file import bench_source, simulable
-from campaign.protocol.loop_check import margins_in_words
+from campaign.protocol.limit_check import margins_in_words
 from campaign.text import number
 
 
@@ -33,12 +33,10 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     made = SampledCompensation.of(simulable(bench), name)
     head = list(_head(bench, made))
     texts = known[target].write(made, head, trial_inputs(made))
-    try:
+    with writing(f"--output {output}"):
         output.mkdir(parents=True, exist_ok=True)
         for file, text in texts.items():
             (output / file).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"--output {output}: cannot be written: {error.strerror}") from None
     for line in head:
         print_line(line)
     low = [each.verdict for each in _loops(made.bench, name) if each.verdict != "fine"]

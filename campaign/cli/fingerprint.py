@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from campaign.archive.layout.files import why, write_atomically
+from campaign.archive.layout.files import write_atomically
 from campaign.cli.output import print_line, print_note
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ExitCode, UsageError, writing
 from campaign.physics.bench_fingerprint import fingerprint, why_altered
 from campaign.protocol.bench_edit import with_known
-from campaign.protocol.bench_file import bench_source, checked, names_file
+from campaign.protocol.bench_file import bench_source, checked
+from campaign.protocol.further_files import names_file
 
 
 def fingerprint_bench(written: str, *, check: bool) -> ExitCode:
@@ -27,10 +28,8 @@ def fingerprint_bench(written: str, *, check: bool) -> ExitCode:
         )
     if not check and bench.known.fingerprint != now:
         text = with_known(source.text, {}, written)
-        try:
+        with writing(source.file):
             write_atomically(source.file, text)
-        except OSError as error:
-            raise UsageError(f"{source.file}: {why(error)}") from None
         print_note(f"written to {written}")
     print_line(f"bench\t{now.bench}")
     for name, one in now.compensation.items():

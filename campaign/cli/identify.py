@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import textwrap
 import tomllib
-import webbrowser
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-
-from rich.text import Text
 
 from campaign.api.estimate_text import of_unknown_size
 from campaign.archive import find_run
 from campaign.archive.layout.files import why, write_atomically
 from campaign.axis_kind import axis_terms
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import error_console, print_line, print_note, print_table
-from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code
+from campaign.cli.output import open_page, print_line, print_note, print_table, waiting
+from campaign.errors import ExitCode, NoResultError, UsageError, worst_exit_code, writing
 from campaign.estimate import Origin
 from campaign.identify import experiments_by_model
 from campaign.identify.bench_document import bench_text, keys_by_method, nothing_to_write
@@ -30,8 +25,6 @@ from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
 from campaign.text import pretty_unit, words
-
-WIDTH = 80
 
 
 @unwinding()
@@ -63,7 +56,7 @@ def identify_run(
     refuse_other(output, PAGE)  # before minutes of work, and before a bench is written
     if bench is not None:
         _refuse_foreign_bench(bench)
-    with _waiting() as say:
+    with waiting("reading") as show:
         found = identify(
             chosen,
             experiments_by_model(),
@@ -71,16 +64,12 @@ def identify_run(
             validation=unseen,
             compared=compared,
             settings=settings,
-            say=say,
+            say=lambda text: show(text.split(": ")[0], text),
         )
     if all(each.result is None for each in found.sections):
-        told = [f"{each.model.name}: {each.problem}" for each in found.sections]
-        lines = [
-            textwrap.fill(each, WIDTH, initial_indent="  ", subsequent_indent="    ")
-            for each in told
-        ]
+        told = (f"  {each.model.name}: {each.problem}" for each in found.sections)
         refused = NoResultError(
-            "\n".join([f"{chosen.name}: nothing can be identified from it", *lines])
+            "\n".join([f"{chosen.name}: nothing can be identified from it", *told])
         )
         refused.exit_code = worst_exit_code([refused.exit_code, *map(_say_damaged, sides)])
         raise refused
@@ -93,7 +82,9 @@ def identify_run(
         found, output, templates_folder(), command, written, templates, also
     )
     if bench is not None and text is not None:
-        _write_bench(bench, text)  # first: whoever reads what is printed may end early
+        with writing(bench):  # first: whoever reads what is printed may end early
+            bench.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(bench, text)
     _say(found)
     if bench is not None:
         if text is None:
@@ -102,32 +93,13 @@ def identify_run(
         print_note(f"bench: {bench}")
         for method, keys in keys_by_method(found).items():
             print_note(f"  {method}: {', '.join(keys)}")
-    if open_it and not webbrowser.open(made.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
+    if open_it:
+        open_page(made)
     return made, worst_exit_code([*map(_say_damaged, sides)])
 
 
 def _say_damaged(chosen: ChosenRun) -> ExitCode:
     return say_damaged(chosen.run.path, chosen.run.damaged)
-
-
-@contextmanager
-def _waiting() -> Iterator[Callable[[str], None]]:
-    """A line redrawn in place on a terminal; elsewhere one for each method."""
-    console = error_console()
-    if console.is_terminal and not console.is_dumb_terminal:
-        with console.status("reading") as status:
-            yield lambda text: status.update(Text(text))
-        return
-    told: set[str] = set()
-
-    def say(text: str) -> None:
-        head = text.split(": ")[0]
-        if head not in told:
-            told.add(head)
-            print_note(head)
-
-    yield say
 
 
 def _command(
@@ -138,16 +110,12 @@ def _command(
     settings: Sequence[str],
 ) -> str:
     """What makes the same again; names of runs as they were given, and no folders of anybody."""
-    parts = ["campaign identify", _named(run)]
+    parts = ["campaign identify", Path(run).name]
     parts += [f"--model {name}" for name in models]
-    parts += [f"--validate {_named(validate)}"] if validate else []
-    parts += [f"--compare {_named(compare)}"] if compare else []
+    parts += [f"--validate {Path(validate).name}"] if validate else []
+    parts += [f"--compare {Path(compare).name}"] if compare else []
     parts += [f"--set '{text}'" for text in settings]
     return " ".join(parts)
-
-
-def _named(run: str) -> str:
-    return Path(run).name
 
 
 def _beside(chosen: ChosenRun) -> Path:
@@ -171,20 +139,12 @@ def _refuse_foreign_bench(path: Path) -> None:
         raise UsageError(f"{path} is there already and is no bench; name another file")
 
 
-def _write_bench(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, text)
-    except OSError as error:
-        raise UsageError(f"{path}: {why(error)}") from None
-
-
 def _say(found: Identification) -> None:
     print_line(_verdict(found))
     with axis_terms(found.bench.sides):
         for section in found.sections:
             if section.result is None:
-                _wrapped(f"{section.model.name}: not identified: {section.problem}")
+                print_line(f"{section.model.name}: not identified: {section.problem}")
                 continue
             _tell(section)
             if section.problem:
@@ -195,7 +155,7 @@ def _say(found: Identification) -> None:
                 print_table(heads, [[str(row[head]) for head in heads] for row in changes.rows])
         advice = next_measurement(found)
         if advice:
-            _wrapped(advice)
+            print_line(advice)
 
 
 def _verdict(found: Identification) -> str:
@@ -231,11 +191,6 @@ def _tell(section: Section) -> None:
         if each.estimate.reason:
             reasons.setdefault(str(each.estimate.reason), []).append(words(each.estimate.name))
     for reason, names in reasons.items():
-        _wrapped(f"{', '.join(names)}: {reason}.")
+        print_line(f"{', '.join(names)}: {reason}.")
     for remark in of_unknown_size(each.estimate for each in section.identified.parameters):
-        _wrapped(remark)
-
-
-def _wrapped(text: str) -> None:
-    for line in textwrap.wrap(text, WIDTH):
-        print_line(line)
+        print_line(remark)

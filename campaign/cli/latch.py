@@ -67,9 +67,8 @@ def latch_text(stop: PanicStop) -> str:
 def _ask(found: PanicStop, stop: Callable[[], bool]) -> None:
     if not has_terminal():
         raise StillStoppedError(
-            f"the bench was {latch_text(found)}, and there is no terminal to ask whether it may "
-            "move; "
-            f"who has seen why it was stopped adds --clear-stop {found.count}; nothing was moved"
+            f"the bench was {latch_text(found)}; nothing was moved. See why it was stopped, then "
+            f"add --clear-stop {found.count}"
         )
     print_note("It stays off until that is cleared. Look at the bench first.")
     print_note("Type clear when it may move again: ")

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any, NoReturn
-
-from typer.core import TyperCommand
+from typing import NoReturn
 
 from campaign.cli.bench_commands import app  # with all commands
-from campaign.cli.output import paged, plain_streams, print_note, redirect_prints
+from campaign.cli.output import plain_streams, print_note
 from campaign.entry_points import blamed, one_line
 from campaign.errors import (
     DEBUG,
@@ -24,27 +21,7 @@ from campaign.errors import (
 from campaign.plain_text import printable
 
 PLUG_IN_FAULT = ExitCode.LIMIT_OR_FAULT
-PAGED = frozenset({"check", "compare", "identify", "kinds", "list", "plan", "show", "trend"})
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
-
-
-class QuietCommand(TyperCommand):
-    """A command whose standard output is for what it prints itself, and for no plug-in."""
-
-    def invoke(self, ctx: Any) -> Any:
-        with self._paging(ctx), redirect_prints():
-            return super().invoke(ctx)
-
-    def _paging(self, ctx: Any) -> AbstractContextManager[None]:
-        """A pager for commands that only tell something."""
-        as_it_comes = ctx.parent.params.get("no_pager") or ctx.params.get("as_json")
-        return paged() if self.name in PAGED and not as_it_comes else nullcontext()
-
-
-for _command in app.registered_commands:
-    _command.cls = QuietCommand
-    # The whole sentence, and no more; the list of commands would cut it.
-    _command.short_help = (getattr(_command.callback, "__doc__", None) or "").split("\n\n")[0]
 
 
 def main() -> None:

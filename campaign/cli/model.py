@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -11,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field
 
 from campaign.cli.output import print_line
-from campaign.errors import UsageError
+from campaign.errors import UsageError, writing
 from campaign.options import Options
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionModel
@@ -95,11 +94,12 @@ def show_models(
     for each in met:
         told = f"half the step changes it by {number(100 * each.change, 2)} % at most"
         print_line(f"{each.model.name}: {each.model.summary}; {told}")
-    try:
+    with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
-        path.with_suffix(".csv").write_text(_csv(met, asked), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+        table = _table(met, asked)
+        table.to_csv(
+            path.with_suffix(".csv"), index=False, float_format="%.9g", lineterminator="\n"
+        )
     return path
 
 
@@ -217,10 +217,6 @@ def _figure(met: Sequence[ModelCycle], motion: MotionOptions) -> Figure:
     )
 
 
-def _csv(met: Sequence[ModelCycle], motion: MotionOptions) -> str:
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["time_s", "rate_rad_per_s", "angle_rad", *(f"{m.model.name}_N_m" for m in met)])
-    columns = (*_motion(motion), *(each.friction for each in met))
-    rows.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
-    return text.getvalue()
+def _table(met: Sequence[ModelCycle], motion: MotionOptions) -> pd.DataFrame:
+    columns = dict(zip(("time_s", "rate_rad_per_s", "angle_rad"), _motion(motion), strict=True))
+    return pd.DataFrame(columns | {f"{m.model.name}_N_m": m.friction for m in met})

@@ -12,7 +12,7 @@ from pathlib import Path
 from string import Template
 
 from campaign.cli.output import print_line
-from campaign.errors import UsageError
+from campaign.errors import UsageError, writing
 
 TEMPLATES = Path(__file__).with_name("package_templates")
 POINTS = {
@@ -35,16 +35,13 @@ def new_package(kind: str, name: str, folder: Path) -> None:
         raise UsageError(f"there is no package for {kind!r}; there are {', '.join(POINTS)}")
     _check_name(name)
     package = folder / name
-    try:
-        package.mkdir(parents=True)
+    if package.exists():
+        raise UsageError(f"{package} is there already; nothing was written")
+    with writing(package):
         for path, text in package_files(kind, name).items():
-            (package / path).parent.mkdir(exist_ok=True)
+            (package / path).parent.mkdir(parents=True, exist_ok=True)
             (package / path).write_text(text, encoding="utf-8", newline="\n")
             print_line(str(package / path))
-    except FileExistsError:
-        raise UsageError(f"{package} is there already; nothing was written") from None
-    except OSError as error:
-        raise UsageError(f"{package}: cannot be written: {error.strerror}") from None
     print_line(f"now: pip install -e {package}; pytest {package}; campaign kinds {name}")
 
 

@@ -16,8 +16,11 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+import time
+import webbrowser
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TextIO, cast
 
 from rich import box
@@ -32,6 +35,8 @@ from campaign.plain_text import json_text, printable
 
 TYPED = "  campaign "
 """What a line begins with that is to be typed as it is, and therefore never broken."""
+INTERVAL = 10.0
+"""s between two lines of one phase where nothing is redrawn."""
 ONE_LINE = 20
 """Characters up to which no cell of a table on a terminal goes on below."""
 
@@ -181,8 +186,7 @@ def print_note(text: str, style: str = "") -> None:
 def _print_words(out: Console, text: Text, hang: int = 0) -> None:
     """Line by line; where a terminal is too narrow for one, the rest of it goes below, indented."""
     if out.is_terminal:
-        lines = (_wrapped(line, out.width, hang) for line in text.plain.split("\n"))
-        text = Text("\n".join(lines), style=text.style)
+        text = Text(_broken(text.plain, out.width, hang), style=text.style)
     out.print(text, soft_wrap=True)
 
 
@@ -192,13 +196,47 @@ def _wrapped(line: str, width: int, hang: int) -> str:
     text = line.lstrip()
     indent = line[: len(line) - len(text)]
     return textwrap.fill(
-        text,
+        _joined(text),
         width,
         initial_indent=indent,
         subsequent_indent=indent + " " * hang,
         break_long_words=False,
         break_on_hyphens=False,
     )
+
+
+@contextmanager
+def waiting(first: str) -> Iterator[Callable[[str, str], None]]:
+    """What is done meanwhile, on standard error; hand on the phase, and all of it in words.
+
+    A line redrawn in place on a terminal, which begins with `first`; elsewhere one for each phase,
+    and one now and then.
+    """
+    out = error_console()
+    if out.is_terminal and not out.is_dumb_terminal:
+        with out.status(first) as status:
+            yield lambda phase, text: status.update(Text(text))
+        return
+    printed: dict[str, float] = {}
+
+    def show(phase: str, text: str) -> None:
+        now = time.monotonic()
+        if now - printed.get(phase, -INTERVAL) >= INTERVAL:
+            printed[phase] = now
+            print_note(text)
+
+    yield show
+
+
+def _joined(text: str) -> str:
+    """An uncertainty in one line with its number: no line is broken at these spaces."""
+    return text.replace(" ± ", "\xa0±\xa0")
+
+
+def open_page(page: Path) -> None:
+    """In a browser; a note where there is none."""
+    if not webbrowser.open(page.resolve().as_uri()):
+        print_note("no browser was found; open the file by hand", style="yellow")
 
 
 def print_json(tree: Any) -> None:
@@ -241,7 +279,8 @@ def print_table(
 
 
 def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
-    return zip(*([_plain(cell) for cell in row] for row in (headings, *rows)), strict=True)
+    shown = ([_joined(_plain(cell)) for cell in row] for row in (headings, *rows))
+    return zip(*shown, strict=True)
 
 
 def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table | None:
@@ -261,7 +300,8 @@ def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table 
 def _least(column: Sequence[str]) -> int:
     """Width at which no word is broken; short cells and names stay in one line."""
     whole = all(cell_len(cell) <= ONE_LINE or " " not in cell for cell in column)
-    return max(cell_len(part) for cell in column for part in ([cell] if whole else cell.split()))
+    parts = (part for cell in column for part in ([cell] if whole else cell.split(" ")))
+    return max(cell_len(line) for part in parts for line in part.split("\n"))
 
 
 def _shared(columns: Sequence[Sequence[str]], widths: list[int], left: int) -> list[int]:
@@ -281,8 +321,14 @@ def _table(columns: Sequence[Sequence[str]], widths: Sequence[int]) -> Table:
     for column, width in zip(columns, widths, strict=True):
         table.add_column(column[0], width=width)
     for row in list(zip(*columns, strict=True))[1:]:
-        table.add_row(*map(Text, row))
+        cells = zip(row, widths, strict=True)
+        table.add_row(*(Text(_broken(cell, width)) for cell, width in cells))
     return table
+
+
+def _broken(text: str, width: int, hang: int = 0) -> str:
+    """Each line of a text in lines of that width."""
+    return "\n".join(_wrapped(line, width, hang) for line in text.split("\n"))
 
 
 def _print_record(out: Console, headings: Sequence[str], row: Sequence[str]) -> None:

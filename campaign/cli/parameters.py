@@ -9,181 +9,132 @@ import typer
 
 from campaign.cli.completion import complete_protocol, complete_run
 
-
-def output_option(metavar: str, help_text: str) -> Any:
-    """`--output`: what is written differs from command to command, how it is named does not."""
-    return typer.Option("--output", metavar=metavar, help=help_text, show_default=False)
+RESULTS = Path("results")
+RUN = "A path, a run's name, or a unique beginning of it"
 
 
-def workers_option(help_text: str) -> Any:
+def option(name: str, metavar: str, told: str, **more: Any) -> Any:
+    """An option with a value."""
+    return typer.Option(name, metavar=metavar, help=told, **more)
+
+
+def flag(name: str, told: str) -> Any:
+    """An option that is there or not."""
+    return typer.Option(name, help=told)
+
+
+def several(name: str, metavar: str, told: str) -> Any:
+    """An option of which each value is one more."""
+    return typer.Option(name, metavar=metavar, help=f"{told}; may be given again.")
+
+
+def argument(metavar: str, told: str, **more: Any) -> Any:
+    """An argument; whether it may be absent is what its metavar shows."""
+    return typer.Argument(metavar=metavar, help=told, show_default=False, **more)
+
+
+def workers_option(told: str) -> Any:
     """`--workers`: how many of something at once, one per processor when absent."""
-    told = f"{help_text}; one per processor if absent."
-    return typer.Option("--workers", metavar="N", min=1, max=256, help=told, show_default=False)
+    told = f"{told}; one per processor if absent."
+    return option("--workers", "N", told, min=1, max=256)
 
 
-ProtocolArgument = Annotated[
+Protocol = Annotated[
     str,
     typer.Argument(
         metavar="PROTOCOL",
-        help="A TOML file, or the name of a shipped protocol.",
+        help="A TOML file, or the name of one in protocols/ or of a shipped protocol.",
         autocompletion=complete_protocol,
     ),
 ]
-RunArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="RUN",
-        help="A path, a run's name, or a unique beginning of it.",
-        show_default=False,
-        autocompletion=complete_run,
-    ),
-]
-NewestRunArgument = Annotated[
+Run = Annotated[str, argument("RUN", f"{RUN}.", autocompletion=complete_run)]
+NewestRun = Annotated[
     str | None,
-    typer.Argument(
-        metavar="[RUN]",
-        help="A path, a run's name, or a unique beginning of it; the newest when absent.",
-        show_default=False,
-        autocompletion=complete_run,
-    ),
+    argument("[RUN]", f"{RUN}; the newest when absent.", autocompletion=complete_run),
 ]
-BenchArgument = Annotated[
+Bench = Annotated[
     str, typer.Argument(metavar="BENCH", help="A TOML file, or a shipped bench's name.")
 ]
-ResultsOption = Annotated[
-    Path, typer.Option("--results", metavar="DIR", help="Where the archives are.")
-]
-OnlyOption = Annotated[
+Results = Annotated[Path, option("--results", "DIR", "Where the archives are.")]
+Only = Annotated[list[str] | None, several("--only", "TEST", "Only this test")]
+Set = Annotated[
     list[str] | None,
-    typer.Option("--only", metavar="TEST", help="Only this test; may be given again."),
+    several("--set", "PATH=VALUE", "Change a value of the protocol, a bench or the backend"),
 ]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="PATH=VALUE",
-        help="Change a value of the protocol, a bench or the backend; may be given again.",
-    ),
-]
-BackendOption = Annotated[
-    str, typer.Option("--backend", metavar="NAME", help="What executes the trials.")
-]
-LargeOption = Annotated[
-    bool, typer.Option("--allow-large", help="Accept a plan of more than 100 000 trials.")
-]
-OpenOption = Annotated[bool, typer.Option("--open", help="Open it in a browser.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
-TemplatesOption = Annotated[
+Backend = Annotated[str, option("--backend", "NAME", "What executes the trials.")]
+Large = Annotated[bool, flag("--allow-large", "Accept a plan of more than 100 000 trials.")]
+Open = Annotated[bool, flag("--open", "Open it in a browser.")]
+Json = Annotated[bool, flag("--json", "Print JSON for machines.")]
+Templates = Annotated[
     Path | None,
-    typer.Option(
+    option(
         "--templates",
-        metavar="DIR",
-        help="Templates that win over the packaged ones; they are code, so trust them.",
-        show_default=False,
+        "DIR",
+        "Templates that win over the packaged ones; they are code, so trust them.",
     ),
 ]
-FormatOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Besides the page: markdown, latex, pdf; may be given again.",
-    ),
+Format = Annotated[
+    list[str] | None, several("--format", "NAME", "Besides the page: markdown, latex, pdf")
 ]
-WorkersOption = Annotated[
-    int | None, workers_option("Trials executed at once, where the backend can")
-]
-WatchOption = Annotated[
-    bool, typer.Option("--watch", help="Draw channels of the running trial in the terminal.")
-]
-ExecutorOption = Annotated[
+Workers = Annotated[int | None, workers_option("Trials executed at once, where the backend can")]
+Watch = Annotated[bool, flag("--watch", "Draw channels of the running trial in the terminal.")]
+Executor = Annotated[
     str,
-    typer.Option(
+    option(
         "--executor",
-        metavar="WHERE",
-        help="Execute simulated trials on a Dask cluster: dask (of this machine), or "
+        "WHERE",
+        "Execute simulated trials on a Dask cluster: dask (of this machine), or "
         "dask://HOST:PORT of a scheduler.",
-        show_default=False,
     ),
 ]
-TlsOption = Annotated[
+Tls = Annotated[
     Path | None,
-    typer.Option(
+    option(
         "--executor-tls",
-        metavar="DIR",
-        help="Folder with ca.pem, cert.pem and key.pem for a scheduler on another machine.",
-        show_default=False,
+        "DIR",
+        "Folder with ca.pem, cert.pem and key.pem for a scheduler on another machine.",
     ),
 ]
-ReportOption = Annotated[bool, typer.Option("--report", help="Build the report as well.")]
-YesOption = Annotated[
-    bool, typer.Option("--yes", help="For scripts: do not prompt, also not before a bench moves.")
-]
-ClearStopOption = Annotated[
+Report = Annotated[bool, flag("--report", "Build the report as well.")]
+Yes = Annotated[bool, flag("--yes", "For scripts: do not prompt, also not before a bench moves.")]
+ClearStop = Annotated[
     int | None,
-    typer.Option(
-        "--clear-stop",
-        metavar="COUNT",
-        min=0,
-        help="Clear a panic stop, by the count that a person has seen.",
-        show_default=False,
+    option(
+        "--clear-stop", "COUNT", "Clear a panic stop, by the count that a person has seen.", min=0
     ),
 ]
-PortOption = Annotated[
+Port = Annotated[
     str | None,
-    typer.Option(
-        "--port",
-        metavar="PORT",
-        help="Where the controller is; short for --set backend.port=PORT.",
-        show_default=False,
-    ),
+    option("--port", "PORT", "Where the controller is; short for --set backend.port=PORT."),
 ]
-ControllerOption = Annotated[
-    str, typer.Option("--port", metavar="PORT", help="Where the controller is.")
+Controller = Annotated[str, option("--port", "PORT", "Where the controller is.")]
+Baud = Annotated[int, option("--baud", "RATE", "Of a serial port.", min=1200)]
+Patience = Annotated[float, option("--patience", "S", "Until it gives up.", min=0.1, max=600.0)]
+From = Annotated[
+    str | None, option("--from", "RUN", "The run to replay; short for --set backend.run=RUN.")
 ]
-BaudOption = Annotated[
-    int, typer.Option("--baud", metavar="RATE", min=1200, help="Of a serial port.")
-]
-PatienceOption = Annotated[
-    float,
-    typer.Option("--patience", metavar="S", min=0.1, max=600.0, help="Until it gives up."),
-]
-FromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="RUN",
-        help="The run to replay; short for --set backend.run=RUN.",
-        show_default=False,
-    ),
-]
-HandoverOption = Annotated[
+Handover = Annotated[
     Path | None,
-    typer.Option(
+    option(
         "--handover",
-        metavar="DIR",
-        help="Where trials are handed out, with --backend files; short for "
-        "--set backend.folder=DIR.",
-        show_default=False,
+        "DIR",
+        "Where trials are handed out, with --backend files; short for --set backend.folder=DIR.",
     ),
 ]
-TruthOption = Annotated[
+Truth = Annotated[
     str,
-    typer.Option(
+    option(
         "--truth",
-        metavar="BENCH",
-        help="What sim simulates in place of each test's bench; plan and analysis do not know it.",
-        show_default=False,
+        "BENCH",
+        "What sim simulates in place of each test's bench; plan and analysis do not know it.",
     ),
 ]
-SignOption = Annotated[
+Sign = Annotated[
     Path | None,
-    typer.Option(
+    option(
         "--sign",
-        metavar="FILE",
-        help="Sign the sealed run with this key of OpenSSH, or with its agent; tried before "
+        "FILE",
+        "Sign the sealed run with this key of OpenSSH, or with its agent; tried before "
         "anything moves.",
-        show_default=False,
     ),
 ]
-RESULTS = Path("results")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from campaign.archive import new_run_name
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
-from campaign.cli.chosen_options import chosen_lines
-from campaign.cli.cost import Cost, cost_lines, costs
+from campaign.backends.interface import Backend, ExecutesTogether, KnowsCost
 from campaign.cli.damage import archive_of, say_damaged
 from campaign.cli.output import bytes_text, print_json, print_line, print_note, print_table
 from campaign.cli.prepare import PreparedRun, Request, lacking, prepare
@@ -19,6 +19,7 @@ from campaign.errors import ExitCode
 from campaign.execution.display import clock
 from campaign.experiments import experiments
 from campaign.experiments.interface import lost_without
+from campaign.options import describe
 from campaign.policy import Policy, Response
 from campaign.protocol import (
     LimitUse,
@@ -30,10 +31,10 @@ from campaign.protocol import (
     check_loops,
     low_margins,
 )
-from campaign.protocol.limit_check import in_display_units, one_count
-from campaign.protocol.loop_check import in_words
+from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.stages import most_of
 from campaign.trial import Most, Role, Trial
+from campaign.units import Quantity, convert
 
 NOTES = 5
 """of a test that are shown; the others are in the JSON."""
@@ -84,8 +85,8 @@ def _print(
     details: bool,
 ) -> None:
     plan = prepared.plan
-    if plan.title:
-        print_line(plan.title)
+    if plan.protocol.title:
+        print_line(plan.protocol.title)
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
         f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
@@ -93,7 +94,7 @@ def _print(
     )
     if (most := plan.following).trials:
         print_line(f"later stages add {in_short(most)}, in the size above")
-    for line in policy_lines(plan.policy):
+    for line in policy_lines(plan.protocol.policy):
         print_line(line)
     unseeded = [test.name for test in plan.tests if test.order == "shuffled"]
     if unseeded:
@@ -251,3 +252,110 @@ def _print_details(
     if len(notes) > NOTES:
         print_line(f"  and {len(notes) - NOTES} more notes; --json has them all")
     print_line()
+
+
+def chosen_lines(test: PlannedTest) -> Iterator[str]:
+    """One line for each: `settle_angle = "1 deg"`, and why."""
+    texts = {name: as_toml(test.kind, name, test.options[name]) for name in test.chosen}
+    width = max((len(f"{name} = {text}") for name, text in texts.items()), default=0)
+    for name, reason in test.chosen.items():
+        line = f"{name} = {texts[name]}"
+        yield f"{line:<{min(width, 40)}}  {reason}"
+
+
+def as_toml(kind: str, name: str, value: Any) -> str:
+    """An option's value (SI) as a protocol writes it; of a long list the ends."""
+    known = {info.name: info.quantity for info in describe(experiments()[kind].options)}
+    quantity = known.get(name)
+    quantity = quantity and quantity.here
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return _listed([_one(item, quantity) for item in value])
+    return _one(value, quantity)
+
+
+def _one(value: Any, quantity: Quantity | None) -> str:
+    if isinstance(value, str) or quantity is None:
+        return f'"{value}"' if isinstance(value, str) else f"{value:g}"
+    return f'"{convert(value, quantity.si, quantity.display):.6g} {quantity.display}"'
+
+
+def _listed(texts: Sequence[str]) -> str:
+    if len(texts) <= 3:
+        return f"[{', '.join(texts)}]"
+    return f"[{texts[0]}, {texts[1]}, ... {texts[-1]}] ({len(texts)})"
+
+
+MILLISECOND = 1e-3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of the trials of one test.
+
+    Attributes:
+        steps: of the integration, in all.
+        shortest, longest: step (s).
+        because: what the shortest is needed for; empty when it is as long as steps get.
+        of_milliseconds: steps per millisecond of bench time, on average.
+        alone: trials that are executed one by one, because too few of the plan are like them.
+    """
+
+    steps: int
+    shortest: float
+    longest: float
+    because: str
+    of_milliseconds: float
+    alone: int
+
+
+def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
+    """By test; empty for a backend that does not compute."""
+    if not isinstance(backend, KnowsCost):
+        return {}
+    like = _like(plan)
+    alone = _alone(backend, like)
+    known = {trial.number: backend.cost(trial) for trial in like.values()}
+    found = {}
+    for test in plan.tests:
+        each = [known[like[number].number] for number in test.numbers]
+        shortest = min(each, key=lambda cost: cost.step)
+        steps = sum(cost.steps for cost in each)
+        found[test.name] = Cost(
+            steps=steps,
+            shortest=shortest.step,
+            longest=max(cost.step for cost in each),
+            because=shortest.because,
+            of_milliseconds=MILLISECOND * steps / sum(cost.steps * cost.step for cost in each),
+            alone=sum(number in alone for number in test.numbers),
+        )
+    return found
+
+
+def _like(plan: Plan) -> dict[int, Trial]:
+    """By number, the first trial that differs in its seed alone: its cost stands for all."""
+    first: dict[Hashable, Trial] = {}
+    return {t.number: first.setdefault(t.apart_from_seed, t) for t in plan.trials}
+
+
+def _alone(backend: Backend, like: Mapping[int, Trial]) -> frozenset[int]:
+    """Numbers of the trials that have too few companions."""
+    if not isinstance(backend, ExecutesTogether):
+        return frozenset()
+    group = {trial.number: backend.group(trial) for trial in like.values()}
+    count = Counter(group[trial.number] for trial in like.values())
+    few = backend.fewest_together
+    return frozenset(n for n, trial in like.items() if count[group[trial.number]] < few)
+
+
+def cost_lines(cost: Cost) -> Iterator[str]:
+    """For people: the step, why it is what it is, and what cannot be done together."""
+    step = f"{1e3 * cost.shortest:.4g}"
+    if cost.longest != cost.shortest:
+        step += f" to {1e3 * cost.longest:.4g}"
+    line = f"{cost.steps / 1e6:.3g} million steps of {step} ms"
+    if cost.because:
+        line += f", {cost.of_milliseconds:.2g} times those of 1 ms: {cost.because}"
+    yield line
+    if cost.alone:
+        which = "it is" if cost.alone == 1 else f"{cost.alone} of the trials are"
+        yield f"{which} simulated alone: too few of the plan have the same structure"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -10,21 +9,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from campaign.archive import find_run
 from campaign.backends import backends, calls
 from campaign.backends.interface import Backend, BackendKind, SimulatesTruth, Source
 from campaign.channels import explained, missing
 from campaign.cli.damage import archive_of
+from campaign.cli.output import print_note
 from campaign.errors import ArchiveError, ProtocolError, UsageError
 from campaign.experiments import experiments
 from campaign.options import Options
 from campaign.protocol import Plan, load_protocol, make_plan
 from campaign.protocol.missing_values import check_benches
 from campaign.protocol.overrides import parse_overrides
-from campaign.protocol.schema import Protocol
+from campaign.protocol.problems import find_faults
+from campaign.protocol.schema import Protocol, replaced
 from campaign.resources import protocols_folder, shipped_protocol, shipped_protocols
+from campaign.text import nearest
 from campaign.trial import Tree, Trial
 
 IMPORT = "import"
@@ -91,7 +91,7 @@ def prepare(request: Request) -> PreparedRun:
 
 def _check_keep(plan: Plan, kind: BackendKind) -> None:
     """Raise UsageError where samples that are not kept would be missed."""
-    keep = plan.policy.keep
+    keep = plan.protocol.policy.keep
     if keep == "all":
         return
     if kind.source is not Source.SIMULATION:
@@ -136,9 +136,9 @@ def _check_recordings(protocol: Protocol, kind: BackendKind) -> None:
     for test in protocol.tests:
         if test.entry.recording:
             message = (
-                f"the test '{test.entry.name}' was executed elsewhere, and these are its "
-                f"recordings: `campaign import {protocol.path}` makes a run of them, `campaign "
-                f"plan {protocol.path} --backend {IMPORT}` shows what it would hold"
+                f"the test '{test.entry.name}' was executed elsewhere: `campaign import "
+                f"{protocol.path}` makes a run of it, `campaign plan {protocol.path} --backend "
+                f"{IMPORT}` shows it"
             )
             raise ProtocolError([test.origin.problem(("recording",), "key", message)])
 
@@ -231,10 +231,9 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
             f"its mapping makes {there}: say by {tables} which column it is"
         )
     return (
-        f"the backend {kind.name!r} does not record what the experiment {trial.kind!r} requires in "
-        f"{trial.name} ({trial.label}): {what}\n"
-        "let the bench record it under that name, take another backend, or leave out the test "
-        f"{trial.test!r}; nothing was moved"
+        f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}; "
+        f"the backend {kind.name!r} does not record it\n"
+        f"record it, take another backend, or leave out the test {trial.test!r}; nothing was moved"
     )
 
 
@@ -268,17 +267,23 @@ def short_settings(
 
 
 def find_protocol(text: str) -> Path:
-    """The file of that name, else the shipped protocol of that name."""
-    path = Path(text)
-    if path.exists():
+    """The file `text`; else, of that name, the one in `protocols/` here or the shipped one.
+
+    Which of these two it is stands on standard error. Raises UsageError where there is none.
+    """
+    path, name = Path(text), text.removesuffix(".toml")
+    if path.exists() and not path.is_dir():
         return path
-    shipped = shipped_protocol(text.removesuffix(".toml"))
-    if shipped is not None and path.name == text:
-        return shipped
+    if path.name == text:
+        own = Path("protocols", f"{name}.toml")
+        if found := own if own.is_file() else shipped_protocol(name):
+            print_note(f"protocol: {found}")
+            return found
+    if path.exists():
+        return path  # a folder: whoever reads it says so
     names = shipped_protocols()
-    close = difflib.get_close_matches(path.stem, names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(names)}"
-    raise UsageError(f"{text}: there is no such file, and no shipped protocol of that name; {hint}")
+    hint = nearest(path.stem, names) or f"; shipped are {', '.join(names)}"
+    raise UsageError(f"{text}: no such file, and no protocol of that name{hint}")
 
 
 def find_backend(name: str) -> BackendKind:
@@ -296,20 +301,13 @@ def backend_options(kind: BackendKind, changes: tuple[str, ...]) -> Options:
         raise UsageError("\n".join(str(problem) for problem in problems))
     tree: dict[str, Any] = {}
     for override in overrides:
-        table = tree
-        for key in override.keys[1:-1]:
-            table = table.setdefault(str(key), {})
-        table[str(override.keys[-1])] = override.value
-    try:
-        return kind.options.model_validate(tree)
-    except ValidationError as error:
-        raise UsageError(
-            "\n".join(
-                f"--set backend.{'.'.join(str(key) for key in each['loc'])}: {each['msg']}; "
-                f"`campaign kinds {kind.name}` lists the options"
-                for each in error.errors(include_url=False)
-            )
-        ) from None
+        tree = replaced(tree, override.keys[1:], override.value)
+    options = find_faults(kind.options, tree)
+    if isinstance(options, list):
+        wrong = ((".".join(map(str, ("backend", *keys))), message) for keys, _, message in options)
+        more = f"`campaign kinds {kind.name}` lists the options"
+        raise UsageError("\n".join(f"--set {path}: {message}; {more}" for path, message in wrong))
+    return options
 
 
 def _is_backend_setting(text: str) -> bool:

@@ -5,7 +5,6 @@ What makes a page is imported within the functions: other processes analyse in t
 
 from __future__ import annotations
 
-import webbrowser
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -14,11 +13,10 @@ from shlex import quote
 from typing import TYPE_CHECKING, cast
 
 from campaign.archive import RunReader, find_run, open_run
-from campaign.cli.output import print_note, print_table
+from campaign.cli.output import open_page, print_note, print_table
 from campaign.errors import DEBUG, ArchiveError, ExitCode, UsageError, worst_exit_code
 from campaign.interrupts import unwinding
 from campaign.report.processes import (
-    Workers,
     begin_early,
     choose_processes,
     workers,
@@ -26,9 +24,9 @@ from campaign.report.processes import (
 
 if TYPE_CHECKING:
     from campaign.archive.writing.results_file import PreparedResults
+    from campaign.report.build import Report
     from campaign.report.content.document import Document
     from campaign.report.content.first_screen import FirstScreen
-    from campaign.report.content.references import Files
     from campaign.report.drawing.figures import Column
 
 LISTED = 4
@@ -56,60 +54,50 @@ def report_run(
     files = {each: read_values(each) for each in references}
     begin_early(path)
     run = open_run(path)
-    with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
-        return _page(
-            run, output, templates, at_work, formats, trials, files, zoom=zoom, open_it=open_it
-        )
-
-
-def _page(
-    run: RunReader,
-    output: Path | None,
-    templates: Path | None,
-    at_work: Workers,
-    formats: Sequence[str],
-    trials: str,
-    references: Files,
-    *,
-    zoom: bool,
-    open_it: bool,
-) -> tuple[Path, ExitCode]:
-    """The page of what processes have begun to analyse, and what is told of it."""
-    from campaign.cli.damage import say_damaged
-    from campaign.cli.keep_results import written_results
-    from campaign.execution.run_reference import reference
-    from campaign.experiments import experiments
-    from campaign.report.build import build_report
-    from campaign.report.formats import chosen_formats
-    from campaign.resources import templates_folder
-
-    path, measure_anew = run.path, at_work.measure_anew
     written: list[PreparedResults] = []
-
-    def write_results(document: Document) -> None:
-        results = written_results(run, document, measured_anew=measure_anew)
-        written.extend([results] if results else [])
-
     try:
-        report = build_report(
-            run,
-            output or path.with_name(f"{path.stem}-report"),
-            experiments=experiments(),
-            packaged_templates=templates_folder(),
-            templates=templates,
-            measure_anew=measure_anew,
-            at_work=at_work,
-            formats=chosen_formats(formats),
-            trials=_wanted_trials(run, trials),
-            zoom=zoom,
-            command=_command(path, measure_anew=measure_anew),
-            when_found=write_results,
-            references=references,
-        )
-        kept = [_published(each) for each in written]
+        with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
+            # Imported while they begin to analyse.
+            from campaign.cli.keep_results import written_results
+            from campaign.experiments import experiments
+            from campaign.report.build import build_report
+            from campaign.report.formats import chosen_formats
+            from campaign.resources import templates_folder
+
+            def write_results(document: Document) -> None:
+                made = written_results(run, document, measured_anew=measure_anew)
+                written.extend([made] if made else [])
+
+            report = build_report(
+                run,
+                output or path.with_name(f"{path.stem}-report"),
+                experiments=experiments(),
+                packaged_templates=templates_folder(),
+                templates=templates,
+                measure_anew=measure_anew,
+                at_work=at_work,
+                formats=chosen_formats(formats),
+                trials=_wanted_trials(run, trials),
+                zoom=zoom,
+                command=_command(path, measure_anew=measure_anew),
+                when_found=write_results,
+                references=files,
+            )
+            kept = [_published(each) for each in written]
     finally:
         for each in written:
             each.discard()
+    code = _say(report, path, kept, measure_anew=measure_anew)
+    if open_it:
+        open_page(report.path)
+    return report.path, code
+
+
+def _say(report: Report, path: Path, kept: Sequence[str], *, measure_anew: bool) -> ExitCode:
+    """Key numbers, what is missing or damaged, and the files; the exit code of all that."""
+    from campaign.cli.damage import say_damaged
+    from campaign.execution.run_reference import reference
+
     _print_key_numbers(report.layout.document.opening)
     lacking = [test for test in report.layout.document.tests if test.lacks_result]
     codes = [say_damaged(path, report.damaged), *([ExitCode.NO_RESULT] if lacking else [])]
@@ -120,9 +108,7 @@ def _page(
         command = f"{DEBUG}=1 campaign report {reference(path)}{anew}"
         print_note(f"to see where an analysis failed:\n  {command}")
     print_note(f"written: {'; '.join([*_told(report.files), *filter(None, kept)])}")
-    if open_it and not webbrowser.open(report.path.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
-    return report.path, worst_exit_code(codes)
+    return worst_exit_code(codes)
 
 
 def _print_key_numbers(opening: FirstScreen) -> None:

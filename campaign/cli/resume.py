@@ -19,10 +19,9 @@ from campaign.cli.damage import say_damaged
 from campaign.cli.output import print_note
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import Request, find_backend, open_backend, prepare
-from campaign.cli.session import Session, conduct, print_warning
+from campaign.cli.session import Session, conduct, print_warning, require_watch
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
-from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.execution import provenance
 from campaign.execution.resume import (
@@ -41,7 +40,7 @@ from campaign.execution.stop import under_guardian
 from campaign.options import Options
 from campaign.policy import Policy
 from campaign.protocol import PlannedStage, PlannedTest, check_limits, check_loops
-from campaign.protocol.bench_file import names_file
+from campaign.protocol.further_files import names_file
 from campaign.trial import Tree, Trial
 
 
@@ -182,14 +181,8 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
     )
     prepared = prepare(request)
     plan = prepared.plan
-    now = Conditions(
-        plan.normalised,
-        prepared.kind.name,
-        prepared.options.model_dump(mode="json"),
-        provenance.versions(),
-        provenance.plug_ins(plan.trials, prepared.kind.name, plan.truths.values()),
-    )
-    changes = differences(archived_conditions(run), now)
+    kind, options, truths = prepared.kind, prepared.options, plan.truths
+    changes = _changes(run, plan.normalised, kind, options, plan.trials, truths)
     if not same_list(run.first_stage, plan.trials):
         why = f":\n{listed(changes)}" if changes else ""
         raise UsageError(
@@ -199,36 +192,35 @@ def _from_protocol(run: RunReader, protocol: Path) -> Remade:
     check_limits(plan)
     check_loops(plan)
     print_warnings(plan)
-    changes = changes or trial_differences(run.first_stage, plan.trials)
-    return Remade(
-        prepared.kind,
-        prepared.options,
-        plan.trials,
-        plan.tests,
-        plan.policy,
-        tuple(changes),
-        plan.stages,
-        plan.truths,
-    )
+    changes = changes or tuple(trial_differences(run.first_stage, plan.trials))
+    tests, policy = plan.tests, plan.protocol.policy
+    return Remade(kind, options, plan.trials, tests, policy, changes, plan.stages, truths)
 
 
 def _from_archive(run: RunReader) -> Remade:
     header = run.header
     kind = find_backend(header.backend)
     options = kind.options.model_validate(header.backend_options, context={"si": True})
-    was = archived_conditions(run)
     policy = Policy.model_validate(header.normalised.get("policy", {}), context={"si": True})
     trials = tuple(run.full_plan.trial(planned.number) for planned in run.first_stage)
-    now = Conditions(
-        was.normalised,
-        kind.name,
-        options.model_dump(mode="json"),
-        provenance.versions(),
-        provenance.plug_ins(trials, kind.name, header.truth.plants.values()),
-    )
-    changes = tuple(differences(was, now))
     truths = header.truth.plants
+    changes = _changes(run, archived_conditions(run).normalised, kind, options, trials, truths)
     return Remade(kind, options, trials, (), policy, changes, stages_of(header), truths)
+
+
+def _changes(
+    run: RunReader,
+    normalised: Tree,
+    kind: BackendKind,
+    options: Options,
+    trials: Sequence[Trial],
+    truths: Mapping[str, Tree],
+) -> tuple[str, ...]:
+    """How what the run would be executed with today differs from what it was begun with."""
+    plug_ins = provenance.plug_ins(trials, kind.name, truths.values())
+    settings = options.model_dump(mode="json")
+    now = Conditions(normalised, kind.name, settings, provenance.versions(), plug_ins)
+    return tuple(differences(archived_conditions(run), now))
 
 
 def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from string import Template
 
 from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms, sides_in
-from campaign.cli.chosen_options import chosen_lines
 from campaign.cli.output import print_line, print_note
-from campaign.cli.plan import in_short
-from campaign.errors import CampaignError, UsageError
+from campaign.cli.plan import chosen_lines, in_short
+from campaign.errors import CampaignError, UsageError, writing
 from campaign.execution.display import clock
 from campaign.experiments import experiments
+from campaign.experiments.interface import Experiment
 from campaign.experiments.shared.rig import Rig
 from campaign.interrupts import unwinding
 from campaign.physics.bench import Bench
@@ -23,45 +24,8 @@ from campaign.protocol.bench_file import load_bench
 from campaign.resources import protocols_folder
 
 WIDTH = 98
-
-
-@dataclass(frozen=True)
-class _Test:
-    """One test of a protocol that is written: what it is called, and what it is for."""
-
-    name: str
-    kind: str
-    title: str
-    purpose: str
-    more: str = ""
-
-
-SPREAD = "spread_starts = true    # a ripple over position then bends no curve\n"
+TEMPLATES = Path(__file__).with_name("rig_protocol_templates")
 PILOT = "pilot = true    # no Stribeck curve is described: ten speeds tell which others to run\n"
-
-
-def _identify(bench: Bench) -> tuple[_Test, ...]:
-    return (
-        _Test(
-            "velocity-map",
-            "velocity_map",
-            "Friction torque over speed",
-            "Constant speeds in both directions, and the Stribeck curve through them.",
-            SPREAD + ("" if Rig(bench).stribeck_velocity else PILOT),
-        ),
-        _Test(
-            "breakaway",
-            "breakaway",
-            "Breakaway and presliding",
-            "Slow torque ramps from rest: how friction gives way, and how stiff it is before.",
-        ),
-        _Test(
-            "closed-loop",
-            "frequency_response",
-            "Frequency response of the rate loop",
-            "A stepped sine of the rate command: bandwidth and margins.",
-        ),
-    )
 
 
 @unwinding()
@@ -72,26 +36,25 @@ def init_for_bench(folder: Path, written: str) -> None:
     cannot be written; nothing is written then.
     """
     bench = load_bench(written)
-    identify, stabilize = _identify(bench), _stabilize(bench)
-    for test in (*identify, *stabilize):
-        _check_fit(test, bench)
     source = _source(written)
     own = folder / "benches" / source.name
-    name = f"benches/{source.name}"
-    files = {folder / "identify.toml": _page(bench, name, "Identification of", identify)}
-    if stabilize:
-        files[folder / "stabilize.toml"] = _page(bench, name, "Compensation on", stabilize)
+    # A motor on a table has no hull that swings, and nothing to compensate.
+    names = ("identify", *(["stabilize"] if bench.compensation else []))
+    files = {
+        folder / f"{name}.toml": _text(name, bench, f"benches/{source.name}") for name in names
+    }
+    for text in files.values():
+        for test in tomllib.loads(text)["test"]:
+            _check_fit(test["name"], experiments()[test["kind"]], bench)
     if not _is(source, own):
         files[own] = source.read_text(encoding="utf-8")
     taken = [path for path in files if path.exists()]
     if taken:
         raise UsageError(f"{taken[0]} is there already; nothing was written: name a new folder")
-    try:
+    with writing(folder):
         for path, text in files.items():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"{folder}: cannot be written: {error.strerror}") from None
     print_line(f"{len(files)} files written to {folder}")
     protocols = [path for path in files if path.parent == folder]
     for path in protocols:
@@ -101,15 +64,14 @@ def init_for_bench(folder: Path, written: str) -> None:
     print_line(f"now: campaign plan {where}, then campaign run {where} --report")
 
 
-def _check_fit(test: _Test, bench: Bench) -> None:
+def _check_fit(name: str, experiment: Experiment, bench: Bench) -> None:
     """Raises UsageError where no values would suit the bench."""
-    experiment = experiments()[test.kind]
     try:
         if experiment.fit is not None:
             with axis_terms(bench.sides):
                 experiment.fit(experiment.options(), bench)
     except (ValueError, ArithmeticError) as error:
-        raise UsageError(f"{bench.name}: no {test.name} fits it: {error}") from None
+        raise UsageError(f"{bench.name}: no {name} fits it: {error}") from None
 
 
 def _source(written: str) -> Path:
@@ -122,40 +84,18 @@ def _is(one: Path, other: Path) -> bool:
     return other.exists() and one.resolve() == other.resolve()
 
 
-def _stabilize(bench: Bench) -> tuple[_Test, ...]:
-    """Where the bench has a compensation: a motor on a table has no hull that swings."""
-    if not bench.compensation:
-        return ()
-    methods = ", ".join(f'"{name}"' for name in ("none", *bench.compensation))
-    return (
-        _Test(
-            "stabilization",
-            "stabilization",
-            "Stabilization error by compensation method",
-            "The hull swings, the load should not: what each compensation of the bench leaves.",
-            f"repeat = 3\n\n[test.matrix]\ncompensation = [{methods}]\n",
-        ),
-    )
-
-
-def _page(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
+def _text(name: str, bench: Bench, file: str) -> str:
+    """The template of that name for a bench whose file the protocol names."""
+    words = {
+        "bench": bench.name,
+        "quoted": bench.name.replace("\\", "\\\\").replace('"', '\\"'),
+        "file": file,
+        "pilot": "" if Rig(bench).stribeck_velocity else PILOT,
+        "methods": ", ".join(f'"{method}"' for method in ("none", *bench.compensation)),
+    }
+    template = Template((TEMPLATES / f"{name}.toml").read_text(encoding="utf-8"))
     with axis_terms(bench.sides):
-        return in_axis_terms(_text(bench, name, what, tests))
-
-
-def _text(bench: Bench, name: str, what: str, tests: Sequence[_Test]) -> str:
-    head = (
-        f"# {what} {bench.name}. Values that are not written follow from the bench file: its\n"
-        "# limits, inertia, sensors, loops, and its friction as far as it is described. Write\n"
-        "# one to have your own.\n"
-    )
-    title = f"{what} {bench.name}".replace("\\", "\\\\").replace('"', '\\"')
-    parts = (
-        f'# {test.purpose}\n[[test]]\nname = "{test.name}"\nkind = "{test.kind}"\n'
-        f'bench = "{name}"\ntitle = "{test.title}"\n{test.more}'
-        for test in tests
-    )
-    return head + "\n".join([f'title = "{title}"\npublished = "none"\n', *parts])
+        return in_axis_terms(template.substitute(words))
 
 
 def _with_reasons(path: Path) -> None:

@@ -14,15 +14,14 @@ from campaign.cli.compile_engine import compiling_meanwhile, wait_until_compiled
 from campaign.cli.plan import print_warnings
 from campaign.cli.prepare import PreparedRun, Request, find_backend, prepare
 from campaign.cli.profile import print_profile
-from campaign.cli.session import Session, conduct
+from campaign.cli.session import Session, conduct, require_watch
 from campaign.cli.sign import rehearse_signing
 from campaign.cli.step_check import is_checked
-from campaign.cli.watch import require_watch
 from campaign.errors import ExitCode
 from campaign.execution import provenance
 from campaign.execution.stop import under_guardian
 from campaign.protocol import as_tree, check_limits, check_loops
-from campaign.protocol.bench_file import names_file
+from campaign.protocol.further_files import names_file
 from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
 
@@ -94,7 +93,7 @@ def run_protocol(
             prepared.kind,
             backend,
             plan.trials,
-            plan.policy,
+            plan.protocol.policy,
             at_once,
             results / f"{lock.name}{PARTIAL}",
             yes,
@@ -116,31 +115,31 @@ def run_header(
     prepared: PreparedRun, request: Request, name: str, began: datetime, remarks: Remarks
 ) -> RunHeader:
     """Everything the archive keeps about the run before its first trial."""
-    plan = prepared.plan
-    policy = plan.policy.model_dump(mode="json")
+    plan, asked = prepared.plan, prepared.plan.protocol
+    policy = asked.policy.model_dump(mode="json")
     return RunHeader(
         name=name,
         created=began.isoformat(timespec="milliseconds"),
-        title=plan.title,
-        description=plan.description,
+        title=asked.title,
+        description=asked.description,
         protocol_name=prepared.path.stem,
         protocol_path=str(prepared.path.resolve()),
-        sources=dict(plan.sources),
+        sources=dict(asked.sources),
         truth=Truth(
             option=_absolute(request.truth),
-            sources=dict(plan.truth_sources),
+            sources=dict(asked.truth_sources),
             plants=dict(plan.truths),
         ),
-        normalised={**plan.normalised, "published": plan.published, "policy": policy},
+        normalised={**plan.normalised, "published": asked.published, "policy": policy},
         tests=tuple(as_tree(plan)["tests"]),
         seed=plan.seed,
         versions=provenance.versions(),
         plugins=provenance.plug_ins(plan.trials, prepared.kind.name, plan.truths.values()),
         host=provenance.host(),
         command=provenance.command(),
-        operator=remarks.operator or plan.operator,
-        notes="\n".join(filter(None, (plan.notes, remarks.note))),
-        tags=tuple(dict.fromkeys((*plan.tags, *remarks.tags))),
+        operator=remarks.operator or asked.operator,
+        notes="\n".join(filter(None, (asked.notes, remarks.note))),
+        tags=tuple(dict.fromkeys((*asked.tags, *remarks.tags))),
         backend=prepared.kind.name,
         source=prepared.kind.source.value,
         backend_options=prepared.options.model_dump(mode="json"),

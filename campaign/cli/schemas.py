@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from campaign.cli.output import print_json, print_line
-from campaign.errors import UsageError
+from campaign.errors import UsageError, writing
 from campaign.experiments import experiments
 from campaign.importing.json_schema import mapping_schema
 from campaign.interrupts import unwinding
@@ -60,10 +60,8 @@ def _write_schemas(folder: Path) -> None:
         f"{FOLDER}/{of}.json": json.dumps(SCHEMAS[of](), indent=1, ensure_ascii=False) + "\n"
         for of in ("protocol", "bench")
     }
-    try:
+    with writing(folder):
         (folder / FOLDER).mkdir(exist_ok=True)
         for name, text in {**files, ".taplo.toml": RULES}.items():
             if not (folder / name).exists():
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise UsageError(f"{folder}: cannot be written: {error.strerror}") from None

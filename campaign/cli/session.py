@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,6 +10,8 @@ from contextlib import chdir, closing, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+
+from rich.console import Console
 
 from campaign.archive import RunReader, RunStatus, RunWriter
 from campaign.archive.layout.header import SEALED
@@ -27,9 +30,8 @@ from campaign.cli.output import error_console, print_line, print_note
 from campaign.cli.prepare import check_connected
 from campaign.cli.sign import sign_new_run
 from campaign.cli.step_check import say_step_check
-from campaign.cli.watch import watching
 from campaign.errors import BackendError, CampaignError, ExitCode, UsageError, worst_exit_code
-from campaign.execution.display import clock, progress_display
+from campaign.execution.display import Shown, clock, progress_display
 from campaign.execution.executors import (
     FEWEST_FOR_PROCESSES,
     PRELOADED,
@@ -330,3 +332,26 @@ def _build_report(outcome: RunOutcome) -> ExitCode:
     page, code = report_run(str(archive), archive.parent, None, None, open_it=False)
     print_note(f"report: {page}")
     return code
+
+
+def require_watch(executor: str) -> None:
+    """Raises UsageError, before anything moves, when nothing could be drawn."""
+    if importlib.util.find_spec("plotext") is None:
+        raise UsageError("--watch needs plotext: pip install 'campaign[watch]'")
+    if executor:
+        raise UsageError("--watch shows trials of this process; leave --executor out")
+
+
+@contextmanager
+def watching(console: Console) -> Iterator[Shown]:
+    """Channels of the running trial, for as long as the block lasts; else the usual display."""
+    if not console.is_terminal or console.is_dumb_terminal:
+        print_note("--watch: this terminal cannot show pictures; progress is printed in lines")
+        with progress_display(console) as usual:
+            yield usual
+        return
+    display = WatchDisplay(os.dup(console.file.fileno()))
+    try:
+        yield display
+    finally:
+        display.end()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+
+from pydantic import BaseModel
 
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.header import Truth
@@ -158,21 +160,21 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
             }
             for trial in run.trials
         ],
-        "attempts": [a.model_dump(mode="json", exclude={"event"}) for a in _repeated(story)],
-        "decisions": [d.model_dump(mode="json", exclude={"event"}) for d in story.all(Decision)],
-        "operator_steps": [
-            s.model_dump(mode="json", exclude={"event"}) for s in story.all(OperatorStep)
-        ],
+        "attempts": _dumped(_repeated(story)),
+        "decisions": _dumped(story.all(Decision)),
+        "operator_steps": _dumped(story.all(OperatorStep)),
         "stages": [
-            {
-                **s.model_dump(mode="json", exclude={"event", "trials", "trees"}),
-                "trials": [trial.number for trial in s.trials],
-            }
-            for s in run.stages
+            {**told, "trials": [trial.number for trial in stage.trials]}
+            for told, stage in zip(_dumped(run.stages), run.stages, strict=True)
         ],
-        "resumed": [r.model_dump(mode="json", exclude={"event"}) for r in story.all(RunResumed)],
+        "resumed": _dumped(story.all(RunResumed)),
         "damaged": [vars(damage) for damage in run.damaged],
     }
+
+
+def _dumped(entries: Iterable[BaseModel]) -> list[dict[str, object]]:
+    """Entries of the journal as plain data."""
+    return [each.model_dump(mode="json", exclude={"event", "trees"}) for each in entries]
 
 
 def _facts(run: RunReader) -> list[tuple[str, str]]:

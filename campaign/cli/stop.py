@@ -94,8 +94,8 @@ def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
     if not attempt.latched:
         print_line(NOT_LATCHED)
         print_note(
-            "The controller's firmware is of an earlier version: the program that runs it can "
-            "switch it on again at any time. End that program, or cut the drive's power.",
+            "Older firmware: the program that runs the controller can switch it on again. "
+            "End that program, or cut the drive's power.",
             "bold red",
         )
         return ExitCode.DONE

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
-import webbrowser
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
 from campaign.archive import find_run, open_run
 from campaign.cli.damage import say_damaged
-from campaign.cli.output import print_line, print_note, print_table
+from campaign.cli.output import open_page, print_line, print_note, print_table
 from campaign.errors import ExitCode, UsageError, worst_exit_code
 from campaign.experiments import experiments
 from campaign.identify import experiments_by_model
@@ -21,8 +19,6 @@ from campaign.trends.page import write_trends
 from campaign.trends.rig_trends import JUMP, TREND, Trends, Verdict, follow
 from campaign.trends.tables import detectable_words, headline, not_judged, sentences
 
-WIDTH = 80
-"""Columns of a terminal that is not wide."""
 STEM = 90
 """Letters of a run's name that a folder is called by."""
 REASONS = 6
@@ -72,8 +68,8 @@ def trend_of_archives(
     for fitted in trends.fitted:
         for problem in fitted.problems:
             print_note(problem, style="yellow")
-    if open_it and not webbrowser.open(page.resolve().as_uri()):
-        print_note("no browser was found; open the file by hand", style="yellow")
+    if open_it:
+        open_page(page)
     codes = [say_damaged(member.run.path, member.damaged) for member in trends.members]
     return page, worst_exit_code(codes)
 
@@ -113,15 +109,11 @@ def _slug(over: str) -> str:
 
 
 def _tell(trends: Trends) -> None:
-    for line in textwrap.wrap(" ".join(sentences(trends)), WIDTH):
-        print_line(line)
+    print_line(" ".join(sentences(trends)))
     for each in trends.declared:
-        told = "; ".join((headline(each, trends), *each.notes))
-        for line in textwrap.wrap(told, WIDTH, subsequent_indent="  "):
-            print_line(line)
+        print_line("; ".join((headline(each, trends), *each.notes)), 2)
     for why in islice(not_judged(trends), REASONS):
-        for line in textwrap.wrap(f"not judged, {why}", WIDTH, subsequent_indent="  "):
-            print_line(line)
+        print_line(f"not judged, {why}", 2)
     rest = trends.of(Verdict.NOT_SHOWN)
     if rest:
         heads = ["no trend shown", f"seen from, per {trends.covariate.per}"]

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from campaign.archive.layout.files import write_atomically
 from campaign.plain_text import printable
 from campaign.wire.device import Latch
 from campaign.wire.fields import clipped
@@ -105,7 +106,7 @@ class LatchMemory:
 
     def _keep(self, stop: Stop) -> None:
         if self._file is not None:
-            _write(self._file, stop)
+            write_atomically(self._file, json.dumps(asdict(stop)))
         self.stop = stop
         self._remembered = True
 
@@ -117,7 +118,7 @@ def new_memory(file: Path) -> None:
     """
     if os.path.lexists(file):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(file))
-    _write(file, Stop())
+    write_atomically(file, json.dumps(asdict(Stop())))
 
 
 def _read(file: Path | None) -> Stop | None:
@@ -139,19 +140,3 @@ def _read(file: Path | None) -> Stop | None:
         return Stop(tree["latched"], count, cause, clipped(printable(str(tree["by"]))), at)
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         return None
-
-
-def _write(file: Path, stop: Stop) -> None:
-    """Replace the file as a whole, and have it on the disk. Raises OSError."""
-    new = file.with_name(f"{file.name}.new")
-    with new.open("w", encoding="utf-8") as out:
-        json.dump(asdict(stop), out)
-        out.flush()
-        os.fsync(out.fileno())
-    new.replace(file)
-    if os.name == "posix":
-        folder = os.open(file.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)

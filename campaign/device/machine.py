@@ -1,18 +1,20 @@
-"""The plant of the emulated controller: axis, drive, current trial."""
+"""The plant of the emulated controller: axis, drive, current trial; and the log of the drive."""
 
 from __future__ import annotations
 
+import json
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
+from typing import IO
 
 from campaign.axis_kind import sides_in
 from campaign.backends.sim import CHANNELS, SimBackend, SimOptions, announced
 from campaign.device.clock import Now, Pace
 from campaign.device.faults import FaultName, FaultSpec
-from campaign.device.log import DeviceLog
 from campaign.device.motion import Motion, Strike
 from campaign.device.producer import Producer
 from campaign.device.ring import Ring
@@ -191,3 +193,23 @@ class Machine:
         self._motion.end(ending, safe=True)
         self.outcome = ending.outcome
         self._motion = self._ending = None
+
+
+class DeviceLog:
+    """Appends what happens, in the order in which it happened; without a file, nothing."""
+
+    def __init__(self, file: Path | None) -> None:
+        self._out: IO[str] | None = None
+        if file is not None:
+            self._out = file.open("a", encoding="utf-8", buffering=1)  # a line is never torn
+
+    def __call__(self, event: str, **facts: str | int | float | bool | None) -> None:
+        """Note `event`, such as `drive on`, with what belongs to it."""
+        if self._out is not None:
+            self._out.write(json.dumps({"at": time.time(), "event": event, **facts}) + "\n")
+
+    def close(self) -> None:
+        """Nothing more happens."""
+        if self._out is not None:
+            self._out.close()
+            self._out = None

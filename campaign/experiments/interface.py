@@ -31,11 +31,13 @@ from campaign.experiments.post_processing.swept_tables import table_names
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import IncompleteBenchError
+from campaign.protocol.schema import ChosenValue as ChosenValue
+from campaign.protocol.schema import ExperimentKind, StageKind
 from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
 from campaign.result import RecordingDoubt, Result
-from campaign.trial import Most, OfferedRecording, Tree, Trial, TrialRequest, canonical_json
+from campaign.trial import Tree, Trial, TrialRequest, canonical_json
 
 NOT_TOLD = Cause("not in the recording", "the recording does not tell it")
 
@@ -117,15 +119,7 @@ def with_samples(trials: Iterable[TrialData]) -> list[TrialData]:
 
 
 @dataclass(frozen=True)
-class ChosenValue:
-    """A value (SI) that an experiment chose for an option that a test does not write, and why."""
-
-    value: Any
-    reason: str
-
-
-@dataclass(frozen=True)
-class Stage:
+class Stage(StageKind):
     """Trials of one point of a test's matrix that follow from what those before them found.
 
     Attributes:
@@ -139,9 +133,6 @@ class Stage:
             costs the stage and not the run.
     """
 
-    name: str
-    why: str
-    most: Callable[[Any, Bench], Most]
     trials: Callable[[Any, Bench, TestData], Iterable[TrialRequest]]
 
 
@@ -175,7 +166,7 @@ NO_MODEL = Model("", "")
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(ExperimentKind):
     """A kind of test.
 
     Attributes:
@@ -220,22 +211,11 @@ class Experiment:
         key_numbers: which findings answer what a test asks, the most important first.
     """
 
-    name: str
-    summary: str
-    options: type[Options]
-    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
     analyse: Callable[[TestData], Result]
     measure: Callable[[TrialData], Sequence[Estimate]] | None = None
     needs_samples: bool = True
-    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
-    requires: Mapping[str, str] = field(default_factory=dict)
-    can_use: Mapping[str, str] = field(default_factory=dict)
-    seeks_instability: bool = False
     perturbs_bench: bool = False
-    stages: tuple[Stage, ...] = ()
-    recorded: Callable[[Any, Bench, OfferedRecording], Iterable[TrialRequest]] | None = None
-    windows: tuple[str, ...] = ()
-    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
+    stages: tuple[Stage, ...] = field(default=(), kw_only=True)
     most_samples: int | None = None
     model: Model = NO_MODEL
     key_numbers: tuple[KeyQuantity, ...] = ()

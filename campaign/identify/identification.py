@@ -24,7 +24,7 @@ from campaign.experiments.interface import (
 from campaign.identify.material import ChosenRun, same_recordings
 from campaign.parameter import NOTHING_IDENTIFIED, IdentifiedRig, Parameter
 from campaign.physics.bench import Bench
-from campaign.protocol.files import Overridden
+from campaign.protocol.files import Typed
 from campaign.protocol.overrides import parse_overrides
 from campaign.protocol.problems import find_faults
 from campaign.references.verdict import JudgedNumber, with_verdicts
@@ -167,7 +167,7 @@ def _options(
         name, *keys = override.keys
         if name not in known or len(keys) != 1:
             told = f"write METHOD.option=value; methods are {', '.join(known)}"
-            problems.append(Overridden(override.text).problem((), "key", told))
+            problems.append(override.origin.problem((), "key", told))
             continue
         trees[str(name)][str(keys[0])] = override.value
         texts[str(name)] = override.text
@@ -186,7 +186,8 @@ def _options(
 
 def _placed(faults: Sequence[tuple[Any, Any, str]], text: str) -> Iterator[Problem]:
     for keys, _, message in faults:
-        yield Overridden(text).problem((), "value", f"{'.'.join(map(str, keys))}: {message}")
+        at = Typed(f"--set {text}")
+        yield at.problem((), "value", f"{'.'.join(map(str, keys))}: {message}")
 
 
 def _section(

@@ -18,8 +18,8 @@ WIDEST = 64
 """Most columns of a matrix; what is wider on both sides is an image or a map, and no recording."""
 
 OPAQUE = (
-    "is an object of a MATLAB class, which other programs cannot read; in MATLAB save its numbers, "
-    "e.g. t = ts.Time; y = ts.Data; save('file.mat', 't', 'y')"
+    "is an object of a MATLAB class; in MATLAB save its numbers, e.g. t = ts.Time; y = ts.Data; "
+    "save('file.mat', 't', 'y')"
 )
 
 

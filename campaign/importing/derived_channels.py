@@ -242,8 +242,8 @@ def _relative(entry: ChannelColumn, number: float) -> float | None:
         return error / 100.0  # of 'times', whatever it is in
     if not entry.times:
         raise ValueError(
-            f"the uncertainty {entry.uncertainty!r} has no 'times' that it could be of; without "
-            "one it is a share of what the column reads, as in '5 %'"
+            f"the uncertainty {entry.uncertainty!r} needs a 'times' that it is of; without one "
+            "write a share, as in '5 %'"
         )
     _, by = _times(entry)
     of = _unit(unit)

@@ -356,8 +356,8 @@ class _Finding:
         if step <= 0 or times[0] > ends[0] + step or times[-1] + step < ends[1] - step:
             what = self.opened.table(*table).name or self.used[table[0]].name
             message = (
-                f"{what} has times from {times[0]:.6g} to {times[-1]:.6g} s, and the trial is from "
-                f"{ends[0]:.6g} to {ends[1]:.6g} s: cut it by start and stop, or correct a clock"
+                f"{what} has times {times[0]:.6g} to {times[-1]:.6g} s, the trial {ends[0]:.6g} to "
+                f"{ends[1]:.6g} s; cut it by start and stop, or correct a clock"
             )
             raise self._wrong(message, ("file",))
         return {"clock": clock, "own_rate": 1.0 / step}

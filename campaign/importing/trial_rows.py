@@ -115,8 +115,8 @@ def by_trigger(
         if begin < end:
             raise ValueError(
                 f"column {name!r} rises through {level:g} again in row {begin + 1}, "
-                f"{counted(end - begin, 'row')} before the trial that is running there ends: no "
-                "row may be in two trials; take a shorter 'duration', or another 'level'"
+                f"{counted(end - begin, 'row')} before the end of a trial; take a shorter "
+                "'duration', or another 'level'"
             )
     if (fewest := min(b - a for a, b in pairs)) < SHORTEST:
         raise ValueError(f"its 'duration' holds {counted(fewest, 'row')}, and {NEEDED}")

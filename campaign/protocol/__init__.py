@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from campaign.protocol.limit_check import check_limits
+from campaign.protocol.limit_check import check_limits, check_loops, low_margins
 from campaign.protocol.load import load_protocol
-from campaign.protocol.loop_check import check_loops, low_margins
 from campaign.protocol.plan import LimitUse, Plan, PlannedTest, make_plan
 from campaign.protocol.plan_tree import as_tree
 from campaign.protocol.schema import ExperimentKind, Protocol, ProtocolFile, TestEntry

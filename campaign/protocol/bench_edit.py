@@ -30,39 +30,29 @@ def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
 
     try:
         changed = _edited(text, entries)
-        faults = _faults(changed)
-        if faults:
-            raise UsageError(f"{name}: with what is to be written it is no bench: {faults}")
         bench = _bench(changed)
+        if isinstance(bench, str):
+            raise UsageError(f"{name}: with what is to be written it is no bench: {bench}")
         stated = fingerprint(bench).model_dump(mode="json")
         changed = _edited(changed, {"fingerprint": stated})
         again = _bench(changed)
+        stands = isinstance(again, Bench) and again.known.fingerprint == fingerprint(bench)
     except (TOMLKitError, LookupError, ValueError, TypeError, AttributeError) as error:
         raise UsageError(
             f"{name}: its keys are written in a form that cannot be edited; write [known] as a "
             "table of its own"
         ) from error
-    if again.known.fingerprint != fingerprint(bench):
+    if not stands:
         raise UsageError(f"{name}: its fingerprint cannot be written; write it by hand: {stated}")
     return changed
 
 
-def _bench(text: str) -> Bench:
-    """The bench that a text says. Raises ValueError when it says none."""
+def _bench(text: str) -> Bench | str:
+    """The bench that a text says, or what is wrong with it; ValueError where it is no TOML."""
     tree = tomllib.loads(text)
     tree.pop("schema", None)  # of the file, and nothing of the bench
     found = find_faults(Bench, tree)
-    if isinstance(found, list):
-        raise ValueError("; ".join(message for _, _, message in found))
-    return found
-
-
-def _faults(text: str) -> str:
-    """What is wrong with a bench; "" where nothing is."""
-    tree = tomllib.loads(text)
-    tree.pop("schema", None)
-    found = find_faults(Bench, tree)
-    return "; ".join(message for _, _, message in found) if isinstance(found, list) else ""
+    return "; ".join(message for _, _, message in found) if isinstance(found, list) else found
 
 
 def _edited(text: str, entries: Mapping[str, Any]) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from campaign.errors import ProtocolError, UsageError
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, IncompleteBenchError, complete
 from campaign.protocol.files import Source, UnreadableError, Within, read_source
+from campaign.protocol.further_files import benches_in, names_file, no_bench
 from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.problems import validate
 from campaign.resources import protocols_folder
@@ -54,17 +54,10 @@ def checked(source: Source) -> Bench:
     return bench
 
 
-def names_file(written: str) -> bool:
-    """Whether it is the path of a file, and no shipped bench's name."""
-    return "/" in written or "\\" in written or written.endswith(".toml")
-
-
 def _find(written: str) -> Path:
     if names_file(written):
         return Path(written)
-    shipped = {file.stem: file for file in (protocols_folder() / "benches").glob("*.toml")}
-    if written in shipped:
-        return shipped[written]
-    close = difflib.get_close_matches(written, shipped, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(sorted(shipped))}"
-    raise UsageError(f"{written}: no shipped bench of that name; {hint} (or name a .toml file)")
+    known = benches_in(protocols_folder())
+    if written not in known:
+        raise UsageError(no_bench(written, known))
+    return known[written]

@@ -23,8 +23,6 @@ from campaign.protocol.stages import PlannedStage, most_of, planned_stages
 from campaign.protocol.swept_value_text import point_text
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
-Names = tuple[str, ...]
-
 CHANNELS = 11
 """A backend records, besides the time; for the estimate of what would be written."""
 LARGEST_RECORDING = 200_000_000
@@ -264,46 +262,52 @@ def _trial(
     request, key = place.request, (id(place.point), place.index)
     if key not in known:
         options = place.point.options_tree if request.planned else place.point.written
-        requires, can_use = channels_of(test.experiment, request)
-        with axis_terms(sides_in(place.bench_tree)):
-            note = in_axis_terms(request.note)
-            told = point_text(test.experiment.options, test.options, request.point)
+        asked = fields_of(test.experiment, request, place.bench_tree, test.options)
         known[key] = {
+            **asked,
             "point": {**place.point.values, **request.point},
-            "told": {**place.point.told, **told},
+            "told": {**place.point.told, **asked["told"]},
             "options": {**options, **request.options} if request.options else options,
-            "note": note,
-            "requires": requires,
-            "can_use": can_use,
         }
     return Trial.model_construct(
         _ALL_GIVEN,
         number=number,
         test=test.entry.name,
         kind=test.entry.kind,
-        role=request.role,
         repeat=place.repeat,
         seed=place_hash(seed, place.point.values, place.index, place.repeat),
         bench=place.bench_tree,
-        task=request.task,
         setup=setup,
         set_by_operator=set_by_hand,
-        windows=request.windows,
         truth=place.truth,
         recording=request.recording,
         **known[key],
     )
 
 
-def channels_of(experiment: ExperimentKind, request: TrialRequest) -> tuple[Names, Names]:
-    """Names of the channels that a trial requires and of those that it can use, sorted."""
+def fields_of(
+    experiment: ExperimentKind, request: TrialRequest, bench: Tree, written: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What a trial has of its request alone; `written`: the test's options as in the protocol.
+
+    Names of the channels that it requires and of those that it can use are sorted.
+    """
     declared = request.role is Role.MEASUREMENT
     requires, can_use = request.requires, request.can_use
     if requires is None:
         requires = experiment.requires if declared else ()
     if can_use is None:
         can_use = experiment.can_use if declared else ()
-    return tuple(sorted(requires)), tuple(sorted(can_use))
+    with axis_terms(sides_in(bench)):
+        return {
+            "role": request.role,
+            "task": request.task,
+            "windows": request.windows,
+            "note": in_axis_terms(request.note),
+            "told": point_text(experiment.options, written, request.point),
+            "requires": tuple(sorted(requires)),
+            "can_use": tuple(sorted(can_use)),
+        }
 
 
 def memory_problem(test: Test, needed: int) -> Problem:

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-import campaign
 from campaign.errors import Problem
 from campaign.protocol.positions import Aim, Keys, Position, Positions
 
@@ -98,13 +97,13 @@ class At:
 
 
 @dataclass(frozen=True)
-class Overridden:
-    """A value given on the command line."""
+class Typed:
+    """A value given on the command line, with the option's name."""
 
     text: str
 
     def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
-        return Problem(Path(f"--set {self.text}"), 0, 0, message)
+        return Problem(Path(self.text), 0, 0, message)
 
 
 @dataclass(frozen=True)
@@ -165,9 +164,8 @@ def _other_schema(source: Source, kind: Kind) -> Problem | None:
     if type(given) is int and given == SCHEMA[kind]:
         return None
     message = (
-        f"{given!r} is not the schema of a {kind} that campaign {campaign.__version__} reads; it "
-        f"is {SCHEMA[kind]}. Use the program that the file was written for, or write the keys of "
-        "today and leave this line out"
+        f"this program reads {kind}s of schema {SCHEMA[kind]}, not {given!r}; "
+        "use the program of that schema, or write today's keys without this line"
     )
     return source.problem(("schema",), "value", message)
 

@@ -12,7 +12,6 @@ from campaign.errors import Problem, ProtocolError, UsageError
 from campaign.options import TextFile
 from campaign.physics.bench import Bench
 from campaign.policy import Policy
-from campaign.protocol.attachments import Read, attach, attach_values
 from campaign.protocol.axes import is_large, make_axis, value_problems
 from campaign.protocol.calibration import Calibration, CalibrationOptions
 from campaign.protocol.collect import (
@@ -24,16 +23,13 @@ from campaign.protocol.collect import (
     top_level,
 )
 from campaign.protocol.files import (
-    Kind,
     Origin,
     PatchedTree,
     Source,
-    UnreadableError,
     Within,
-    looked_for,
     read_source,
-    read_text,
 )
+from campaign.protocol.further_files import FurtherFiles, read_any_text
 from campaign.protocol.known_cells import cell_problems
 from campaign.protocol.matrix import Axis
 from campaign.protocol.operator import operator_problems
@@ -52,6 +48,7 @@ from campaign.protocol.schema import (
     replaced,
     split_entry,
 )
+from campaign.protocol.shapes import Read, attach, attach_values
 from campaign.protocol.truth_file import Truths
 from campaign.published.calibration_covariance import FOLDER, file_name
 from campaign.text import nearest
@@ -81,7 +78,9 @@ def load_protocol(
     if source is None:
         raise _failed(collected)
     apply_overrides(settings, collected)
-    loader = _Loader(collected, experiments, Truths(shipped, collected.problems, truth))
+    files = FurtherFiles(shipped, collected.problems, collected.sources, collected.chains)
+    truths = Truths(FurtherFiles(shipped, collected.problems), truth)
+    loader = _Loader(collected, experiments, files, truths)
     tests = loader.tests()
     tree, origin = top_level(source, settings)
     top = validate(ProtocolFile, tree, origin)
@@ -126,11 +125,8 @@ class _Loader:
 
     collected: Collection
     experiments: Mapping[str, ExperimentKind]
+    files: FurtherFiles
     truths: Truths
-
-    @property
-    def shipped(self) -> Path:
-        return self.truths.shipped
 
     def tests(self) -> list[Test]:
         first: dict[str, Draft] = {}
@@ -151,8 +147,8 @@ class _Loader:
         """Name of the published values: "thesis", "none", or of a source that is read here."""
         if written in ("thesis", "none"):
             return written
-        file, name = sibling(source, written)
-        found = self._read(file, name, origin, ("published",), written)
+        file = sibling(source, written)
+        found = self.files.read(read_source, *file, origin, ("published",), written)
         return found.name if found is not None else written
 
     def calibration(
@@ -161,13 +157,11 @@ class _Loader:
         """The calibration with its bench, which all tests must use."""
         if options is None:
             return None
-        bench = self._bench_source(source, origin, ("calibration", "bench"), options.bench)
+        bench = self.files.bench(options.bench, source, origin, ("calibration", "bench"))
         if bench is None:
             return None
         for draft in self.collected.drafts:
-            own = self._bench_source(
-                draft.source, draft.origin, ("bench",), draft.tree.get("bench")
-            )
+            own = self._bench(draft)
             if own is not None and own is not bench:
                 message = f"the calibration is of the bench {shown(options.bench)}; use it here too"
                 self._report(draft.origin.problem(("bench",), "value", message))
@@ -193,7 +187,7 @@ class _Loader:
         if isinstance(entry, list):
             self._report(*entry)
         experiment = self._experiment(draft, common.get("kind"))
-        bench = self._bench_source(draft.source, draft.origin, ("bench",), common.get("bench"))
+        bench = self._bench(draft)
         if experiment is None:
             return None
         tree = _patched(bench.tree, draft.bench_patches) if bench is not None else None
@@ -239,73 +233,15 @@ class _Loader:
         self._report(draft.origin.problem(("kind",), "value", message))
         return None
 
-    def _bench_source(
-        self, source: Source, origin: Origin, keys: Keys, written: Any
-    ) -> Source | None:
-        if not isinstance(written, str):
+    def _bench(self, draft: Draft) -> Source | None:
+        """Its bench; the result of a calibration that is beside that is kept among the sources."""
+        bench = self.files.bench(draft.tree.get("bench"), draft.source, draft.origin, ("bench",))
+        if bench is None:
             return None
-        if "/" in written or "\\" in written or written.endswith(".toml"):
-            file, name = sibling(source, written)
-            return self._read(file, name, origin, keys, written, "bench")
-        shipped = sorted(file.stem for file in (self.shipped / "benches").glob("*.toml"))
-        if written in shipped:
-            file = self.shipped / "benches" / f"{written}.toml"
-            return self._read(file, written, origin, keys, written, "bench")
-        message = f"no shipped bench is called {shown(written)}; {allowed(shipped)}"
-        beside = self._toml_files(source.file.parent)
-        slip = nearest(written, shipped) or nearest(f"{written}.toml", beside)
-        message += f", or the path of a .toml file{slip}"
-        self._report(origin.problem(keys, "value", message))
-        return None
-
-    def _read(
-        self,
-        file: Path,
-        name: str,
-        origin: Origin,
-        keys: Keys,
-        written: str,
-        kind: Kind | None = None,
-    ) -> Source | None:
-        """A further file, read once; a missing one is a problem of the text that names it."""
-        known = self.collected.sources.get(name)
-        if known is not None and known.file == file:
-            return known
-        if known is not None:  # a protocol file that is called like a shipped bench
-            name = str(file)
-        try:
-            source = read_source(file, name, kind)
-        except UnreadableError as error:
-            hint = nearest(file.name, self._toml_files(file.parent))
-            message = f"{shown(written)}: {error} {looked_for(file)}{hint}"
-            self._report(origin.problem(keys, "value", message))
-            return None
-        if not isinstance(source, Source):
-            self._report(*source)
-            return None
-        self.collected.sources[name] = source
-        if kind == "bench":
-            self._keep_calibration(source)
-        return source
-
-    def _keep_calibration(self, bench: Source) -> None:
-        """Keeps the result of the bench's calibration among the sources, where one is beside it."""
         file, name = bench.file.parent / FOLDER / bench.file.name, file_name(bench.name)
-        if not file.is_file():
-            return
-        try:
-            self.collected.sources[name] = Source(file, name, read_text(file), {})
-        except UnreadableError as error:
-            self._report(Problem(file, 1, 1, str(error)))
-
-    def _toml_files(self, folder: Path) -> list[str]:
-        """Those there that may be benches: a protocol that was read is none."""
-        protocols = {file.name for file in self.collected.chains}
-        try:
-            names = sorted(file.name for file in folder.glob("*.toml"))[:1000]
-        except (OSError, ValueError):
-            return []
-        return [name for name in names if name not in protocols]
+        if file.is_file():
+            self.files.read(read_any_text, file, name, draft.origin, ("bench",), str(file))
+        return bench
 
     def _attached(
         self, draft: Draft, experiment: ExperimentKind, options: Mapping[str, Any]
@@ -317,18 +253,10 @@ class _Loader:
         """Reads a file beside the draft's protocol and keeps its text among the sources."""
 
         def read(keys: Keys, written: str) -> TextFile:
-            file, name = sibling(draft.source, written)
-            known = self.collected.sources.get(name)
-            if known is None or known.file != file:
-                name = name if known is None else str(file)
-                try:
-                    known = Source(file, name, read_text(file), {})
-                except UnreadableError as error:
-                    message = f"{shown(written)}: {error} {looked_for(file)}"
-                    self._report(origin.problem(keys, "value", message))
-                    return TextFile(written)
-                self.collected.sources[name] = known
-            return TextFile(known.name, known.text)
+            found = self.files.read(
+                read_any_text, *sibling(draft.source, written), origin, keys, written
+            )
+            return TextFile(written) if found is None else TextFile(found.name, found.text)
 
         return read
 

@@ -53,9 +53,8 @@ def refusal(test: Test, bytes_needed: int) -> str:
     repeated = f", {test.entry.repeat} times" if test.entry.repeat > 1 else ""
     whole = f"{points} point{'s' if points != 1 else ''} of its matrix{repeated}"
     return (
-        f"test '{test.entry.name}' ({whole}) would take about {_amount(bytes_needed)} of memory to "
-        f"plan; a plan may take {_amount(MOST)}, about {MOST // TRIAL} trials: sweep less, lower "
-        "'repeat', or make several protocols of it"
+        f"test '{test.entry.name}' ({whole}) needs about {_amount(bytes_needed)} of memory; a plan "
+        f"may take {_amount(MOST)}, about {MOST // TRIAL} trials: sweep less, or lower 'repeat'"
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaign.errors import Problem
-from campaign.protocol.files import Overridden
+from campaign.protocol.files import Typed
 from campaign.protocol.positions import Keys
 
 EXAMPLE = 'write --set test.option=value, such as --set stabilization.frequency="0.5 Hz"'
@@ -23,8 +23,8 @@ class Override:
     value: Any
 
     @property
-    def origin(self) -> Overridden:
-        return Overridden(self.text)
+    def origin(self) -> Typed:
+        return Typed(f"--set {self.text}")
 
 
 def parse_overrides(texts: Sequence[str]) -> tuple[list[Override], list[Problem]]:
@@ -34,7 +34,8 @@ def parse_overrides(texts: Sequence[str]) -> tuple[list[Override], list[Problem]
         path, equals, value = text.partition("=")
         keys = _keys(path)
         if not equals or not keys:
-            problems.append(Overridden(text).problem((), "value", f"not a setting; {EXAMPLE}"))
+            wrong = Typed(f"--set {text}")
+            problems.append(wrong.problem((), "value", f"not a setting; {EXAMPLE}"))
         else:
             overrides.append(Override(text, keys, _value(value.strip())))
     return overrides, problems

@@ -14,7 +14,6 @@ from campaign.physics.limits import Margin, margins
 from campaign.physics.plan_loops import LoopUse, loops_used
 from campaign.physics.resolution import CLOSE, resolution_margins
 from campaign.physics.truth import digest
-from campaign.policy import Policy
 from campaign.protocol import memory
 from campaign.protocol.axes import is_large, value_problems
 from campaign.protocol.check_trials import nothing_to_check, with_checks
@@ -107,38 +106,25 @@ class Plan:
     Its trials are those of the first stage; what may follow them is in `stages`.
 
     Attributes:
-        name: of the protocol's file.
-        published: "thesis", "none" or the name of a source.
+        protocol: as it was loaded; its policy is not part of `normalised`.
         only: the tests it was restricted to; empty for all.
-        sources: verbatim text of every file, by its name as written.
         normalised: what determines the trials, SI, of all tests: compared at a resume.
         fingerprint: SHA-256 of `normalised`.
         seed: from which tests without a seed of their own got theirs.
         breaches: every limit that a trial would break.
-        policy: what to do about faults, and when to rest; not part of `normalised`.
         truths: plants that `sim` simulates in place of the benches, by the digest that trials
-            have; `truth_sources` their files. Nothing but `sim` and the archive takes them.
+            have. Nothing but `sim` and the archive takes them.
     """
 
-    name: str
-    title: str
-    description: str
-    operator: str
-    notes: str
-    tags: tuple[str, ...]
-    published: str
+    protocol: Protocol
     tests: tuple[PlannedTest, ...]
     trials: tuple[Trial, ...]
-    sources: Mapping[str, str]
     normalised: Tree
     fingerprint: str
-    overrides: tuple[str, ...]
     only: tuple[str, ...]
     seed: int
     breaches: tuple[LimitUse, ...]
-    policy: Policy = field(default_factory=Policy)
     truths: Mapping[str, Tree] = field(default_factory=dict)
-    truth_sources: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
@@ -165,7 +151,8 @@ class Plan:
         """Bytes of all recordings before compression, an upper estimate of what is written; those
         of later stages included.
         """
-        planned = sum(map(_size, self.trials)) + sum(len(text) for text in self.sources.values())
+        texts = sum(len(text) for text in self.protocol.sources.values())
+        planned = sum(map(_size, self.trials)) + texts
         return planned + _size_of_stages(self)
 
 
@@ -213,25 +200,15 @@ def make_plan(
     if protocol.check is not None:
         normalised["check"] = {"test": protocol.check.test, "every": protocol.check.every}
     return Plan(
-        name=protocol.path.name,
-        title=protocol.title,
-        description=protocol.description,
-        operator=protocol.operator,
-        notes=protocol.notes,
-        tags=protocol.tags,
-        published=protocol.published,
+        protocol=protocol,
         tests=tuple(planned),
         trials=tuple(trials),
-        sources=protocol.sources,
         normalised=normalised,
         fingerprint=hashlib.sha256(canonical_json(normalised).encode()).hexdigest(),
-        overrides=protocol.overrides,
         only=tuple(only),
         seed=master,
         breaches=tuple(use for use in uses if use.margin.broken),
-        policy=protocol.policy,
         truths={name: tree for expanded in expansions for name, tree in expanded.truths.items()},
-        truth_sources=protocol.truth_sources,
     )
 
 

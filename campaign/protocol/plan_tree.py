@@ -21,20 +21,21 @@ POLES = 8
 
 def as_tree(plan: Plan) -> dict[str, Any]:
     """Everything about a plan but the files it came from; JSON-able, SI, stable names."""
+    asked = plan.protocol
     return {
-        "protocol": plan.name,
-        "title": plan.title,
-        "description": plan.description,
-        "operator": plan.operator,
-        "notes": plan.notes,
-        "tags": list(plan.tags),
-        "published": plan.published,
+        "protocol": asked.path.name,
+        "title": asked.title,
+        "description": asked.description,
+        "operator": asked.operator,
+        "notes": asked.notes,
+        "tags": list(asked.tags),
+        "published": asked.published,
         "fingerprint": plan.fingerprint,
         "seed": plan.seed,
-        "overrides": list(plan.overrides),
+        "overrides": list(asked.overrides),
         "only": list(plan.only),
-        "sources": sorted(plan.sources),
-        "policy": plan.policy.model_dump(mode="json"),
+        "sources": sorted(asked.sources),
+        "policy": asked.policy.model_dump(mode="json"),
         "duration_s": plan.duration,
         "following": _most(plan.following),
         "samples": plan.samples,

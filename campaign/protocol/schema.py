@@ -6,9 +6,8 @@ here by exclusion: every key of a test that is not a field of `TestEntry`.
 
 from __future__ import annotations
 
-import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -32,69 +31,40 @@ Slug = Annotated[
 ]
 
 
-class ChosenValue(typing.Protocol):
-    """A value (SI) for an option that a test does not write, and why that one."""
+@dataclass(frozen=True)
+class ChosenValue:
+    """A value (SI) that an experiment chose for an option that a test does not write, and why."""
 
-    @property
-    def value(self) -> Any: ...
-
-    @property
-    def reason(self) -> str: ...
+    value: Any
+    reason: str
 
 
-class StageKind(typing.Protocol):
-    """What this room needs of a stage; see `campaign.experiments.interface`."""
+@dataclass(frozen=True)
+class StageKind:
+    """What a plan needs of a stage; see `campaign.experiments.interface.Stage`."""
 
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def why(self) -> str: ...
-
-    @property
-    def most(self) -> Callable[[Any, Bench], Most]: ...
+    name: str
+    why: str
+    most: Callable[[Any, Bench], Most]
 
 
-class ExperimentKind(typing.Protocol):
-    """What this room needs of an experiment; see `campaign.experiments.interface`."""
+@dataclass(frozen=True)
+class ExperimentKind:
+    """What a plan needs of an experiment; see `campaign.experiments.interface.Experiment`."""
 
-    __dataclass_fields__: typing.ClassVar[dict[str, Any]]
-    """It is one, so that `replace` makes one with other trials of it."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def options(self) -> type[Options]: ...
-
-    @property
-    def trials(self) -> Callable[[Any, Bench], Iterable[TrialRequest]]: ...
-
-    @property
-    def fit(self) -> Callable[[Any, Bench], Mapping[str, ChosenValue]] | None: ...
-
-    @property
-    def warnings(self) -> Callable[[Any, Bench], Iterable[str]] | None: ...
-
-    @property
-    def requires(self) -> Mapping[str, str]: ...
-
-    @property
-    def can_use(self) -> Mapping[str, str]: ...
-
-    @property
-    def seeks_instability(self) -> bool: ...
-
-    @property
-    def stages(self) -> Sequence[StageKind]: ...
-
-    @property
-    def recorded(
-        self,
-    ) -> Callable[[Any, Bench, OfferedRecording], Iterable[TrialRequest]] | None: ...
-
-    @property
-    def windows(self) -> tuple[str, ...]: ...
+    name: str
+    summary: str
+    options: type[Options]
+    trials: Callable[[Any, Bench], Iterable[TrialRequest]]
+    _: KW_ONLY
+    fit: Callable[[Any, Bench], Mapping[str, ChosenValue]] | None = None
+    requires: Mapping[str, str] = field(default_factory=dict)
+    can_use: Mapping[str, str] = field(default_factory=dict)
+    seeks_instability: bool = False
+    stages: tuple[StageKind, ...] = ()
+    recorded: Callable[[Any, Bench, OfferedRecording], Iterable[TrialRequest]] | None = None
+    windows: tuple[str, ...] = ()
+    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
 
 
 class OperatorEntry(Options):

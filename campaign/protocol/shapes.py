@@ -6,7 +6,7 @@ both follow from the declared types.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -15,7 +15,7 @@ from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
 
 from campaign.choice import Choice
-from campaign.options import meaning_of
+from campaign.options import TextFile, meaning_of
 from campaign.protocol.positions import Keys
 from campaign.units import Quantity
 
@@ -176,3 +176,36 @@ def _tags(model: type[BaseModel], discriminator: str) -> tuple[Any, ...]:
     if field is None or get_origin(field.annotation) is not Literal:
         return ()
     return get_args(field.annotation)
+
+
+Read = Callable[[Keys, str], TextFile]
+"""The file that is written at some keys; when it cannot be read, one without text."""
+
+
+def attach(options: type[BaseModel], tree: Mapping[str, Any], read: Read) -> dict[str, Any]:
+    """`tree` with every path of an option of type `TextFile` replaced by that file."""
+    attached: dict[str, Any] = _attached(Shape((options,)), dict(tree), (), read)
+    return attached
+
+
+def attach_values(
+    options: type[BaseModel], tree: Mapping[str, Any], keys: Keys, values: Any, read: Read
+) -> Any:
+    """The same for the listed values of an option that is swept; `keys` lead to it."""
+    shape = shape_at(options, tree, keys)
+    if shape is None or not isinstance(values, list):
+        return values
+    return [_attached(shape, value, (index,), read) for index, value in enumerate(values)]
+
+
+def _attached(shape: Shape | None, value: Any, keys: Keys, read: Read) -> Any:
+    if shape is None:
+        return value
+    if shape.members == (TextFile,) and isinstance(value, str):
+        return read(keys, value)
+    if not isinstance(value, Mapping | list):
+        return value
+    narrow = shape.narrowed(value)
+    if isinstance(value, list):
+        return [_attached(narrow.child(i), v, (*keys, i), read) for i, v in enumerate(value)]
+    return {k: _attached(narrow.child(k), v, (*keys, k), read) for k, v in value.items()}

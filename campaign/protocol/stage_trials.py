@@ -6,23 +6,20 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
 from campaign.physics.bench import Bench
 from campaign.physics.limits import margins
 from campaign.physics.plan_loops import loops_used
 from campaign.physics.resolution import resolution_margins
 from campaign.protocol.expand import (
-    channels_of,
     check_recording,
+    fields_of,
     first_line,
     place_hash,
     samples_of,
 )
-from campaign.protocol.limit_check import in_display_units, one_count
-from campaign.protocol.loop_check import in_words
+from campaign.protocol.limit_check import in_display_units, in_words, one_count
 from campaign.protocol.schema import ExperimentKind
 from campaign.protocol.stages import PlannedStage
-from campaign.protocol.swept_value_text import point_text
 from campaign.trial import Most, Trial, TrialRequest, canonical_json
 
 ROUNDING = 1e-9
@@ -120,28 +117,19 @@ def _trial(
     """A trial of a stage. Its seed follows from its place, whatever else was refused or executed:
     the test's seed, the point, the stage, and its index among what the stage asks for.
     """
-    requires, can_use = channels_of(experiment, request)
-    with axis_terms(sides_in(planned.bench)):
-        note = in_axis_terms(request.note)
-        told = point_text(experiment.options, {}, request.point)
+    asked = fields_of(experiment, request, planned.bench, {})
     return Trial.model_construct(  # as in a plan: what there is to check of it, `_check` does
         number=number,
         test=planned.test,
         kind=planned.kind,
-        role=request.role,
         point={**stage.point, **request.point},
-        told={**planned.told, **told},
         options=planned.options,
         seed=place_hash("stage", stage.seed, stage.point, stage.number, index),
         bench=planned.bench,
         truth=planned.truth,
-        task=request.task,
-        note=note,
         setup=planned.setup,
         set_by_operator=planned.set_by_operator,
-        requires=requires,
-        can_use=can_use,
-        windows=request.windows,
+        **{**asked, "told": {**planned.told, **asked["told"]}},
     )
 
 

@@ -7,13 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from campaign.backends.interface import Backend
+from campaign.backends.interface import Backend, ExecutesTogether, SupportsExternalStop
 from campaign.errors import BackendError
-from campaign.recording import Array, Ending, Outcome, Recording, SafeState
+from campaign.recording import Array, Ending, Outcome, PanicStop, Recording, SafeState
 from campaign.testing.archive_check import archived_as_recorded
 from campaign.testing.backend_under_test import BackendUnderTest, Check, CheckFailedError, require
-from campaign.testing.external_stop_check import keeps_a_stop_from_outside
-from campaign.testing.parallel_check import executes_together_what_it_does_alone
 from campaign.testing.strict_recorder import StrictRecorder
 from campaign.testing.supervised_backend import Disturb, got_through, supervised, with_narrow_limit
 from campaign.trial import Trial, canonical_json
@@ -373,3 +371,114 @@ def _consistent(ending: Ending) -> None:
         canonical_json(dict(ending.telemetry))
     except (TypeError, ValueError) as error:
         raise CheckFailedError(f"the telemetry is not JSON: {error}") from None
+
+
+def executes_together_what_it_does_alone(under_test: BackendUnderTest) -> None:
+    """Of trials executed together each has the samples that it has alone, and its own end."""
+    with under_test.open() as backend:
+        if not isinstance(backend, ExecutesTogether):
+            return
+        trial = under_test.possible
+        fewest, most = backend.fewest_together, backend.most_together
+        require(1 < fewest <= most, f"{fewest} to {most} trials together: there is no such number")
+        require(
+            backend.group(trial) == backend.group(trial.model_copy(update={"number": 2})),
+            "group() of two trials that differ in their number only is not the same",
+        )
+        # Each has noise of its own. The second one is stopped at once: that is its own affair.
+        trials = [
+            trial.model_copy(update={"number": number, "seed": trial.seed + number})
+            for number in range(1, most + 1)
+        ]
+        alone = [_alone(backend, each) for each in trials]
+        recorders = [StrictRecorder() for _ in trials]
+        stops = [lambda place=place: place == 1 for place in range(most)]
+        endings = list(backend.execute_together(trials, recorders, stops))
+    places = sorted(place for place, _ in endings)
+    require(places == list(range(most)), f"{most} trials, and the places of endings {places}")
+    for place, ending in endings:
+        if place == 1:
+            stopped = ending.outcome is Outcome.INTERRUPTED
+            require(stopped, f"a trial that was stopped ended as {ending.outcome}")
+            continue
+        whole = ending.outcome is Outcome.COMPLETED
+        require(whole, f"beside a trial that was stopped, another one ended as {ending.outcome}")
+        require(not recorders[place].order, "; ".join(recorders[place].order))
+        _require_equal(alone[place], recorders[place].recording(ending))
+
+
+def _alone(backend: Backend, trial: Trial) -> Recording:
+    recorder = StrictRecorder()
+    return recorder.recording(backend.execute(trial, recorder, lambda: False))
+
+
+def _require_equal(alone: Recording, together: Recording) -> None:
+    lengths = f"{len(together.time)} samples together, {len(alone.time)} alone"
+    require(len(alone.time) == len(together.time), lengths)
+    for name, channel in alone.channels.items():
+        equal = channel.samples.tobytes() == together[name].tobytes()
+        require(equal, f"{name}: its samples are not those of the trial alone")
+
+
+def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
+    """Once stopped it says by whom, and moves again only after just that stop was cleared."""
+    with under_test.open() as backend:
+        if not isinstance(backend, SupportsExternalStop):
+            told = "a way to stop it is given (stop_outside), but it cannot tell of a stop"
+            require(under_test.stop_outside is None, told)
+            return
+        require(under_test.stop_outside, "it can be stopped from outside: stop_outside says how")
+        require(backend.panic_stop() is None, "it is stopped before a stop was sent")
+        _stopped_in_mid_trial(under_test, backend)
+        first = _found(backend)
+        _moves_nothing(under_test.possible, backend)
+        backend.make_safe()
+        _found(backend)  # nor does coming to rest clear it
+        _does_not_clear(backend, first.count + 1)
+        _stop(under_test)
+        _does_not_clear(backend, first.count)
+        backend.clear_stop(_found(backend).count)
+        require(backend.panic_stop() is None, "it is stopped after the stop was cleared")
+        ending = _execute(under_test.possible, backend, StrictRecorder())
+        told = f"after the stop was cleared, the trial ended as {ending.outcome}: {ending.reason}"
+        require(ending.outcome is Outcome.COMPLETED, told)
+
+
+def _stopped_in_mid_trial(under_test: BackendUnderTest, backend: Backend) -> None:
+    recorder = StrictRecorder(lambda count: _stop(under_test) if count == 1 else None)
+    ending = _execute(under_test.possible, backend, recorder)
+    told = f"a trial stopped from outside ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, told)
+
+
+def _moves_nothing(trial: Trial, backend: Backend) -> None:
+    recorder = StrictRecorder()
+    ending = _execute(trial, backend, recorder)
+    require(not recorder.blocks, f"{recorder.blocks} blocks were recorded on a stopped bench")
+    told = f"a trial on a stopped bench ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, told)
+
+
+def _found(backend: SupportsExternalStop) -> PanicStop:
+    found = backend.panic_stop()
+    if found is None or not found.by.strip():
+        raise CheckFailedError(f"panic_stop() answered {found!r} on a stopped bench")
+    return found
+
+
+def _does_not_clear(backend: SupportsExternalStop, count: int) -> None:
+    try:
+        backend.clear_stop(count)
+    except BackendError:
+        _found(backend)
+        return
+    raise CheckFailedError(f"clear_stop({count}) cleared another stop than the latest")
+
+
+def _execute(trial: Trial, backend: Backend, recorder: StrictRecorder) -> Ending:
+    return backend.execute(trial, recorder, lambda: False)
+
+
+def _stop(under_test: BackendUnderTest) -> None:
+    if under_test.stop_outside is not None:
+        under_test.stop_outside()

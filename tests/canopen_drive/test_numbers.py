@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from campaign.canopen_drive import objects as od
-from campaign.canopen_drive.bus_load import bus_load, frame_bits
 from campaign.canopen_drive.drive import DriveError
 from campaign.canopen_drive.player import fault_of
-from campaign.canopen_drive.settings import cycle
+from campaign.canopen_drive.settings import bus_load, cycle, frame_bits
 from campaign.canopen_drive.targets import targets_of
 from campaign.canopen_drive.units import Scale, scale_of
 from campaign.recording import Fault

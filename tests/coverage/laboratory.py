@@ -12,7 +12,7 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.truth import digest, plant_of
-from campaign.protocol.expand import channels_of
+from campaign.protocol.expand import fields_of
 from campaign.recording import MemoryRecorder
 from campaign.result import Result
 from campaign.trial import Trial
@@ -119,14 +119,12 @@ def plan(case: Case, kind: str, draw: int = 0) -> list[Trial]:
     found: list[Trial] = []
     for repeat in range(1, repeats + 1):
         for request in experiment.trials(options, case.stated):
-            requires, can_use = channels_of(experiment, request)
             number = len(found) + 1
             found.append(
                 Trial(
-                    number=number, test=kind, kind=kind, role=request.role, repeat=repeat,
-                    point=dict(request.point), options=tree, seed=_seed(case, kind, draw, number),
-                    bench=bench, task=request.task, requires=requires, can_use=can_use,
-                    windows=request.windows, truth=truth,
+                    number=number, test=kind, kind=kind, repeat=repeat, point=dict(request.point),
+                    options=tree, seed=_seed(case, kind, draw, number), bench=bench, truth=truth,
+                    **fields_of(experiment, request, bench, {}),
                 )
             )  # fmt: skip
     return found

@@ -14,8 +14,7 @@ from campaign.backends.sim import SimBackend, SimOptions
 from campaign.device.controller import Controller
 from campaign.device.faults import parse_faults
 from campaign.device.latch import new_memory
-from campaign.device.log import DeviceLog
-from campaign.device.machine import Setup
+from campaign.device.machine import DeviceLog, Setup
 from campaign.protocol.bench_file import load_bench
 from campaign.recording import MemoryRecorder
 from campaign.signals import Sine

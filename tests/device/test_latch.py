@@ -133,14 +133,14 @@ def test_the_drive_goes_off_before_it_is_remembered_and_that_before_it_is_said(
     order: list[str] = []
     rig = Rig()
     rig.start()
-    remember = latch_module._write
+    remember = latch_module.write_atomically
 
     def write(*arguments: object) -> None:
         order.append("drive on" if rig.controller.machine.drive_on else "drive off")
         order.append("remembered")
         remember(*arguments)
 
-    monkeypatch.setattr(latch_module, "_write", write)
+    monkeypatch.setattr(latch_module, "write_atomically", write)
     rig.controller._send = lambda to, what: order.append(type(what).__name__)
     stopped(rig)
     assert order[:3] == ["drive off", "remembered", "Status"]  # of the new state, then the answers

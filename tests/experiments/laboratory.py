@@ -11,7 +11,7 @@ from campaign.estimate import Estimate
 from campaign.experiments import experiments
 from campaign.experiments.interface import TestData, result_of
 from campaign.physics.bench import Bench
-from campaign.protocol.expand import channels_of
+from campaign.protocol.expand import fields_of
 from campaign.reason import Cause
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.result import Finding, Result, Table, bare
@@ -45,22 +45,17 @@ def trials(kind: str, bench: Bench, options: Tree, matrix: Iterable[Tree] = ({},
     for point in matrix:
         chosen = experiment.options.model_validate({**options, **point})
         for request in experiment.trials(chosen, bench):
-            requires, can_use = channels_of(experiment, request)
+            own = request.bench or bench.model_dump(mode="json")
             found.append(
                 Trial(
                     number=len(found) + 1,
                     test=kind,
                     kind=kind,
-                    role=request.role,
                     point={**point, **request.point},
                     options=chosen.model_dump(mode="json"),
                     seed=len(found) + 1,
-                    bench=request.bench or bench.model_dump(mode="json"),
-                    task=request.task,
-                    note=request.note,
-                    requires=requires,
-                    can_use=can_use,
-                    windows=request.windows,
+                    bench=own,
+                    **fields_of(experiment, request, own, {}),
                 )
             )
     return found

@@ -124,7 +124,7 @@ def test_short_stretches_are_left_out_and_told(tmp_path: Path):
          "the longest of 1 row; a recording needs 10. Column 'run' has no value in 20 rows"),
         ([0, *[2] * 30, *[0] * 5, *[2] * 80],
          'trigger = { column = "run", level = 1, duration = "50 ms" }',
-         "again in row 37, 15 rows before the trial that is running there ends"),
+         "again in row 37, 15 rows before the end of a trial"),
         ([0] * 20 + [1] * 40, 'trigger = { column = "run", level = 0.5, duration = "9 ms" }',
          "its 'duration' holds 9 rows, and a recording needs 10"),
         ([1] * 9, "", "a.csv: it has 9 rows, and a recording needs 10"),
@@ -327,5 +327,5 @@ def test_an_uncertainty_with_a_unit_needs_the_constant_that_it_is_of(tmp_path: P
     text = COLUMNS.replace('unit = "deg"', 'unit = "deg"\nuncertainty = "0.1 deg"') + TEST + ENTRY
     told = refused(tmp_path, text)
     assert "m.toml:4:" in told
-    assert "'0.1 deg' has no 'times' that it could be of; without one it is a share" in told
+    assert "'0.1 deg' needs a 'times' that it is of; without one write a share" in told
     assert "\n" not in told

@@ -119,7 +119,7 @@ CASES = {
         _jittered(), 'repair = ["resample"]', TIME, TIME + 'repair = ["resample"]\n', off=0.02),
     "coarse times": Case(
         replace(plain, t=np.floor(SOUND.t * 100) / 100),
-        "rounded to 0.01 s, too coarse for steps of 0.001 s; the 'sample_rate' that it had",
+        "rounded to 0.01 s, too coarse for steps of 0.001 s; give the 'sample_rate'",
         'column = "t"\nunit = "s"\n', 'sample_rate = "1000 Hz"\n'),
 }  # fmt: skip
 

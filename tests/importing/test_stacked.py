@@ -77,7 +77,7 @@ def test_each_stretch_of_time_is_a_trial(tmp_path: Path) -> None:
 def test_time_that_begins_anew_is_no_repetition(tmp_path: Path) -> None:
     """To leave out what is no later would throw most of the file away."""
     told = refused(tmp_path, COLUMNS + TEST + ENTRY, again(0.0, 0.0, 0.0))
-    assert "time begins anew in row 101, 201: 3 recordings in one file" in told
+    assert "time begins anew in row 101, 201: 3 recordings; in" in told
     assert "restarts = true" in told
     assert "drop repeated" not in told
 

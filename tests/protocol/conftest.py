@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import pytest
 from pydantic import Field
@@ -13,7 +12,7 @@ from pydantic import Field
 from campaign.errors import Problem, ProtocolError
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.protocol import Protocol, load_protocol
+from campaign.protocol import ExperimentKind, Protocol, load_protocol
 from campaign.signals import Polyline, Sine
 from campaign.trial import Role, Task, TrialRequest
 from campaign.units import AngularAcceleration, AngularRate, Frequency
@@ -83,23 +82,10 @@ def _still(options: StillOptions, bench: Bench) -> Iterator[TrialRequest]:
     yield TrialRequest(task, role=Role.WARM_UP)
 
 
-@dataclass(frozen=True)
-class Kind:
-    name: str
-    options: type[Options]
-    trials: Callable[[Any, Bench], Iterator[TrialRequest]]
-    requires: Mapping[str, str] = field(default_factory=dict)
-    can_use: Mapping[str, str] = field(default_factory=dict)
-    seeks_instability: bool = False
-    fit: Callable[[Any, Bench], Mapping[str, Any]] | None = None
-    warnings: Callable[[Any, Bench], Iterable[str]] | None = None
-    stages: tuple[Any, ...] = ()
-
-
 KINDS = {
-    "swing": Kind("swing", SwingOptions, _swing),
-    "speeds": Kind("speeds", SpeedsOptions, _speeds),
-    "still": Kind("still", StillOptions, _still),
+    "swing": ExperimentKind("swing", "", SwingOptions, _swing),
+    "speeds": ExperimentKind("speeds", "", SpeedsOptions, _speeds),
+    "still": ExperimentKind("still", "", StillOptions, _still),
 }
 
 

@@ -36,7 +36,7 @@ def problem(desk, text: str = TEXT) -> str:
 def test_the_text_is_a_source_and_the_samples_are_in_the_trial(desk) -> None:
     desk.write("lab/data/roll.csv", CSV)
     made = plan(desk)
-    assert made.sources["data/roll.csv"] == CSV
+    assert made.protocol.sources["data/roll.csv"] == CSV
     (trial,) = made.trials
     assert isinstance(trial.task.base_acceleration, Polyline)
     assert len(trial.task.base_acceleration.times) == 2 + 2 * 3  # lead-in, then 3 straight lines
@@ -60,7 +60,7 @@ def test_files_can_be_swept(desk) -> None:
     first, second = made.trials
     assert str(first.point["motion.file"]).startswith("data/a.csv (SHA-256")
     assert first.task.base_acceleration != second.task.base_acceleration
-    assert {"data/a.csv", "data/b.csv"} <= set(made.sources)
+    assert {"data/a.csv", "data/b.csv"} <= set(made.protocol.sources)
 
 
 def test_a_missing_file_is_named_where_it_is_written(desk) -> None:

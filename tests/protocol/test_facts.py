@@ -9,8 +9,7 @@ from campaign.errors import ProtocolError
 from campaign.experiments import experiments
 from campaign.physics.complete import PURPOSES
 from campaign.protocol import Plan, load_protocol, make_plan
-from campaign.protocol.limit_check import check_limits
-from campaign.protocol.loop_check import check_loops
+from campaign.protocol.limit_check import check_limits, check_loops
 from campaign.protocol.missing_values import check_benches
 from tests.protocol.conftest import SHIPPED, Desk
 

@@ -43,12 +43,12 @@ def test_a_sweep_can_be_set(desk) -> None:
 def test_whole_matrix_and_common_keys(desk) -> None:
     changed = plan(desk, "swing.matrix={ gain = [1, 2, 3] }", "swing.repeat=2")
     assert len(changed.trials) == 6
-    assert changed.overrides == ("swing.matrix={ gain = [1, 2, 3] }", "swing.repeat=2")
+    assert changed.protocol.overrides == ("swing.matrix={ gain = [1, 2, 3] }", "swing.repeat=2")
 
 
 def test_top_level(desk) -> None:
-    changed = plan(desk, "title=A new day", "operator=me", 'tags=["a", "b"]')
-    assert (changed.title, changed.operator, changed.tags) == ("A new day", "me", ("a", "b"))
+    top = plan(desk, "title=A new day", "operator=me", 'tags=["a", "b"]').protocol
+    assert (top.title, top.operator, top.tags) == ("A new day", "me", ("a", "b"))
 
 
 def test_the_last_one_wins(desk) -> None:
@@ -90,7 +90,7 @@ def test_a_setting_that_cannot_be(desk, override: str, message: str) -> None:
 
 
 def test_text_that_would_smuggle_in_more_toml_is_text(desk) -> None:
-    assert plan(desk, 'title="a"\noperator="b"').title == '"a"\noperator="b"'
+    assert plan(desk, 'title="a"\noperator="b"').protocol.title == '"a"\noperator="b"'
 
 
 def test_scatter_by_path(desk) -> None:

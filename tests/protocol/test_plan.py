@@ -109,7 +109,7 @@ def test_sources_are_verbatim_and_named_as_written(desk, simulink: str) -> None:
     desk.write("values.toml", "x = 1\n")
     main = 'include = ["sub/other.toml"]\npublished = "values.toml"\n' + SWING + "# end"
     plan = make_plan(desk.load(main))
-    assert plan.sources == {
+    assert plan.protocol.sources == {
         "protocol.toml": main,
         "sub/other.toml": included,
         "more/own bench.toml": simulink,
@@ -117,7 +117,7 @@ def test_sources_are_verbatim_and_named_as_written(desk, simulink: str) -> None:
         "simulink": simulink,
     }
     assert [test.name for test in plan.tests] == ["speeds", "swing"]
-    assert plan.published == "values.toml"
+    assert plan.protocol.published == "values.toml"
 
 
 def test_a_plan_is_json(desk) -> None:
@@ -253,7 +253,7 @@ def test_no_archive_is_larger_than_the_plan_says(desk, tmp_path) -> None:
 
     now = "2026-11-21T09:36:58Z"
     plan = make_plan(desk.load(SWING + MATRIX), seed=1)
-    header = RunHeader(name="noise", created=now, sources=dict(plan.sources))
+    header = RunHeader(name="noise", created=now, sources=dict(plan.protocol.sources))
     writer = RunWriter.create(tmp_path / "results", header, plan.trials)
     random = np.random.default_rng(1)
     for trial in plan.trials:

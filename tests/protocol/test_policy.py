@@ -28,7 +28,7 @@ pause = "10 min"
 
 
 def test_what_is_written_is_what_applies(desk: Desk) -> None:
-    policy = make_plan(desk.load(WRITTEN + TEST)).policy
+    policy = make_plan(desk.load(WRITTEN + TEST)).protocol.policy
     assert policy.rest == Rest.model_construct(every=3600.0, pause=600.0)
     hot = policy.response(Ending(Outcome.FAULT, fault=Fault.OVER_TEMPERATURE))
     assert (hot.do, hot.times, hot.pause, hot.then) == ("retry", 3, 300.0, "skip")
@@ -49,7 +49,7 @@ def test_without_tables_a_failed_trial_is_skipped(desk: Desk) -> None:
 
 def test_the_policy_determines_no_trial(desk: Desk) -> None:
     with_it, without = make_plan(desk.load(WRITTEN + TEST)), make_plan(desk.load(TEST))
-    assert with_it.policy != without.policy
+    assert with_it.protocol.policy != without.protocol.policy
     assert with_it.fingerprint == without.fingerprint
     assert with_it.normalised == without.normalised
 

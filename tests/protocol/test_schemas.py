@@ -28,7 +28,7 @@ def test_another_schema_is_refused_in_a_line_at_its_place(tmp_path: Path, schema
     bench = file(tmp_path, f"schema = {schema}\n{PLATFORM}")
     named = file(tmp_path, f'{TEST}"own.toml"\n', "named.toml")
     protocol = file(tmp_path, f'schema = {schema}\n{TEST}"simulink"\n', "own-schema.toml")
-    told = r"is not the schema of a {} that campaign \S+ reads; it is {}\. Use the program [^\n]*\Z"
+    told = r"this program reads {}s of schema {}, not [^\n]*; use the program [^\n]*\Z"
     with pytest.raises(ProtocolError, match=r"own.toml:1:10: .*" + told.format("bench", 3)):
         load_bench(str(bench))
     for path, kind in ((named, ("bench", 3)), (protocol, ("protocol", 2))):

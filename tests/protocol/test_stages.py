@@ -83,7 +83,7 @@ def test_what_may_follow_counts_in_the_size(desk: Desk, staged) -> None:
             Most(LARGEST_PLAN // 3, 1.0, 1),
             "with the trials that may follow, the plan has over 100000",
         ),
-        (Most(10**9, 1.0, 1), "of memory to plan"),
+        (Most(10**9, 1.0, 1), "of memory; a plan"),
         (Most(1, math.inf, 1), "the stage 'again' has no bound of its duration"),
     ],
 )

@@ -63,10 +63,10 @@ def test_nothing_but_the_plan_has_it(desk, truth: str) -> None:
     """Neither sources, options, tests nor trials tell the number by which it differs."""
     protocol = desk.load(TEST)
     plan = make_plan(protocol, seed=0)
-    assert "truth.toml" not in plan.sources
-    assert plan.truth_sources == {"truth.toml": truth}
+    assert "truth.toml" not in plan.protocol.sources
+    assert plan.protocol.truth_sources == {"truth.toml": truth}
     said = [trial.model_dump_json() for trial in plan.trials]
-    said += [canonical_json(plan.normalised), repr(plan.tests), repr(plan.sources)]
+    said += [canonical_json(plan.normalised), repr(plan.tests), repr(plan.protocol.sources)]
     assert not any("31.4159265" in text for text in said)
     assert "31.4159265" in repr(plan.truths)
 

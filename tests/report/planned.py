@@ -47,7 +47,7 @@ def planned(path: Path, *overrides: str) -> tuple[dict[str, AnalysedTest], RunHe
     header = RunHeader(
         name="run",
         created="2026-11-21T09:36:58Z",
-        sources=dict(plan.sources),
+        sources=dict(plan.protocol.sources),
         overrides={name: value for name, _, value in (each.partition("=") for each in overrides)},
     )
     return tests, header

@@ -162,7 +162,7 @@ def test_resume_asks_for_what_is_left_and_for_no_more(
     for unconnected in (True, False):
         with monkeypatch.context() as patched:
             bench = Bench("drive_torque", unconnected=unconnected).put_in_place(patched)
-            with pytest.raises(UsageError, match=r"in trial-0000[45] .*: drive_torque"):
+            with pytest.raises(UsageError, match=r"trial-0000[45] .* requires drive_torque"):
                 resume_run(str(path), results, **again)
             assert not bench.executed
     monkeypatch.setattr(SimBackend, "channels", lambda backend, trial: ALL - {"pointing_error"})

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from campaign.backends.sim import SimBackend, SimOptions
-from campaign.cli.cost import costs
+from campaign.cli.plan import costs
 from tests.archives import PROTOCOL, plan_of
 
 TWO = f"""{PROTOCOL}

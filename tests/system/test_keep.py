@@ -9,7 +9,6 @@ import pytest
 
 import campaign
 from campaign.archive import open_run
-from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request, prepare
 from campaign.cli.rerun import rerun_trial
 from campaign.cli.run import run_protocol
@@ -23,6 +22,7 @@ from campaign.recording import Ending, Outcome
 from campaign.trial import Role
 from tests.execution.fakes import COMPLETED, make_trials
 from tests.execution.test_policy import Lab
+from tests.system.laboratory import disturb
 from tests.system.user import SEA, write
 from tests.system.user import campaign as typed
 
@@ -133,23 +133,7 @@ def test_a_trial_without_samples_is_repeated_by_its_digests(runs, tmp_path: Path
 
 
 def test_a_repetition_that_differs_is_seen_by_its_digests(runs, tmp_path, capsys, monkeypatch):
-    execute = SimBackend.execute
-
-    def with_an_error(backend, trial, recorder, stopped):
-        append = recorder.append
-
-        class Disturbed:
-            start, event = recorder.start, recorder.event
-
-            @staticmethod
-            def append(time, block):
-                block = block.copy()
-                block[2, 0] += 1e-12
-                append(time, block)
-
-        return execute(backend, trial, Disturbed(), stopped)
-
-    monkeypatch.setattr(SimBackend, "execute", with_an_error)
+    disturb(monkeypatch)
     assert rerun_trial(str(runs["none"]), "1", tmp_path) is ExitCode.TRIALS_FAILED
     assert "different, by the digests of: gyro_rate" in capsys.readouterr().out
 

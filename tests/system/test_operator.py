@@ -9,7 +9,13 @@ from io import StringIO
 import pytest
 
 from campaign.backends import backends
-from campaign.cli.ask import AssumingOperator, ConsoleOperator, NotStartedError, allow_motion
+from campaign.cli.ask import (
+    ASSUMED,
+    AbsentOperator,
+    ConsoleOperator,
+    NotStartedError,
+    allow_motion,
+)
 from campaign.experiments import experiments
 from campaign.protocol import PlannedTest, load_protocol, make_plan
 from campaign.resources import protocols_folder
@@ -41,9 +47,8 @@ def test_an_answer_is_recorded_as_given(
 
 
 def test_a_script_takes_steps_for_done_and_the_record_says_so():
-    assert (
-        AssumingOperator().confirm(make_trials(1)[0], "x", lambda: False) == "assumed done (--yes)"
-    )
+    said = AbsentOperator(ASSUMED).confirm(make_trials(1)[0], "x", lambda: False)
+    assert said == "assumed done (--yes)"
 
 
 def unstable_test() -> PlannedTest:

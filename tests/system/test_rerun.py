@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from campaign.archive import open_run
-from campaign.backends.sim import SimBackend
 from campaign.cli.prepare import Request
 from campaign.cli.rerun import _error, rerun_trial
 from campaign.cli.run import run_protocol
@@ -21,6 +20,7 @@ from campaign.physics import grid
 from campaign.physics.engine_version import ENGINE
 from campaign.physics.step_choice import StepChoice
 from campaign.recording import ChannelInfo, Ending, MemoryRecorder, Outcome, Recording
+from tests.system.laboratory import disturb
 from tests.system.user import SEA, write
 
 
@@ -48,23 +48,7 @@ def test_the_same_samples_come_out(archive: Path, capsys: pytest.CaptureFixture[
 def test_another_sample_is_found_and_named(
     archive: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    execute = SimBackend.execute
-
-    def with_an_error(backend, trial, recorder, stopped):
-        append = recorder.append
-
-        class Disturbed:
-            start, event = recorder.start, recorder.event
-
-            @staticmethod
-            def append(time, block):
-                block = block.copy()
-                block[2, 0] += 1e-12
-                append(time, block)
-
-        return execute(backend, trial, Disturbed(), stopped)
-
-    monkeypatch.setattr(SimBackend, "execute", with_an_error)
+    disturb(monkeypatch)
     assert rerun_trial(archive.stem, "1", archive.parent) is ExitCode.TRIALS_FAILED
     first, found, _ = capsys.readouterr().out.splitlines()
     assert first.endswith("different")

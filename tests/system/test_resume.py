@@ -13,81 +13,37 @@ from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision, RunResumed, parse_journal
 from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend
-from campaign.cli.prepare import Request
-from campaign.cli.resume import remake, resume_run
-from campaign.cli.run import Remarks, run_protocol
+from campaign.cli.resume import remake
+from campaign.cli.run import Remarks
 from campaign.errors import ExitCode, UsageError
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.test_resuming import content, documented_differences
+from tests.system.laboratory import BENCH, Laboratory
 from tests.system.user import SEA, begun, campaign, write
 
-BENCH = (Path(__file__).parents[2] / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
 OWN_BENCH = SEA.replace('bench = "simulink"', 'bench = "bench.toml"\nseed = 5\nrepeat = 2')
 
 
-class Lab:
-    """A folder with a protocol and its bench; runs go on in this process."""
-
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder = folder
-        self.results = folder / "results"
-        self.patch = monkeypatch
-        self.protocol = write(folder, OWN_BENCH)
-        self.bench = write(folder, BENCH, "bench.toml")
-
-    def run(self, results: str = "results") -> tuple[ExitCode, Path]:
-        request = Request(str(self.protocol), seed=7)
-        remarks = Remarks("me", "a note", ("tag",))
-        into = self.folder / results
-        code = run_protocol(request, into, workers=1, report=False, remarks=remarks)
-        return code, next(into.glob("*.nxs"))
-
-    def stopped_in(self, trial: int, ending: Ending | None = None) -> Path:
-        """A run that Ctrl-C, or the given ending, meets in the middle of a trial."""
-        execute = SimBackend.execute
-
-        def stop(backend, what, recorder, stopped):
-            if what.number != trial:
-                return execute(backend, what, recorder, stopped)
-            if ending is None:
-                signal.raise_signal(signal.SIGINT)
-            ended = execute(backend, what, recorder, stopped)
-            return ending or ended
-
-        with self.patch.context() as patch:
-            patch.setattr(SimBackend, "execute", stop)
-            _, archive = self.run()
-        return archive
-
-    def resume(self, archive: Path, *, accept: bool = False) -> ExitCode:
-        return resume_run(
-            str(archive),
-            self.results,
-            accept_changes=accept,
-            workers=1,
-            report=False,
-            port=None,
-            yes=False,
-        )
+ASKED = {"seed": 7, "remarks": Remarks("me", "a note", ("tag",))}
 
 
 @pytest.fixture
-def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
-    return Lab(tmp_path, monkeypatch)
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Laboratory:
+    return Laboratory(tmp_path, monkeypatch, OWN_BENCH)
 
 
-def interrupted(lab: Lab) -> Path:
+def interrupted(lab: Laboratory) -> Path:
     """Stopped in the third of four trials; the signal comes while it is being executed."""
-    archive = lab.stopped_in(3, Ending(Outcome.INTERRUPTED, "stopped"))
+    archive = lab.stopped_in(3, Ending(Outcome.INTERRUPTED, "stopped"), **ASKED)
     assert open_run(archive).status == "interrupted"
     return archive
 
 
 @pytest.mark.slow
-def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented(lab: Lab):
+def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented(lab: Laboratory):
     archive = interrupted(lab)
     assert lab.resume(archive) is ExitCode.DONE
-    _, whole = lab.run("other")
+    _, whole = lab.executed("other", **ASKED)
     ours, theirs = content(archive), content(whole)
     missing = object()
     differing = {
@@ -101,7 +57,7 @@ def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented
 
 
 @pytest.mark.slow
-def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Lab):
+def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Laboratory):
     archive = interrupted(lab)
     executed = []
     execute = SimBackend.execute
@@ -115,24 +71,24 @@ def test_finished_trials_are_not_repeated_and_an_interrupted_one_is(lab: Lab):
 
 
 @pytest.mark.slow
-def test_white_space_and_comments_are_no_change(lab: Lab):
+def test_white_space_and_comments_are_no_change(lab: Laboratory):
     archive = interrupted(lab)
     write(lab.folder, "# mine\n\n" + OWN_BENCH.replace(" = ", "   =  ") + "\n")
     write(lab.folder, "# mine\n" + BENCH, "bench.toml")
     assert lab.resume(archive) is ExitCode.DONE
 
 
-def change_protocol(lab: Lab) -> None:
+def change_protocol(lab: Laboratory) -> None:
     write(lab.folder, OWN_BENCH.replace("settle_cycles = 1", "settle_cycles = 2"))
 
 
-def change_bench(lab: Lab) -> None:
+def change_bench(lab: Laboratory) -> None:
     limits = lab.bench.read_text(encoding="utf-8")
     assert 'angle = "' in limits
     write(lab.folder, limits.replace('angle = "', 'angle = "1', 1), "bench.toml")
 
 
-def change_version(lab: Lab) -> None:
+def change_version(lab: Laboratory) -> None:
     real = lab.patch
     from campaign.execution import provenance
 
@@ -149,7 +105,9 @@ def change_version(lab: Lab) -> None:
         (change_version, r"versions\.numba: .* → 0\.1"),
     ],
 )
-def test_what_has_changed_is_named_by_field_and_refused_unless_accepted(lab: Lab, change, field):
+def test_what_has_changed_is_named_by_field_and_refused_unless_accepted(
+    lab: Laboratory, change, field
+):
     archive = interrupted(lab)
     before = archive.read_bytes()
     change(lab)
@@ -164,7 +122,7 @@ def test_what_has_changed_is_named_by_field_and_refused_unless_accepted(lab: Lab
     assert len(resumed.changes) == 1
 
 
-def test_another_list_of_trials_is_another_run_whatever_is_accepted(lab: Lab):
+def test_another_list_of_trials_is_another_run_whatever_is_accepted(lab: Laboratory):
     archive = interrupted(lab)
     write(lab.folder, OWN_BENCH.replace('"lugre"]', '"lugre", "static"]'))
     with pytest.raises(UsageError, match="start a new run") as refused:
@@ -173,7 +131,7 @@ def test_another_list_of_trials_is_another_run_whatever_is_accepted(lab: Lab):
 
 
 @pytest.mark.slow
-def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: Lab, capsys):
+def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: Laboratory, capsys):
     archive = interrupted(lab)
     planned = [trial.fingerprint for trial in open_run(archive).plan]
     lab.protocol.unlink()
@@ -186,11 +144,11 @@ def test_a_protocol_that_is_gone_is_said_and_the_archived_plan_is_executed(lab: 
 @pytest.mark.slow
 @pytest.mark.parametrize(("policy", "repeated"), [("skip", False), ("abort", True)])
 def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
-    lab: Lab, policy: str, repeated: bool
+    lab: Laboratory, policy: str, repeated: bool
 ):
     lab.protocol = write(lab.folder, f'faults = {{ reset = "{policy}" }}\n{OWN_BENCH}')
     fault = Ending(Outcome.FAULT, "it started anew", fault=Fault.RESET)
-    archive = lab.stopped_in(2, fault)
+    archive = lab.stopped_in(2, fault, **ASKED)
     status = open_run(archive).status
     if repeated:
         assert status == "fault"
@@ -204,7 +162,7 @@ def test_a_fault_is_repeated_when_it_ended_the_run_and_not_when_it_was_skipped(
     assert decisions == [policy]
 
 
-def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: Lab):
+def test_a_bench_at_another_port_is_no_change_and_where_it_is_today_counts(lab: Laboratory):
     run = open_run(interrupted(lab))
     with pytest.raises(UsageError, match="'sim' has no port"):
         remake(run, "socket://127.0.0.1:9")

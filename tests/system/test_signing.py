@@ -28,8 +28,7 @@ from campaign.cli.resume import resume_run
 from campaign.cli.run import run_protocol
 from campaign.cli.show import show_archive
 from campaign.cli.sign import sign_archive
-from campaign.cli.signature import wanted_signature
-from campaign.cli.verify import verify_archives
+from campaign.cli.verify import verify_archives, wanted_signature
 from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.recording import Ending, Outcome, SafeState
 from tests.archive.conftest import make_header, make_trial, write_run, write_trial

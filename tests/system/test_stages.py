@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import signal
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,74 +14,46 @@ import pytest
 import campaign as program
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.verification.verify_run import verify_run
-from campaign.backends.sim import SimBackend
 from campaign.cli import session
-from campaign.cli.prepare import Request
-from campaign.cli.resume import resume_run
-from campaign.cli.run import run_protocol
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate
 from campaign.execution.trial_metrics import TrialMeasurement
 from campaign.experiments import experiments
 from campaign.experiments.frequency_response import experiment as frequency_response
 from campaign.experiments.interface import TrialData
+from tests.system.laboratory import BENCH, Laboratory
 from tests.system.test_stage_kills import FOLLOWING, PLANNED, PROTOCOL
 from tests.system.user import campaign, write
 
-ROOT = Path(__file__).parents[2]
-BENCH = (ROOT / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
 ALL = PLANNED + FOLLOWING
+OWN_BENCH = PROTOCOL.replace('"simulink"', '"bench.toml"')
 
 
-class Lab:
-    """A folder with a protocol and its own bench; runs go on in this process."""
+class Lab(Laboratory):
+    """Of a protocol with stages and its own bench."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder, self.patch = folder, monkeypatch
-        self.protocol = write(folder, PROTOCOL.replace('"simulink"', '"bench.toml"'))
-        write(folder, BENCH, "bench.toml")
+    def run(self, workers: int = 1) -> RunReader:
+        return open_run(self.executed(workers=workers)[1])
 
-    def run(self, results: str = "results", workers: int = 1) -> RunReader:
-        run_protocol(
-            Request(str(self.protocol)), self.folder / results, workers=workers, report=False
-        )
-        return open_run(find_run(self.folder / results))
-
-    def stopped_in(self, number: int) -> RunReader:
-        """A run that Ctrl-C meets in a trial."""
-        execute = SimBackend.execute
-
-        def stop(backend, trial, recorder, stopped):
-            if trial.number == number:
-                signal.raise_signal(signal.SIGINT)
-                while not stopped():  # the handler is the main thread's, this may be another
-                    time.sleep(0.001)
-            return execute(backend, trial, recorder, stopped)
-
-        with self.patch.context() as patch:
-            patch.setattr(SimBackend, "execute", stop)
-            run = self.run()
+    def stopped(self, number: int) -> RunReader:
+        run = open_run(self.stopped_in(number))
         assert run.status == "interrupted"
         return run
 
-    def resume(self, run: RunReader, *, accept: bool = False) -> RunReader:
-        code = resume_run(
-            str(run.path), run.path.parent, accept_changes=accept, workers=1, report=False,
-            port=None, yes=False,
-        )  # fmt: skip
-        assert code is ExitCode.DONE
-        return open_run(find_run(run.path.parent))
+    def resumed(self, run: RunReader, *, accept: bool = False) -> RunReader:
+        assert self.resume(run.path, accept=accept) is ExitCode.DONE
+        return open_run(run.path)
 
 
 @pytest.fixture
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
-    return Lab(tmp_path, monkeypatch)
+    return Lab(tmp_path, monkeypatch, OWN_BENCH)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> RunReader:
     """A run that nobody stopped, by one worker; to be read only."""
-    return Lab(tmp_path_factory.mktemp("whole"), pytest.MonkeyPatch()).run()
+    return Lab(tmp_path_factory.mktemp("whole"), pytest.MonkeyPatch(), OWN_BENCH).run()
 
 
 def samples(run: RunReader) -> dict[int, tuple[str, bytes]]:
@@ -104,9 +74,9 @@ def test_two_workers_find_number_and_record_what_one_does(lab: Lab, whole: RunRe
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 14])
 def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunReader, number: int):
-    stopped = lab.stopped_in(number)
+    stopped = lab.stopped(number)
     assert len(stopped.plan) > len(stopped.trials) or len(stopped.plan) == PLANNED
-    resumed = lab.resume(stopped)
+    resumed = lab.resumed(stopped)
     assert samples(resumed) == samples(whole)
     assert verify_run(resumed.path).problems == ()
 
@@ -116,26 +86,26 @@ def test_a_run_that_is_stopped_goes_on_to_the_same_samples(lab: Lab, whole: RunR
 def test_a_protocol_that_is_gone_leaves_its_stages_in_the_archive(
     lab: Lab, whole: RunReader, number: int
 ):
-    stopped = lab.stopped_in(number)
+    stopped = lab.stopped(number)
     lab.protocol.unlink()
-    assert samples(lab.resume(stopped)) == samples(whole)
+    assert samples(lab.resumed(stopped)) == samples(whole)
 
 
 def test_what_followed_on_one_bench_does_not_move_a_changed_one(lab: Lab):
-    stopped = lab.stopped_in(14)
+    stopped = lab.stopped(14)
     write(lab.folder, BENCH.replace('angle = "', 'angle = "1', 1), "bench.toml")
     before = stopped.path.read_bytes()
     with pytest.raises(UsageError, match=r"follows from what was found before sweep was changed"):
-        lab.resume(stopped, accept=True)
+        lab.resumed(stopped, accept=True)
     assert stopped.path.read_bytes() == before
 
 
 @pytest.mark.slow
 def test_a_change_before_anything_followed_is_accepted(lab: Lab):
-    stopped = lab.stopped_in(1)
+    stopped = lab.stopped(1)
     assert stopped.stages == ()
     write(lab.folder, BENCH.replace('angle = "', 'angle = "1', 1), "bench.toml")
-    resumed = lab.resume(stopped, accept=True)
+    resumed = lab.resumed(stopped, accept=True)
     assert len(resumed.trials) == ALL
     limits = [each.trial.bench["limits"]["angle"] for each in resumed.trials[-FOLLOWING:]]
     changed = resumed.trials[0].trial

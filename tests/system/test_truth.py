@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import signal
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Sequence, Set
 from pathlib import Path
 
 import pytest
@@ -13,10 +12,7 @@ import pytest
 from campaign.api import analysis
 from campaign.archive import open_run
 from campaign.backends.sim import SimBackend
-from campaign.cli.prepare import Request
 from campaign.cli.rerun import rerun_trial
-from campaign.cli.resume import resume_run
-from campaign.cli.run import run_protocol
 from campaign.cli.show import show_archive
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
@@ -24,16 +20,16 @@ from campaign.experiments.interface import TestData, result_of
 from campaign.report.build import render
 from campaign.report.content import document
 from campaign.resources import templates_folder
+from tests.system.laboratory import BENCH, Laboratory
 from tests.system.user import campaign, write
 
-BENCH = (Path(__file__).parents[2] / "protocols/benches/simulink.toml").read_text(encoding="utf-8")
 ODD = "31.4159265"
 TRUTH = BENCH.replace('static_torque = "32 N m"', f'static_torque = "{ODD} N m"', 1)
 MAP = """\
 [[test]]
 name = "map"
 kind = "velocity_map"
-bench = "stated.toml"
+bench = "bench.toml"
 seed = 5
 speeds = ["0.5 deg/s", "1 deg/s", "2 deg/s", "4 deg/s", "8 deg/s", "12 deg/s", "20 deg/s"]
 max_time = "4 s"
@@ -51,43 +47,21 @@ def stated() -> str:
     return "friction = {}\n" + text.replace('inertia = "35 kg m^2"', 'inertia = "42 kg m^2"')
 
 
-class Lab:
-    """A folder with a protocol, its bench and its truth; runs go on in this process."""
+class Lab(Laboratory):
+    """Of a protocol, its stated bench and its truth."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder, self.results, self.patch = folder, folder / "results", monkeypatch
-        self.protocol = write(folder, MAP)
-        write(folder, stated(), "stated.toml")
+    def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
+        super().__init__(folder, patch, MAP, stated())
         self.truth = write(folder, TRUTH, "truth.toml")
 
     def run(self, backend: str = "sim", *changes: str, truth: str | None = None) -> Path:
-        before = set(self.results.glob("*.nxs"))
         truth = str(self.truth) if truth is None else truth
-        request = Request(str(self.protocol), changes=changes, backend=backend, truth=truth)
-        code = run_protocol(request, self.results, workers=1, report=False, yes=True)
-        assert code in (ExitCode.DONE, ExitCode.INTERRUPTED)
-        (archive,) = set(self.results.glob("*.nxs")) - before
+        code, archive = self.executed(changes=changes, backend=backend, truth=truth)
+        assert code is ExitCode.DONE
         return archive
 
     def interrupted(self) -> Path:
-        """A run that Ctrl-C meets in its third trial."""
-        execute = SimBackend.execute_together
-
-        def stop(backend, trials, recorders, stops) -> Iterator:
-            if any(trial.number == 3 for trial in trials):
-                signal.raise_signal(signal.SIGINT)
-            return execute(backend, trials, recorders, stops)
-
-        with self.patch.context() as patch:
-            patch.setattr(SimBackend, "execute_together", stop)
-            patch.setattr(SimBackend, "most_together", 1)
-            return self.run()
-
-    def resume(self, archive: Path, *, accept: bool = False) -> ExitCode:
-        return resume_run(
-            str(archive), self.results, accept_changes=accept, workers=1, report=False, port=None,
-            yes=True,
-        )  # fmt: skip
+        return self.stopped_in(3, truth=str(self.truth))
 
 
 @pytest.fixture
@@ -273,7 +247,7 @@ def replace_truth(trial):
 
 def test_a_mistaken_truth_is_bad_usage(tmp_path: Path) -> None:
     write(tmp_path, MAP)
-    write(tmp_path, stated(), "stated.toml")
+    write(tmp_path, stated(), "bench.toml")
     write(tmp_path, TRUTH.replace('inertia = "35 kg m^2"', 'inertia = "35 apples"'), "truth.toml")
     done = campaign(tmp_path, "run", "protocol.toml", "--truth", "truth.toml", code=2)
     line = TRUTH[: TRUTH.index('inertia = "35')].count("\n") + 1

@@ -81,9 +81,9 @@ def archived(folder: Path, wanted: Mapping[str, Wanted], text: str = RAMPS) -> d
             {
                 "name": name,
                 "created": run.at.isoformat(),
-                "title": plan.title,
-                "protocol_name": plan.name,
-                "sources": dict(plan.sources),
+                "title": plan.protocol.title,
+                "protocol_name": plan.protocol.path.name,
+                "sources": dict(plan.protocol.sources),
                 "normalised": tree,
                 "tests": tree["tests"],
                 "trials": len(plan.trials),

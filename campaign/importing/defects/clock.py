@@ -210,8 +210,8 @@ def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
         if anew := restarts(clock):
             raise ValueError(
                 f"time begins anew in row {_told(np.array(anew) + first)}: {len(anew) + 1} "
-                "recordings in one file; 'restarts = true' under its [[test.recording]] makes a "
-                "trial of each, and so does 'each' with a column that numbers them"
+                "recordings; in [[test.recording]] write 'restarts = true', or 'each' with a "
+                "column that numbers them"
             )
         if not repairs and (coarse := _coarse(clock)):
             raise ValueError(coarse)
@@ -254,9 +254,9 @@ def _marked(
         spread = float(np.std(steps) / step)
         worst = int(np.argmax(np.abs(steps - step)))
         raise ValueError(
-            f"its times are no even clock: steps vary by {100 * spread:.3g} % about {step:.6g} s, "
-            f"most by that of {steps[worst]:.6g} s before row {first + rows[worst + 1] + 1}; "
-            'repair = ["resample"] puts lines through the samples'
+            f"its times are no even clock: steps of {step:.6g} s vary by {100 * spread:.3g} %, to "
+            f"{steps[worst]:.6g} s before row {first + rows[worst + 1] + 1}; "
+            'repair = ["resample"] interpolates'
         )
     positions = np.full(int(number[-1]) + 1, np.nan)
     positions[number.astype(int)] = rows
@@ -265,8 +265,7 @@ def _marked(
         if "mark gaps" not in repairs:
             raise ValueError(
                 f"{missing} samples are missing, before row {before}; "
-                'repair = ["mark gaps"] marks them as lost, and a trial for each stretch is had by '
-                "'start' and 'stop'"
+                "repair = [\"mark gaps\"] marks them as lost; 'start' and 'stop' cut them out"
             )
         remarks.append(f"{missing} samples are missing and marked as lost, before row {before}")
     return EvenClock(1.0 / slope, float(clock[0]), len(positions), positions, tuple(remarks))
@@ -280,8 +279,7 @@ def _coarse(clock: Array) -> str:
     step = float(np.polyfit(np.arange(len(clock)), clock, 1)[0])
     return (
         f"its times are rounded to {told.resolution:.3g} s, too coarse for steps of {step:.3g} s; "
-        f"the 'sample_rate' that it had, about {1 / step:.4g} Hz, in place of their column takes "
-        "its rows as even"
+        f"give the 'sample_rate' in place of their column, about {1 / step:.4g} Hz"
     )
 
 

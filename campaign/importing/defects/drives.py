@@ -117,7 +117,7 @@ def of_drive_sign(
     share = float(power.sum()) / whole
     what = (
         f"{torque_name} brakes the motion of {rate_name} ({100 * share:.0f} % of the exchanged "
-        "power), as friction would and no drive: its sign, or that of the rate, is swapped"
+        "power): its sign, or that of the rate, is swapped"
     )
     proven = back and mass < 0
     if not proven:

@@ -3,66 +3,25 @@
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 from campaign import channels
 from campaign.importing.cells import UNIT_WORDS
 from campaign.importing.guess.columns import INDEX, TIME, UNKNOWN, Basis, ColumnGuess
 from campaign.unit_grammar import parse_unit
 
-_QUANTITIES = {
-    UNKNOWN: "voltage volt volts spannung u vd vq vin vbus bus dc id ia ib ic iu iv iw currentd "
-    "phase pwm status enable enabled flag flags error err fehler mode name ext external cof "
-    "coefficient coeff koeffizient reibwert reibzahl mu vibration acc accel accelerometer "
-    "acceleration accelerations beschleunigung ax ay az tx ty mx my ddq qdd ddot qddot ddtheta "
-    "power leistung pressure druck model sim simulated predicted residual tcp pose wrench "
-    "cartesian quaternion twist mag jerk energy duty fault controlword statusword stiffness "
-    "damping inertia gain kp ki kd init initial home offset bias limit limits threshold diff "
-    "deviation following schleppfehler abweichung pulse pulses battery supply latency jitter dt "
-    "delta humidity feuchte depth wear verschleiss resistance feed hall erpm thetae omegae elec "
-    "electrical uncertainty sigma std variance cov",
-    "warmth": "temp temperature temperatures temperatur thermo thermocouple celsius",
-    "torque": "tau torque torques tauj trq tq tor moment momente drehmoment effort efforts force "
-    "forces kraft couple loadcell fn fz fx fy ft fr ff tz mz te tem vir",
-    "rate": "dq qd qdot dtheta dphi thetadot phidot dot w omega vel velo velocity velocities speed "
-    "speeds spd rate drehzahl geschwindigkeit geschw winkelgeschw vitesse rpm rps wm n tacho gyro "
-    "gx gy gz",
-    "angle": "q qm qg qpos pos posn position positions angle angles angular ang theta phi winkel "
-    "lage weg enc encoder encoders displacement distance travel stroke hub abstand rotation dist",
-    "current": "current currents curr cur strom courant i iq isq currentq amps amp",
-    TIME: "t time times timestamp timestamps stamp zeit temps elapsed clock secs seconds millis "
-    "messzeit laufzeit zeitstempel uhrzeit epoch",
-    INDEX: "index idx sample samples seq sequence nr no row count counter step cycle cycles iter "
-    "iteration tick loop",
-}
-"""An earlier quantity outweighs a later one: `q2_tau` is a torque at joint 2."""
+_LISTED = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+_QUANTITIES = _LISTED["quantities"]
+"""An earlier quantity outweighs a later one."""
 
-_CHANGED = {
-    "target": "target targets cmd cmds command commands commanded soll sollwert demand demanded "
-    "dmd setpoint stpt set desired des ref reference goal d g qg sp tgt request requested req "
-    "consigne vorgabe action wanted planned traj trajectory profile star",
-    "motor": "motor motors mot mtr moteur m wm servo antrieb antriebsseite rotor spindle spindel",
-    "load": "load link joint joints jnt gimbal output l j abtrieb abtriebsseite last arm",
-    "hull": "base hull platform plattform ship vessel carrier",
-    "gyro": "gyro gyr gyroscope imu inertial los gx gy gz",
-    "sensed": "tauj sensor cell loadcell transducer messwelle torquemeter strain fx fy ft fr ff tz "
-    "mz friction frictional reib reibung",
-    "normal": "normal axial radial fn fz preload",
-    "place": "winding wicklung bearing housing ambient amb oil coil coolant stator magnet mos fet "
-    "mosfet room rotor",
-    "estimate": "estimate estimated est hat observer",
-    "neutral": "act actual ist istwert wert meas measured measurement fb feedback fbk present "
-    "filt filtered filter raw smooth smoothed avg average mean value values val data real in of "
-    "the du de la und nach max min nominal per rms axis achse axe rel relative gleit sliding "
-    "column channel float double signal sig lin linear rotational robot main state states mech "
-    "mechanical number revolutions",
+_WORDS = {
+    kind: frozenset(listed.split()) for kind, listed in (_QUANTITIES | _LISTED["changed"]).items()
 }
-"""What a word says of a quantity; a neutral one says nothing."""
-
-_WORDS = {kind: frozenset(listed.split()) for kind, listed in (_QUANTITIES | _CHANGED).items()}
 _KNOWN = frozenset().union(*_WORDS.values())
 
 _MOVING = _WORDS["rate"] | _WORDS["angle"] | _WORDS["current"]
@@ -78,29 +37,7 @@ _KINDS = {
         *(("N m", "torque"), ("N", "torque"), ("A", "current"), ("degC", "warmth"), ("s", TIME)),
     )
 }
-_SPELLED = {
-    word: unit
-    for unit, *words in map(
-        str.split,
-        """deg degs degree degrees
-        rad rads radians
-        rev revs turns
-        count counts ticks inc
-        deg/s degps dps
-        rad/s radps
-        mm/s mmps
-        N·m nm
-        mN·m mnm
-        kN kn
-        s sec secs second seconds
-        ms msec millis milliseconds millisec
-        us usec micros microseconds microsec
-        ns nsec nanos nanoseconds nanosec
-        mA ma
-        degC degc celsius""".splitlines(),
-    )
-    for word in words
-}
+_SPELLED = {word: unit for unit, listed in _LISTED["units"].items() for word in listed.split()}
 """Words at the end of a name that are a unit, in lower case."""
 _LETTERS = {"N": "N", "A": "A", "a": "A", "s": "s", "m": "m", "C": "degC"}
 """Letters that may be a unit; `q_m` is measured, and `current_a` of phase a as well."""

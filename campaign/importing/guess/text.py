@@ -19,28 +19,7 @@ from campaign.importing.guess.layouts import Layout, PlacedColumn, layouts, slug
 from campaign.importing.guess.relations import ANGLES, RATES, TORQUES
 from campaign.unit_grammar import parse_unit
 
-_HEAD = """\
-# A first mapping, made by looking at the files. Nothing in it is known that they do not state.
-# What is left to be done by hand:
-# 1. Save this beside the files, and a rig.toml with it. Name and axis are enough:
-#        schema = 3
-#        name = "..."
-#        [axis]
-#        name = "..."
-#        kind = "{kind}"  # rotary: rad and N m; linear: m and N{asked}
-# 2. Check lines that begin with `# ?`. Those of the form `key = ...` or `[...]`: correct what is
-#    wrong, and remove the `# ?`. The others are remarks: consider them, and delete them. Every
-#    channel needs a unit (and `times`, where that is asked); delete the whole block of one that is
-#    not wanted.
-# 3. Columns that were taken for nothing have a block in comments: if one is a channel, write which
-#    for CHANNEL (`campaign kinds channels` lists them), its unit, and remove the `#` of its lines.
-# 4. Without `[gear]` in rig.toml motor and load move as one. With it (`ratio = ...`) columns at the
-#    motor are motor_angle or motor_rate, and a torque there has `times = "RATIO"`.
-# 5. `campaign plan mapping.toml --backend import` says what is still wrong, by line;
-#    `campaign import mapping.toml --report` makes run and report of it.
-# Never guessed: signs, the side of a gear, torque constants, rated torques, offsets, filters.
-schema = 2
-title = {title}"""
+_HEAD = Path(__file__).with_name("mapping_head.toml").read_text(encoding="utf-8").rstrip()
 _LACKING = {
     (*ANGLES, *RATES): "no column was taken for the motion, which `motion` needs: angle or rate",
     TORQUES: "no column was taken for what drives it, which `motion` needs: drive_torque or "

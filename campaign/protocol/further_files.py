@@ -1,0 +1,115 @@
+"""Files that a protocol names besides its includes: benches, truths, published values, options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from campaign.errors import Problem
+from campaign.protocol.collect import sibling
+from campaign.protocol.files import (
+    Origin,
+    Source,
+    UnreadableError,
+    looked_for,
+    read_source,
+    read_text,
+)
+from campaign.protocol.positions import Keys
+from campaign.protocol.problems import allowed, shown
+from campaign.text import nearest
+
+Read = Callable[[Path, str], Source | list[Problem]]
+"""A file under a name, or what is wrong with it. Raises UnreadableError."""
+read_bench: Read = partial(read_source, kind="bench")
+
+
+def read_any_text(file: Path, name: str) -> Source:
+    """A file without values, whatever its text is."""
+    return Source(file, name, read_text(file), {})
+
+
+def names_file(written: str) -> bool:
+    """Whether it is the path of a bench, and no shipped bench's name."""
+    return "/" in written or "\\" in written or written.endswith(".toml")
+
+
+def benches_in(shipped: Path) -> dict[str, Path]:
+    """The benches of a folder of protocols, by the bare name that they go by."""
+    return {file.stem: file for file in sorted((shipped / "benches").glob("*.toml"))}
+
+
+def no_bench(written: str, known: Collection[str], beside: Collection[str] = ()) -> str:
+    """What to say of a name that no bench has; `beside`: files that may be meant."""
+    slip = nearest(written, known) or nearest(f"{written}.toml", beside)
+    message = f"no shipped bench is called {shown(written)}; {allowed(known)}"
+    return f"{message}, or the path of a .toml file{slip}"
+
+
+@dataclass
+class FurtherFiles:
+    """Files of one kind of use, each read once; what is wrong is added to `problems`.
+
+    Attributes:
+        shipped: folder whose `benches/` holds the benches that go by a bare name.
+        sources: by the name that the file is written with.
+        protocols: files that were read as protocols, and are no benches.
+    """
+
+    shipped: Path
+    problems: list[Problem]
+    sources: dict[str, Source] = field(default_factory=dict)
+    protocols: Mapping[Path, object] = field(default_factory=dict)
+
+    def bench(
+        self, written: Any, beside: Source | None, origin: Origin, keys: Keys
+    ) -> Source | None:
+        """A bench by its path, from `beside` or the current folder, or a shipped one by its name.
+
+        `origin`, `keys`: where it is written.
+        """
+        if not isinstance(written, str):
+            return None
+        if names_file(written):
+            file, name = sibling(beside, written) if beside else (Path(written), written)
+            return self.read(read_bench, file, name, origin, keys, written)
+        known = benches_in(self.shipped)
+        if written in known:
+            return self.read(read_bench, known[written], written, origin, keys, written)
+        message = no_bench(written, known, self._toml_files(beside.file.parent) if beside else ())
+        self.problems.append(origin.problem(keys, "value", message))
+        return None
+
+    def read(
+        self, read: Read, file: Path, name: str, origin: Origin, keys: Keys, written: str
+    ) -> Source | None:
+        """A further file; a missing one is a problem of the text that names it."""
+        known = self.sources.get(name)
+        if known is not None and known.file == file:
+            return known
+        if known is not None:  # a protocol file that is called like a shipped bench
+            name = str(file)
+        try:
+            source = read(file, name)
+        except UnreadableError as error:
+            hint = nearest(file.name, self._toml_files(file.parent))
+            message = f"{shown(written)}: {error} {looked_for(file)}{hint}"
+            self.problems.append(origin.problem(keys, "value", message))
+            return None
+        if not isinstance(source, Source):
+            self.problems += source
+            return None
+        self.sources[name] = source
+        return source
+
+    def _toml_files(self, folder: Path) -> list[str]:
+        """Those there that may be benches."""
+        protocols = {file.name for file in self.protocols}
+        try:
+            names = sorted(file.name for file in folder.glob("*.toml"))[:1000]
+        except (OSError, ValueError):
+            return []
+        return [name for name in names if name not in protocols]
