@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
 
 EXPLAINED = 0.9
 """Share of a signal's variance that a single sine must explain to be called one."""

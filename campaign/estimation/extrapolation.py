@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.estimation.least_squares import Array
+from campaign.arrays import Array
 from campaign.reason import NONE, Cause, Reason
 
 FEWEST_BELOW = 3

@@ -12,13 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.autocorrelated_errors import errors_of
 from campaign.estimation.intervals import SINGLE_VALUE, with_error
-
-Array = NDArray[np.float64]
 
 APART = 1.5
 """Fastest over slowest of the speeds, at least: a line through one speed tells no slope."""

@@ -12,12 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.95
 """Confidence of intervals, if nothing else is said."""

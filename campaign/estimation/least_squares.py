@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array, Flags
 
 NULL = 1e-8
 """Singular values of the scaled Jacobian below this share of the largest are null."""
@@ -30,9 +29,7 @@ def refuse_too_few(points: int, parameters: int) -> None:
         )
 
 
-def covariance(
-    jacobian: Array, null: float = NULL, flat: float = 0.0
-) -> tuple[Array, NDArray[np.bool_]]:
+def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[Array, Flags]:
     """(JᵀJ)⁻¹ without null directions, shape (k, k), and which parameters these involve, (k,).
 
     Units of the parameters decide nothing: each column of J, shape (n, k), is scaled to length 1.
@@ -66,7 +63,7 @@ class Minimum:
     point: Array
     residuals: Array
     jacobian: Array
-    held: NDArray[np.bool_]
+    held: Flags
 
     @property
     def cost(self) -> float:
@@ -125,7 +122,7 @@ def minimum(
     return Minimum(point, residuals, jacobian, held)
 
 
-def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
+def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> Flags:
     """Which parameters are at a bound with the descent leading beyond it."""
     return ((point <= lower) & (gradient >= 0)) | ((point >= upper) & (gradient <= 0))
 

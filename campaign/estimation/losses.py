@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
+
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 
 

@@ -14,15 +14,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, Flags
 from campaign.estimate import Estimate
 from campaign.estimation.linear_uncertainty import Uncertainty, estimate_of, uncertainty
 from campaign.estimation.losses import Loss, cost
 from campaign.estimation.objective import Objective
 from campaign.estimation.unknowns import Unknown, values_at
 
-Array = NDArray[np.float64]
 AGREE = 0.01
 """Costs of starts that found the same optimum differ by less than this share."""
 EXACT = 1e-9
@@ -218,7 +217,7 @@ def fit_from(
     phase: str = "",
     display: Display = no_display,
     lowest: Lowest | None = None,
-    used: NDArray[np.bool_] | None = None,
+    used: Flags | None = None,
 ) -> Start:
     """One fit.
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import BATCHES
-from campaign.estimation.least_squares import Array
 from campaign.estimation.stribeck import StribeckFit, fit_stribeck
 
 Counts = NDArray[np.signedinteger[Any]]

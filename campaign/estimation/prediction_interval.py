@@ -10,14 +10,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, exponential, student
 from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.reason import Cause
-
-Array = NDArray[np.float64]
 
 TOO_FEW_POSITIVE = Cause("too few positive values", "it takes two positive values or more")
 

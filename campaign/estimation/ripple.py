@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import BATCHES, of_series
-from campaign.estimation.least_squares import Array
 
 LEAST_PERIODS = 0.8
 """that a window must span for its own cosine and sine to be told apart from its mean."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, student
-from campaign.estimation.least_squares import Array
 from campaign.estimation.step_response import HIGH, LOW, SCATTERS, StepCharacteristics
 from campaign.reason import Cause
 

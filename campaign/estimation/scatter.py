@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, SINGLE_VALUE, student
-from campaign.estimation.least_squares import Array
 from campaign.reason import Cause
 
 ZERO_MEAN = Cause("mean of zero", "its mean is zero")

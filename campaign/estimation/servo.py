@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.continuation import DECIBEL, gain_margin_beyond
 from campaign.estimation.crossings import LevelCrossing, passings, sides
-from campaign.estimation.frequency_response import Array, ComplexArray, Response, open_loop
+from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import LEVEL, shifted_by, with_error
 from campaign.estimation.local_fit import Quantity, Reading, read
@@ -203,7 +203,7 @@ def _phase_crossovers(
     return tuple(found), _gain_bound(loop, above, gain[-1].frequency.value)
 
 
-def _gain_bound(loop: Response, above: NDArray[np.bool_], crossover: float) -> Estimate | None:
+def _gain_bound(loop: Response, above: Flags, crossover: float) -> Estimate | None:
     """-|L| where the phase was last surely above -180 deg, less 1.645 standard errors (dB).
 
     None where that is below the gain crossover.

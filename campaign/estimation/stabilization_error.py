@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.estimation.intervals import (
     exponential,
@@ -24,8 +25,6 @@ from campaign.estimation.intervals import (
 )
 from campaign.estimation.sampled_curve import LOST
 from campaign.reason import Cause, Reason
-
-Array = NDArray[np.float64]
 
 NAME = "stabilization_error"
 ALIKE = 1e-5

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import of_series
-from campaign.estimation.least_squares import Array
 from campaign.estimation.ripple import LEAST_PERIODS, harmonics_of
 from campaign.estimation.steadiness import drifting, seen_rate, torque_drift, unsteady
 from campaign.reason import NONE, Reason

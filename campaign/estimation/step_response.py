@@ -7,12 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.least_squares import Array
+from campaign.arrays import Array, Flags
 from campaign.reason import Cause, Reason
-
-Flags = NDArray[np.bool_]
 
 FINAL_SHARE = 0.2
 """Last part of the recording over which the steady state is averaged."""

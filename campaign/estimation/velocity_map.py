@@ -25,11 +25,12 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.extrapolation import extrapolated
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
-from campaign.estimation.least_squares import Array, profile_limit, refuse_too_few
+from campaign.estimation.least_squares import profile_limit, refuse_too_few
 from campaign.estimation.point_weights import (
     Scatter,
     fit_with_scatter,

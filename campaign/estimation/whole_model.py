@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, Flags
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.inverse.motion import Array
 from campaign.estimation.inverse.regression import (
     Piece,
     Regression,
@@ -65,7 +64,7 @@ class ModelFit:
     values: Values
     residuals: tuple[Array, ...]
     regression: Regression | None
-    free: NDArray[np.bool_]
+    free: Flags
 
     @property
     def correlation(self) -> dict[tuple[str, str], float]:
@@ -148,7 +147,7 @@ def held_out(
     unknowns: Sequence[Unknown],
     residuals: Residuals,
     begin: Array,
-    left_out: Sequence[NDArray[np.bool_]],
+    left_out: Sequence[Flags],
 ) -> tuple[Array, ...]:
     """Residuals of rows that a further fit, from the shares `begin`, did not see.
 
@@ -184,7 +183,7 @@ def _estimate(
     index: int,
     found: SearchResult,
     regression: Regression | None,
-    free: NDArray[np.bool_],
+    free: Flags,
     left_open: bool,
 ) -> Estimate:
     name, share = unknown.name, float(found.shares[index])

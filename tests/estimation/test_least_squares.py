@@ -7,13 +7,8 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from campaign.estimation.least_squares import (
-    Array,
-    covariance,
-    minimum,
-    profile_limit,
-    refuse_too_few,
-)
+from campaign.arrays import Array
+from campaign.estimation.least_squares import covariance, minimum, profile_limit, refuse_too_few
 
 # The Jacobian itself
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from campaign.arrays import Array
 from campaign.estimate import Origin
 from campaign.estimation.intervals import NO_FREEDOM
 from campaign.estimation.linear_uncertainty import INTERRUPTED, NOT_DETERMINED
 from campaign.estimation.losses import cost
 from campaign.estimation.multi_start import (
-    Array,
     Progress,
     SearchResult,
     Settings,

@@ -15,7 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion
 from campaign.estimation.inverse.terms import TERMS
 from campaign.signals import MultiSine
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.excitation_design.passage import first_passage
 from campaign.estimation.frequency.multisine import Lines, OddGrid, random_phases
-from campaign.estimation.inverse.motion import Array
 from campaign.signals import MultiSine
 
 POINTS = 16

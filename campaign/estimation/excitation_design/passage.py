@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array
+from campaign.arrays import Array
 
 BISECTIONS = 60
 """after which the interval is 1e-18 of the first one."""

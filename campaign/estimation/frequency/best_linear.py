@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.distortion import Distortion, detected
 from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.welch import Excited
-from campaign.estimation.frequency_response import Array, ComplexArray
 
 FEWEST_REALISATIONS = 7
 """below which a variance over realisations is no weight for a fit (Pintelon, Schoukens: 4.3.1)."""

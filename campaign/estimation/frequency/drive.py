@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.rational import RationalFit
 from campaign.estimation.frequency.two_mass_model import (
@@ -16,7 +17,6 @@ from campaign.estimation.frequency.two_mass_model import (
     model_jacobian,
     polynomials,
 )
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.reason import Reason
 
 PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.frequency_response import Array, ComplexArray, Response
+from campaign.arrays import Array, ComplexArray, Flags
+from campaign.estimation.frequency_response import Response
 from campaign.estimation.intervals import LEVEL, student
 
 ALIKE = 8.0
@@ -83,7 +84,7 @@ class MeasuredResponse:
         """As the functions for sines take it; few degrees of freedom widen its errors."""
         return Response(self.frequency, self.values, self.widened, self.coherence)
 
-    def at(self, kept: NDArray[np.bool_] | NDArray[np.intp] | slice) -> MeasuredResponse:
+    def at(self, kept: Flags | NDArray[np.intp] | slice) -> MeasuredResponse:
         """Some of its points."""
         parts = ("frequency", "values", "variance", "freedom", "coherence", "bias")
         return replace(self, **{name: getattr(self, name)[kept] for name in parts})

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.frequency_response import Array
+from campaign.arrays import Array
 from campaign.signals import MultiSine
 
 Lines = NDArray[np.int64]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.drive import (
     HIDDEN_BY_PLACE,
@@ -17,7 +18,6 @@ from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.rational import rational_fit
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array
 from campaign.reason import Cause
 
 HIDDEN = Cause(

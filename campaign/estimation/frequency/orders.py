@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import RationalFit, delays_to_try, rational_fit
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.intervals import shifted_by
 
 HIGHEST = 6

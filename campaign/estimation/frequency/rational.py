@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import ALIKE, LEAST_FREEDOM, MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.least_squares import covariance, minimum
 from campaign.reason import NONE, Cause, Reason
 

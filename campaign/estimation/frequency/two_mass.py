@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.frequency.drive import PARTS, TwoMass, correlations_of
 from campaign.estimation.frequency.measured_response import MeasuredResponse
@@ -35,7 +36,6 @@ from campaign.estimation.frequency.two_mass_model import (
     sizes,
     starts,
 )
-from campaign.estimation.frequency_response import Array
 from campaign.estimation.intervals import TORQUE_CONSTANT
 from campaign.estimation.least_squares import Minimum, covariance, minimum
 from campaign.reason import Cause, Reason

@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray
 
 Estimator = Literal["H1", "H2", "Hv"]
 Excited = Literal["input", "reference"]

@@ -9,9 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Regression, regress
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import Term

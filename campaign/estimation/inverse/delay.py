@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece, fitted, regress, stacked
 from campaign.estimation.inverse.rows import all_rows, late_force, moving, rows
 from campaign.estimation.inverse.terms import Terms

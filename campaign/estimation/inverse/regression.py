@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.gate import MATTERS
 from campaign.estimation.intervals import student
-from campaign.estimation.inverse.motion import Array
 
 DIFFER = 1.3
 """Deviations at half and twice the bandwidth that differ by more than this: the largest counts."""

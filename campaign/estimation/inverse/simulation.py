@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.inverse.motion import Array, Motion, later, zero_phase
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion, later, zero_phase
 from campaign.estimation.inverse.terms import Terms
 
 STRETCH = 1.0

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion
 
 Terms = Sequence["Term"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.inverse.motion import Array
 from campaign.estimation.inverse.regression import effective_count
 from campaign.reason import Cause
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.channel import (
     Channel,
     autoregression,
@@ -29,7 +30,7 @@ from campaign.estimation.presliding_dynamics.fit_result import (
     with_slopes,
 )
 from campaign.estimation.presliding_dynamics.parameters import Parameters
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
+from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 from campaign.estimation.presliding_dynamics.start import first_plant
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.channel import Channel
 from campaign.estimation.presliding_dynamics.parameters import LARGEST_OFFSET, Parameters
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.estimation.presliding_dynamics.record import Record
 from campaign.estimation.presliding_dynamics.simulation import (
     Between,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Array
+from campaign.arrays import Array
 
 DIFFERENT = 1.3
 """Ratio of deviations at half, once and twice the bandwidth from which on the largest counts."""

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Appendage, Array, Bristles, Plant
+from campaign.arrays import Array
+from campaign.estimation.presliding_dynamics.plant import Appendage, Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 
 LONGEST_DELAY = 20.0

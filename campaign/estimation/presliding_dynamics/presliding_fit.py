@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import (
@@ -22,7 +23,7 @@ from campaign.estimation.intervals import (
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
 from campaign.estimation.presliding_dynamics.uncertainty import (

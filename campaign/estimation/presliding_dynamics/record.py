@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.presliding_dynamics.plant import Appendage, Array
+from campaign.arrays import Array, Flags
+from campaign.estimation.presliding_dynamics.plant import Appendage
 from campaign.estimation.presliding_dynamics.simulation import Between
 
 FEWEST = 100
@@ -122,7 +122,7 @@ class Record:
         return found if found >= FEWEST_PER_PERIOD else None
 
 
-def measured(record: Record) -> list[tuple[str, Array, NDArray[np.bool_]]]:
+def measured(record: Record) -> list[tuple[str, Array, Flags]]:
     """The channels of a record: name, samples with 0 for lost ones, and which are there."""
     found = []
     for name, values in (("rate", record.rate), ("angle", record.angle)):

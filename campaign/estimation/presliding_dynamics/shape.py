@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.fit_result import JointFit, products, with_torque
 from campaign.estimation.presliding_dynamics.long_run import at_bandwidths
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles
+from campaign.estimation.presliding_dynamics.plant import Bristles
 from campaign.reason import NONE, Cause, Reason
 
 BANDS = 10

@@ -17,7 +17,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.arrays import Array
+from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.physics.compilation import called, compiled
 
 Between = Literal["smooth", "held"]

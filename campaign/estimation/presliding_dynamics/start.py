@@ -6,12 +6,10 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
+from campaign.arrays import Array, ComplexArray
+from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
-
-ComplexArray = NDArray[np.complex128]
 
 GROUPS = 60
 """of neighbouring frequencies, evenly over their logarithm: within one, noise averages out."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.fit import search
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
-from campaign.estimation.presliding_dynamics.plant import Array
 
 CHANCE = 0.01
 """with which records that agree would be taken for ones that do not."""

@@ -14,11 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.trends.scatter import Fits, Mixture, fits
-
-Array = NDArray[np.float64]
 
 LEAST_FOR_A_JUMP = 5
 """With fewer, no place has a second point on both sides that shows how runs scatter."""

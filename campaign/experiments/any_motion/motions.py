@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -19,7 +20,6 @@ from campaign.channels import (
 )
 from campaign.estimation.inverse.motion import (
     REGRESSION_RATE,
-    Array,
     FilterSettings,
     Motion,
     motion_of_position,
