@@ -46,15 +46,23 @@ def student(freedom: float, level: float = LEVEL) -> float:
 
 
 def with_error(
-    name: str, value: float, unit: str, error: float, freedom: float, method: str, **more: Any
+    name: str,
+    value: float,
+    unit: str,
+    error: float,
+    freedom: float,
+    method: str,
+    quantile: float | None = None,
+    **more: Any,
 ) -> Estimate:
     """An estimate from its standard error and the degrees of freedom of that error.
 
     No interval, and the reason, where there are no degrees of freedom or the error is not finite.
+    quantile: half-width over standard error; absent: Student's t.
     """
     if not freedom > 0 or not math.isfinite(error) or not math.isfinite(value):
         return Estimate.without_interval(name, value, unit, NO_FREEDOM(), method=method, **more)
-    half = student(freedom) * error
+    half = (student(freedom) if quantile is None else quantile) * error
     return Estimate(
         name,
         value,
@@ -109,17 +117,9 @@ def exponential(logarithm: Estimate, unit: str) -> Estimate:
     ends = (end for end in (logarithm.low, logarithm.high) if end is not None)
     if beyond or any(abs(end - logarithm.value) > WIDEST for end in ends):
         return replace(
-            logarithm,
-            value=value,
-            unit=unit,
-            low=None,
-            high=None,
-            level=None,
-            standard_error=None,
-            freedom=None,
-            origin=Origin.NOT_DETERMINED,
-            reason=SPANS_DECADES(),
-        )
+            logarithm, value=value, unit=unit, low=None, high=None, level=None, standard_error=None,
+            freedom=None, origin=Origin.NOT_DETERMINED, reason=SPANS_DECADES(),
+        )  # fmt: skip
     error = logarithm.standard_error
     return replace(
         logarithm,
@@ -131,23 +131,21 @@ def exponential(logarithm: Estimate, unit: str) -> Estimate:
     )
 
 
-def of_series(
-    name: str, samples: Array, unit: str, batches: int = BATCHES, **more: Any
-) -> Estimate:
-    """Mean of an autocorrelated series of shape (n,) by batch means: t with `batches` - 1.
+def of_series(name: str, samples: Array, unit: str, **more: Any) -> Estimate:
+    """Mean of an autocorrelated series of shape (n,) by batch means: t with `BATCHES` - 1.
 
     Holds where the correlation is short against a batch; what is slower must be modelled. Source:
     Schmeiser, "Batch size effects in the analysis of simulation output", Oper. Res. 30 (1982).
     """
-    if len(samples) < 2 * batches:
+    if len(samples) < 2 * BATCHES:
         mean = float(np.mean(samples)) if len(samples) else math.nan
-        reason = TOO_FEW_SAMPLES(samples=len(samples), batches=batches)
+        reason = TOO_FEW_SAMPLES(samples=len(samples), batches=BATCHES)
         return Estimate.without_interval(name, mean, unit, reason, **more)
-    used = len(samples) // batches * batches
-    means = samples[:used].reshape(batches, -1).mean(axis=1)
-    error = float(np.std(means, ddof=1)) / math.sqrt(batches)
-    method = f"mean, deviation from {batches} batches"
-    return with_error(name, float(np.mean(samples)), unit, error, batches - 1, method, **more)
+    used = len(samples) // BATCHES * BATCHES
+    means = samples[:used].reshape(BATCHES, -1).mean(axis=1)
+    error = float(np.std(means, ddof=1)) / math.sqrt(BATCHES)
+    method = f"mean, deviation from {BATCHES} batches"
+    return with_error(name, float(np.mean(samples)), unit, error, BATCHES - 1, method, **more)
 
 
 def difference(name: str, one: Estimate, other: Estimate, unit: str, **more: Any) -> Estimate:

@@ -50,6 +50,20 @@ def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[
     return scaled / np.outer(safe, safe), np.asarray(nothing | involved)
 
 
+def gradients(function: Callable[[Array], Array], point: Array, steps: Array) -> Array:
+    """Derivatives of numbers (k,) by parameters (p,): central differences of `steps`, (k, p)."""
+    sides = [(function(point + step) - function(point - step)) for step in np.diag(steps)]
+    return np.asarray(np.stack(sides, axis=-1) / (2.0 * steps))
+
+
+def propagated(by: Array, covariance: Array) -> Array:
+    """Standard deviations of numbers by the delta method, shape (k,) (GUM 5.2.2).
+
+    by: their derivatives by parameters of that covariance (p, p), shape (k, p).
+    """
+    return np.asarray(np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", by, covariance, by), 0.0)))
+
+
 @dataclass(frozen=True)
 class Minimum:
     """Where a sum of squares is smallest between bounds.

@@ -13,7 +13,7 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import LEVEL, exponential, student
+from campaign.estimation.intervals import exponential, with_error
 from campaign.estimation.sampled_curve import drop_interval_if_deterministic
 from campaign.reason import Cause
 
@@ -33,18 +33,7 @@ def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
     logs = np.log(found)
     mean, spread, freedom = float(np.mean(logs)), float(np.std(logs, ddof=1)), len(found) - 1
     error = spread * math.sqrt(1.0 + 1.0 / len(found))
-    half = student(freedom) * error
-    inner = Estimate(
-        name,
-        mean,
-        "",
-        mean - half,
-        mean + half,
-        LEVEL,
-        f"where one more trial will lie, from {len(found)}; Student's t in the logarithm",
-        kind="quantile",
-        standard_error=error,
-        freedom=freedom,
-    )
+    method = f"where one more trial will lie, from {len(found)}; Student's t in the logarithm"
+    inner = with_error(name, mean, "", error, freedom, method, kind="quantile")
     told = exponential(inner, unit)
     return drop_interval_if_deterministic(told, told.value)

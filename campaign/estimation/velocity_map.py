@@ -30,7 +30,12 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.extrapolation import extrapolated
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
-from campaign.estimation.least_squares import profile_limit, refuse_too_few
+from campaign.estimation.least_squares import (
+    gradients,
+    profile_limit,
+    propagated,
+    refuse_too_few,
+)
 from campaign.estimation.point_weights import (
     Scatter,
     fit_with_scatter,
@@ -362,17 +367,13 @@ def shifts(found: StribeckFit, torque_shift: Array) -> dict[str, float]:
 def band(fit: DirectionFit, model: Model, speed: Array) -> Array:
     """Half-width of the 95 % band of the fitted curve (N m) at `speed` (rad/s), shape (m,)."""
     found = fit.fits[model]
-    columns = np.array([_slope(found, name, speed) for name in found.free])
-    variance = np.einsum("km,kl,lm->m", columns, found.covariance, columns)
-    return np.asarray(student(fit.freedom) * np.sqrt(np.maximum(variance, 0.0)))
+    point = np.array([found.values[name] for name in found.free])
 
+    def torque(values: Array) -> Array:
+        return stribeck(speed, {**found.values, **dict(zip(found.free, values, strict=True))})
 
-def _slope(found: StribeckFit, name: str, speed: Array) -> Array:
-    """Derivative of the torque by a parameter, by central differences; shape (m,)."""
-    value = found.values[name]
-    step = 1e-5 * (abs(value) or 1.0)
-    up, down = ({**found.values, name: value + s} for s in (step, -step))
-    return np.asarray((stribeck(speed, up) - stribeck(speed, down)) / (2.0 * step))
+    by = gradients(torque, point, 1e-5 * np.where(point != 0.0, np.abs(point), 1.0))
+    return np.asarray(student(fit.freedom) * propagated(by, found.covariance))
 
 
 def doubts(fit: DirectionFit) -> Iterator[str]:

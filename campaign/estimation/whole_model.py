@@ -85,7 +85,6 @@ def fit_model(
     residuals: Residuals,
     *,
     starts: int = 3,
-    seed: int = 1,
     display: Display = no_display,
 ) -> ModelFit:
     """Fit from several starts, and say how sure each unknown is.
@@ -98,7 +97,7 @@ def fit_model(
     Raises KeyboardInterrupt where it is interrupted: half a fit is none.
     """
     objective = _objective(unknowns, residuals)
-    settings = Settings(starts=starts, seed=seed, stated=False, tolerance=1e-6)
+    settings = Settings(starts=starts, stated=False, tolerance=1e-6)
     found = search(objective, settings, display)
     if found.interrupted or found.jacobian is None or found.uncertainty is None:
         raise KeyboardInterrupt

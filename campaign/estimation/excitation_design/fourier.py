@@ -117,15 +117,6 @@ def _conditions(columns: Array) -> Array:
     return found
 
 
-def random_series(
-    period: float, harmonics: int, room: Room, count: int, seed: int
-) -> list[FourierSeries]:
-    """Series with random coefficients, each as large as the room lets it; see `best_series`."""
-    random = np.random.default_rng(seed)
-    drawn = _allowed(random.standard_normal((count, 2 * harmonics)), period, room)
-    return [_series(period, each) for each in drawn]
-
-
 @lru_cache(maxsize=32)  # a plan asks for the same one again and again
 def best_series(
     period: float,

@@ -18,6 +18,7 @@ from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.rational import rational_fit
 from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.least_squares import gradients, propagated
 from campaign.reason import Cause
 
 HIDDEN = Cause(
@@ -95,9 +96,8 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
 
     theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
     found = told(theta)
-    steps = np.diag(np.maximum(1e-5 * np.abs(theta), 1e-12))
-    by = np.array([(told(theta + h) - told(theta - h)) / (2.0 * np.sum(h)) for h in steps])
-    error = np.sqrt(np.maximum(np.einsum("pi,pq,qi->i", by, fit.scatter, by), 0.0))
+    by = gradients(told, theta, np.maximum(1e-5 * np.abs(theta), 1e-12))
+    error = propagated(by, fit.scatter)
     method = "function of third order with a delay, friction taken to be at one of the inertias"
     misfit = fit.misfit
     if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
@@ -121,6 +121,6 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
         covariance=fit.scatter,
         correlations={}
         if misfit
-        else correlations_of([each for each, _ in names], by.T, fit.scatter),
+        else correlations_of([each for each, _ in names], by, fit.scatter),
         condition=fit.condition,
     )

@@ -96,16 +96,13 @@ class Regression:
         return float(student(max(self.freedom, 1.0)) * grown)
 
 
-def regress(pieces: Sequence[Piece], weights: Sequence[Array] | None = None) -> Regression:
+def regress(pieces: Sequence[Piece]) -> Regression:
     """Least squares of the force by the columns, all pieces together.
-
-    weights: of the rows of each piece, shape (n,), inverse deviations; 1 when absent.
 
     Raises ValueError where there are too few rows, or columns that cannot be told apart.
     """
-    weighted = _weighted(pieces, weights)
-    design, force = stacked(weighted)
-    return fitted(weighted, np.asarray(np.linalg.pinv(_checked(design))), design, force)
+    design, force = stacked(pieces)
+    return fitted(pieces, np.asarray(np.linalg.pinv(_checked(design))), design, force)
 
 
 def stacked(pieces: Sequence[Piece]) -> tuple[Array, Array]:
@@ -220,15 +217,6 @@ def effective_count(residuals: Sequence[Array]) -> float:
             break
         time, lag = time + 2.0 * pair, lag + 2
     return count / max(time, 1.0)
-
-
-def _weighted(pieces: Sequence[Piece], weights: Sequence[Array] | None) -> Sequence[Piece]:
-    if weights is None:
-        return pieces
-    return [
-        Piece(piece.columns * each[:, None], piece.force * each, piece.time)
-        for piece, each in zip(pieces, weights, strict=True)
-    ]
 
 
 def _checked(design: Array) -> Array:

@@ -12,12 +12,12 @@ from campaign.estimation.presliding_dynamics.simulation import Between
 
 FEWEST = 100
 """Samples of a record below which it says too little of its own noise."""
-
-
 FEWEST_PER_PERIOD = 20
 """Samples of a period below which its errors are too few to say how they scatter."""
 ALIKE = 0.9
 """Correlation with itself from which on a torque counts as one that repeats itself."""
+MOST = 0.999
+"""of the power of a torque: what lies beyond moves nothing."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ class Record:
         """Largest torque (N m)."""
         return float(np.max(np.abs(self.torque)))
 
-    def highest_frequency(self, share: float = 0.999) -> float:
-        """Frequency (Hz) below which this share of the torque that the load answers to lies.
+    def highest_frequency(self) -> float:
+        """Frequency (Hz) below which `MOST` of the torque that the load answers to lies.
 
         Told by the product of both spectra: noise of one alone, however wide, does not count.
         """
@@ -97,7 +97,7 @@ class Record:
         product = np.abs(torque * np.fft.rfft(np.nan_to_num(answer))) ** 2
         product[0] = 0.0
         power = np.cumsum(product) / np.sum(product)
-        index = int(np.searchsorted(power, share))
+        index = int(np.searchsorted(power, MOST))
         return float(np.fft.rfftfreq(len(self.torque), self.step)[min(index, len(power) - 1)])
 
     def samples_per_period(self) -> int | None:

@@ -13,16 +13,16 @@ POWER = 0.8
 """How often a change of the detectable size would be declared."""
 
 
-def level_of(p: Sequence[float], rate: float = RATE) -> float:
+def level_of(p: Sequence[float]) -> float:
     """The p value at which one more of the family would be declared, given the others."""
     if not p:
-        return rate
-    declared = sum(each <= rate for each in adjusted(p))
-    return rate * min(declared + 1, len(p)) / len(p)
+        return RATE
+    declared = sum(each <= RATE for each in adjusted(p))
+    return RATE * min(declared + 1, len(p)) / len(p)
 
 
-def detectable(known: Mixture, level: float, power: float = POWER) -> float:
-    """Smallest size that would be declared at `level` with a probability of `power`.
+def detectable(known: Mixture, level: float) -> float:
+    """Smallest size that would be declared at `level` with a probability of `POWER`.
 
     known: what the points leave open of the number; its centre does not matter. The scatter that
         was found is taken as what it would have been with such a change, too.
@@ -31,4 +31,4 @@ def detectable(known: Mixture, level: float, power: float = POWER) -> float:
 
     needed = 0.5 * float(np.diff(known.interval(1.0 - level))[0])
     one_sigma = 0.5 * float(np.diff(known.interval(0.682689492137))[0])
-    return needed + float(ndtri(power)) * one_sigma
+    return needed + float(ndtri(POWER)) * one_sigma
