@@ -16,7 +16,7 @@ def unexplained(fit: JointFit, record: Record) -> float:
 
     Of its first channel, offset and drift taken out of both. Nothing is fitted but those.
     """
-    grid = Grid.of(record, fit.plant, fit.parameters.assumed.between)
+    grid = Grid.of(record, fit.plant)
     channels = tuple(
         Channel.of(name, samples, there, 1.0, np.ones(1))
         for name, samples, there in measured(record)

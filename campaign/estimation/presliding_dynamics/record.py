@@ -8,7 +8,6 @@ import numpy as np
 
 from campaign.arrays import Array, Flags
 from campaign.estimation.presliding_dynamics.plant import Appendage
-from campaign.estimation.presliding_dynamics.simulation import Between
 
 FEWEST = 100
 """Samples of a record below which it says too little of its own noise."""
@@ -139,28 +138,15 @@ def _says_something(values: Array) -> bool:
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What a fit takes as known, and what it leaves free besides sigma0, sigma1 and J.
+    """What a fit begins with besides the records.
 
     Attributes:
-        viscous: sigma2 (N m s/rad), or a first guess of it.
-        viscous_free: below breakaway sigma1 and sigma2 nearly add up, so that a fit of both seldom
-            determines either.
-        inertia: J (kg m^2), where it is known; None: it is free.
+        viscous: first guess of sigma2 (N m s/rad). Below breakaway sigma1 and sigma2 nearly add up,
+            so that the sum is known well and either seldom.
         appendage: an elastic part, or a first guess of it.
         appendage_free: whether its frequency, inertia and damping are fitted, too.
-        coulomb_share, stribeck_velocity, stribeck_exponent: course of s(v) over the rate, where
-            rates come near the Stribeck velocity; see `plant`. Its size is always free.
-        delay: of the channels behind the torque (s); None: free, one for each channel.
-        between: what the torque does between its samples.
     """
 
     viscous: float = 0.0
-    viscous_free: bool = False
-    inertia: float | None = None
     appendage: Appendage | None = None
     appendage_free: bool = False
-    coulomb_share: float = 1.0
-    stribeck_velocity: float = np.inf
-    stribeck_exponent: float = 2.0
-    delay: float | None = None
-    between: Between = "smooth"

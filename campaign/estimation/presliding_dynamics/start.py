@@ -36,14 +36,10 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
     for _ in range(PASSES):
         weight = 1.0 / (plant * np.sqrt(power))
         design, aim = rows * weight[:, None], power * weight
-        if assumed.inertia is not None:
-            aim, design = aim - assumed.inertia * design[:, 0], design[:, 1:]
         scale = np.linalg.norm(design, axis=0)
         whole = np.concatenate([design.real, design.imag]) / scale
         sides = np.concatenate([np.real(aim), np.imag(aim)])
         found = np.linalg.lstsq(whole, sides, rcond=None)[0] / scale
-        if assumed.inertia is not None:
-            found = np.concatenate([[assumed.inertia], found])
         omega = np.array([each for _, _, each in parts])
         plant = np.abs(found[0] * 1j * omega + found[1] + found[2] / (1j * omega))
         plant = np.maximum(plant, 1e-6 * np.max(plant))
@@ -55,14 +51,8 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
         # Nothing at high frequencies: as large as it may be without showing.
         inertia = max(stiffness / (4.0 * highest) ** 2, 2.0 * part.inertia if part else 0.0)
     least = 0.02 * 2.0 * np.sqrt(stiffness * inertia)
-    bristles = Bristles(
-        stiffness,
-        max(damping - assumed.viscous, least),
-        0.3 / max(record.amplitude for record in records),
-        assumed.coulomb_share,
-        assumed.stribeck_velocity,
-        assumed.stribeck_exponent,
-    )
+    compliance = 0.3 / max(record.amplitude for record in records)
+    bristles = Bristles(stiffness, max(damping - assumed.viscous, least), compliance)
     return Plant(inertia, (bristles,), assumed.viscous, part)
 
 
