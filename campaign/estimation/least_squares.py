@@ -142,13 +142,20 @@ def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> Flags:
 
 
 def profile_limit(
-    cost_at: Callable[[float], float], start: float, step: float, most: float
+    cost_at: Callable[[float], float],
+    start: float,
+    step: float,
+    most: float,
+    accuracy: float = 1e-6,
+    doublings: int = 60,
 ) -> float:
     """Where a profile of the sum of squares has risen by `most` above its value at `start`.
 
     Args:
         cost_at: smallest sum of squares with the parameter held at a value.
         step: first step away from `start`, with its sign; doubled until the rise is passed.
+        accuracy: of the limit, as a share of it.
+        doublings: at most.
 
     Raises ValueError where it never rises so far: the data give no limit on that side.
     """
@@ -157,11 +164,11 @@ def profile_limit(
     cost_at = cache(cost_at)  # the ends are asked for by the search between them again
     bottom = cost_at(start)
     inner, outer = start, start + step
-    for _ in range(60):
+    for _ in range(doublings):
         if cost_at(outer) - bottom > most:
             break
         inner, outer = outer, start + 2.0 * (outer - start)
     else:
         raise ValueError("the data give no limit on that side")
-    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=1e-6)
+    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=accuracy)
     return float(found)

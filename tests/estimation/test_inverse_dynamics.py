@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +23,7 @@ from campaign.estimation.inverse.motion import (
 from campaign.estimation.inverse.position_period import find_period
 from campaign.estimation.inverse.regression import (
     Piece,
-    bandwidth,
     effective_count,
-    long_run,
     regress,
 )
 from campaign.estimation.inverse.rows import in_blocks, moving, rows
@@ -206,27 +203,6 @@ def test_deviations_of_autocorrelated_residuals_are_those_of_a_closed_form() -> 
     fit = regress([Piece(np.ones((n, 1)), 3.0 + noise, np.arange(n, dtype=float))])
     assert fit.robust[0] / fit.ordinary[0] == pytest.approx(np.sqrt((1 + r) / (1 - r)), rel=0.05)
     assert fit.effective == pytest.approx(n * (1 - r) / (1 + r), rel=0.1)
-
-
-def test_the_bandwidth_is_that_of_andrews_for_an_autoregression() -> None:
-    """1.1447 (a n)^(1/3) with a = 4 r^2 / ((1 - r)^2 (1 + r)^2) for one column."""
-    draw = np.random.default_rng(2)
-    n, r = 100_000, 0.5
-    series = autoregressive(draw, n, r)
-    expected = 1.1447 * (4 * r**2 / ((1 - r) ** 2 * (1 + r) ** 2) * n) ** (1 / 3)
-    assert bandwidth([series[:, None]]) == pytest.approx(expected, rel=0.03)
-
-
-@pytest.mark.parametrize("lags", [0.5, 1.0, 1.4, 2.0, 7.3, 60.0, 133.7])
-def test_sums_over_windows_are_bartletts_weights(lags: float) -> None:
-    random = np.random.default_rng(2)
-    scores = [random.standard_normal((count, 3)).cumsum(axis=0) for count in (500, 90, 300)]
-    expected = sum((each.T @ each for each in scores), np.zeros((3, 3)))
-    for lag in range(1, math.ceil(lags)):
-        for each in scores:
-            across = each[lag:].T @ each[:-lag]
-            expected = expected + (1.0 - lag / lags) * (across + across.T)
-    np.testing.assert_allclose(long_run(scores, lags), expected, rtol=1e-9)
 
 
 def test_white_values_are_worth_their_number() -> None:
