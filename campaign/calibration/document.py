@@ -1,10 +1,11 @@
-"""A calibration result as TOML, and the bench file with fitted values."""
+"""A calibration result as TOML, and the bench file with fitted values and how they are known."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ HEADER = """\
 """
 
 
+LEAST_CORRELATION = 0.1
+"""below which two values count as told apart."""
 ASSUMPTION = (
     "cells deviate independently, each by its standard deviation times the scatter; linear at the "
     "optimum; the structure of the bench counts as right"
@@ -94,6 +97,69 @@ def bench_text(
     for first, last, text in sorted(edits, reverse=True):
         content = content[:first] + text.encode() + content[last:]
     return with_known(content.decode(), known, str(source.file))
+
+
+def known_entries(
+    outcome: CalibrationOutcome, fitted: Iterable[str], document: str
+) -> dict[str, Any]:
+    """Entries of a bench's table `known`, as TOML has them.
+
+    Every fitted value has an entry: one that the cells do not determine has no interval, and takes
+    away the one that an earlier calibration left there.
+
+    Args:
+        fitted: the cells, as a bench names them.
+        document: whose cells they are, as the bench names it.
+    """
+    entries: dict[str, Any] = {"document": document, "fitted": list(fitted)}
+    entries["values"] = dict(_values(outcome))
+    pairs = list(_correlations(outcome))
+    return {**entries, "correlations": pairs} if pairs else entries
+
+
+def _values(outcome: CalibrationOutcome) -> Iterator[tuple[str, dict[str, Any]]]:
+    for index, parameter in enumerate(outcome.problem.space.parameters):
+        ends = [parameter.unknown.value(end) for end in _ends(outcome, index)]
+        for path, factor in parameter.fields:
+            entry: dict[str, Any] = {"origin": "fitted"}
+            if ends:
+                low, high = sorted(factor * end for end in ends)
+                entry = {"interval": [parameter.text(low), parameter.text(high)], **entry}
+            yield path, entry
+
+
+def _ends(outcome: CalibrationOutcome, index: int) -> tuple[float, ...]:
+    """Of the 95 % interval, in shares of the range; empty where the cells determine nothing.
+
+    It holds wherever parameters are that ended at a bound.
+    """
+    certainty = outcome.uncertainty
+    if certainty is None or certainty.bound[index] or certainty.open[index]:
+        return ()
+    ends = float(certainty.low[index]), float(certainty.high[index])
+    return ends if all(map(math.isfinite, ends)) else ()
+
+
+def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
+    """Pairs of paths whose errors go together; fields of one parameter do so wholly."""
+    certainty = outcome.uncertainty
+    if certainty is None:
+        return
+    fields = [
+        (index, path, factor)
+        for index, parameter in enumerate(outcome.problem.space.parameters)
+        for path, factor in _determined(outcome, index, parameter)
+    ]
+    for (i, one, first), (j, other, second) in combinations(fields, 2):
+        share = float(certainty.correlation[i, j]) * math.copysign(1.0, first * second)
+        if math.isfinite(share) and abs(share) >= LEAST_CORRELATION:
+            yield [one, other, round(min(1.0, max(-1.0, share)), 3)]
+
+
+def _determined(
+    outcome: CalibrationOutcome, index: int, parameter: Parameter
+) -> tuple[tuple[str, float], ...]:
+    return parameter.fields if _ends(outcome, index) else ()
 
 
 def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: float) -> str:

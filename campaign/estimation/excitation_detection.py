@@ -12,8 +12,6 @@ EXPLAINED = 0.9
 """Share of a signal's variance that a single sine must explain to be called one."""
 LEAST_CYCLES = 2.0
 """cycles of a sine in a recording, for its frequency to be told."""
-FINER = 60
-"""halvings by which a frequency is narrowed down within its line of the spectrum."""
 RAMP_PART = (0.2, 0.8)
 """Part of a ramp's height on which its line lies."""
 NOISE = 5.0
@@ -180,25 +178,16 @@ def _where_it_swings(
 
 
 def _best(time: Array, signal: Array, low: float, high: float) -> float:
-    """The frequency at which a sine explains most, by golden section."""
-    golden = 0.5 * (5.0**0.5 - 1.0)
+    """The frequency at which a sine explains most."""
+    from scipy.optimize import minimize_scalar
 
     def left(frequency: float) -> float:
         return -_sine_at(time, signal, frequency)[1]
 
-    a, b = low, high
-    c, d = b - golden * (b - a), a + golden * (b - a)
-    at_c, at_d = left(c), left(d)
-    for _ in range(FINER):
-        if at_c < at_d:
-            b, d, at_d = d, c, at_c
-            c = b - golden * (b - a)
-            at_c = left(c)
-        else:
-            a, c, at_c = c, d, at_d
-            d = a + golden * (b - a)
-            at_d = left(d)
-    return 0.5 * (a + b)
+    found = minimize_scalar(
+        left, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high}
+    )
+    return float(found.x)
 
 
 def _sine_at(time: Array, signal: Array, frequency: float) -> tuple[Array, float]:

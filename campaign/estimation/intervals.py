@@ -30,6 +30,7 @@ TOO_FEW_SAMPLES = Cause("too few samples", "{samples} samples are too few for {b
 NO_STANDARD_ERROR = Cause("no standard error", "one of {whom} has no standard error")
 NOT_POSITIVE = Cause("not positive", "a ratio of numbers that are not positive")
 MODEL_MISFIT = Cause("model misfit", "misfit: {why}")
+TOO_FEW_POSITIVE = Cause("too few positive values", "it takes two positive values or more")
 WIDEST = 0.5 * math.log(1e3)
 """Largest half-width of an interval in the logarithm: a factor of a thousand from end to end."""
 LARGEST = 700.0
@@ -105,6 +106,25 @@ def of_positive_repeats(
         raise ValueError(f"{name}: values must be positive")
     inner = of_repeats(name, np.log(found), "", what, **more)
     return exponential(inner, unit)
+
+
+def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
+    """Where one further positive value will lie: prediction interval, t in the logarithm.
+
+    The interval of a mean says where the mean is. One further value scatters as a single trial
+    does, and is to be held against their distribution: wider by sqrt(n + 1). The value is the
+    geometric mean of `values`, shape (n,). No interval for fewer than two values, or for some that
+    are not positive.
+    """
+    found = np.asarray(values, dtype=float)
+    if len(found) < 2 or not np.all(found > 0):
+        mean = float(np.mean(found)) if len(found) else math.nan
+        return Estimate.without_interval(name, mean, unit, TOO_FEW_POSITIVE())
+    logs, freedom = np.log(found), len(found) - 1
+    error = float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / len(found))
+    method = f"where one more trial will lie, from {len(found)}; Student's t in the logarithm"
+    mean = float(np.mean(logs))
+    return exponential(with_error(name, mean, "", error, freedom, method, kind="quantile"), unit)
 
 
 def exponential(logarithm: Estimate, unit: str) -> Estimate:

@@ -15,7 +15,7 @@ from campaign.estimate import Estimate
 from campaign.estimation.breakaway_torque import NO_FALL, STILL_RISING, breakaway_torque
 from campaign.estimation.presliding import fit_presliding
 from campaign.estimation.presliding_curve import Interface, presliding_angle
-from campaign.estimation.readings import deviation_of_readings, mean_of_readings
+from campaign.estimation.scatter import deviation_of_readings, mean_of_readings
 from tests.estimation.coverage import autoregressive as correlated
 from tests.estimation.coverage import holds, rejected
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from campaign.arrays import Array
-from campaign.estimation.excitation_design.passage import first_passage
 from campaign.estimation.frequency.multisine import Lines, OddGrid, course, random_phases
 from campaign.signals import MultiSine
 
@@ -13,6 +14,8 @@ POINTS = 16
 """Points per cycle of the highest line."""
 CLIPPED = (0.75, 0.98)
 """of its peak at which a signal is clipped, in the first round and in the last."""
+BISECTIONS = 60
+"""of a search for a passage, after which the interval is 1e-18 of the first one."""
 ROUNDS = 400
 """of the search."""
 
@@ -82,3 +85,20 @@ def _begun(lines: Lines, phases: Array, order: int) -> Array:
         return float(np.sum(size * np.sin(turned)))
 
     return np.asarray((phases + 2.0 * np.pi * first_passage(signal, value) * lines) % (2.0 * np.pi))
+
+
+def first_passage(course: Array, value: Callable[[float], float]) -> float:
+    """Share of its period at which a signal first passes zero, to all digits.
+
+    course: one period of it, evenly sampled, finely enough that its first change of sign between
+    two samples is a single passage. value: the signal itself, at a share of its period.
+    """
+    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
+    low, high = index / len(course), (index + 1) / len(course)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if value(low) * value(middle) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from campaign.arrays import Array, ComplexArray
-from campaign.estimation.excitation_design.passage import first_passage
+from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.estimation.frequency.multisine import Lines
 
 Spectrum = ComplexArray

@@ -10,7 +10,7 @@ from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.channel import Channel
 from campaign.estimation.presliding_dynamics.parameters import LARGEST_OFFSET, Parameters
 from campaign.estimation.presliding_dynamics.plant import Plant
-from campaign.estimation.presliding_dynamics.record import Record
+from campaign.estimation.presliding_dynamics.record import Record, measured
 from campaign.estimation.presliding_dynamics.simulation import (
     Motion,
     simulate,
@@ -210,3 +210,30 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
         slope = (_seen(fit, number, motion, moved) - answers) / DIFFERENCE
         found[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
     return found
+
+
+def unexplained(fit: JointFit, record: Record) -> float:
+    """Rms of what the fitted plant misses of another record, over that of the record's own motion.
+
+    Of its first channel, offset and drift taken out of both. Nothing is fitted but those.
+    """
+    grid = Grid.of(record, fit.plant)
+    channels = tuple(
+        Channel.of(name, samples, there, 1.0, np.ones(1))
+        for name, samples, there in measured(record)
+    )
+    own = 1 if record.at_rest else 3
+    shared = fit.vector[: len(fit.parameters.names)]
+    other = replace(
+        fit,
+        records=(record,),
+        parameters=replace(fit.parameters, factors=0, own=(own,)),
+        vector=np.append(shared, np.zeros(own)),
+        channels=(channels,),
+        grids=(grid,),
+        taken=np.zeros(0),
+        doubt_answers=(np.zeros((len(channels), len(record.torque), 0)),),
+    )
+    first, answer = channels[0], other.answers(0)[0]
+    missed = first.left(first.samples - answer)
+    return float(np.linalg.norm(missed) / np.linalg.norm(first.left(first.samples)))
