@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from campaign.arrays import Array
 from campaign.estimation.inverse.delay import find_delay
 from campaign.estimation.inverse.instruments import by_instruments
 from campaign.estimation.inverse.motion import (
@@ -41,7 +41,6 @@ from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from tests.estimation.coverage import autoregressive, holds, rejected
 from tests.estimation.rigs import Rig, random_rigs
 
-Array = NDArray[np.float64]
 EMPS = Path(__file__).parents[3] / "shared" / "data" / "emps"
 PUBLISHED = FilterSettings(100.0, decimation=10, skip=49)
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.breakaway_torque import NO_FALL, STILL_RISING, breakaway_torque
 from campaign.estimation.presliding import fit_presliding
@@ -21,7 +22,6 @@ from tests.estimation.coverage import holds, rejected
 
 MANY = pytest.mark.statistics
 Random = np.random.Generator
-Array = np.ndarray
 INTERVAL, INERTIA = 1e-3, 70.0
 COUNT = np.deg2rad(0.002)
 """One count of a coarse gyro."""

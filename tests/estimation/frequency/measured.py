@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2, f
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-
-Array = np.ndarray
 
 
 def noisy(
