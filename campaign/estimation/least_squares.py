@@ -50,6 +50,12 @@ def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[
     return scaled / np.outer(safe, safe), np.asarray(nothing | involved)
 
 
+def straight_line(values: Array) -> Array:
+    """The straight line through values at even intervals, shape (n,)."""
+    place = np.linspace(-1.0, 1.0, len(values))
+    return np.asarray(values.mean() + place * (place @ values) / (place @ place))
+
+
 def gradients(function: Callable[[Array], Array], point: Array, steps: Array) -> Array:
     """Derivatives of numbers (k,) by parameters (p,): central differences of `steps`, (k, p)."""
     sides = [(function(point + step) - function(point - step)) for step in np.diag(steps)]

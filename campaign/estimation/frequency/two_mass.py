@@ -19,7 +19,7 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimate import Origin
-from campaign.estimation.frequency.drive import PARTS, TwoMass, correlations_of
+from campaign.estimation.frequency.drive import PARTS, UNITS, TwoMass, correlations_of
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.one_inertia import load_side_fit, rigid_fit
@@ -54,18 +54,6 @@ LARGEST = 50.0
 """Logarithm of an inertia or a stiffness (SI), either way, that no drive has."""
 WIDEST_RATIO = 8.0
 """Largest logarithm of J2 / J1, either way."""
-UNITS = {
-    "motor_inertia": "kg m^2",
-    "load_inertia": "kg m^2",
-    "total_inertia": "kg m^2",
-    "stiffness": "N m/rad",
-    "damping": "N m s/rad",
-    "resonance": "Hz",
-    "resonance_damping": "",
-    "antiresonance": "Hz",
-    "antiresonance_damping": "",
-    "inertia_ratio": "",
-}
 METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
 OPEN_COMBINATION = Cause(
     "combination left open",

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from campaign.arrays import Array, ComplexArray
+from campaign.arrays import ComplexArray
+from campaign.estimation.least_squares import straight_line
 from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 
@@ -62,9 +63,9 @@ def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
     channels = {name: values for name, values, _ in measured(record)}
     frequency = np.fft.rfftfreq(len(window), record.step)
     omega = 2.0 * np.pi * np.maximum(frequency, frequency[1])
-    torque = np.fft.rfft(window * _level(record.torque))
+    torque = np.fft.rfft(window * (record.torque - straight_line(record.torque)))
     answer = channels["rate" if "rate" in channels else "angle"]
-    rate = np.fft.rfft(window * _level(answer))
+    rate = np.fft.rfft(window * (answer - straight_line(answer)))
     if "rate" not in channels:
         rate = 1j * omega * rate
     power = np.abs(torque) ** 2
@@ -77,9 +78,3 @@ def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
         here, w = cross[begin:end], omega[begin:end]
         row = np.array([np.sum(1j * w * here), np.sum(here), np.sum(here / (1j * w))])
         yield row, float(np.sum(power[begin:end])), float(np.sqrt(w[0] * w[-1]))
-
-
-def _level(values: Array) -> Array:
-    """Without its straight line."""
-    x = np.linspace(-1.0, 1.0, len(values))
-    return np.asarray(values - np.polyval(np.polyfit(x, values, 1), x))
