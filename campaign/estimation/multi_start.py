@@ -9,7 +9,6 @@ Each fit is `scipy.optimize.least_squares`: trust region reflective, between bou
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -148,19 +147,6 @@ class SearchResult:
     def agreeing(self) -> int:
         """How many starts ended as low as the best one."""
         return agreeing(self.starts, 1.0 if self.settings.stated else EXACT * self.cost_before)
-
-    @property
-    def bic(self) -> float:
-        """Bayesian information criterion; lower is better.
-
-        It compares models of the same data, fitted with the same settings: the cost is minus the
-        logarithm of a likelihood whose deviations were stated, or else follow from the residuals.
-        """
-        n, k = len(self.residuals), len(self.unknowns)
-        if self.settings.stated:
-            return 2.0 * self.cost + k * math.log(n)
-        mean_square = max(2.0 * self.cost / n, float(np.finfo(float).tiny))
-        return n * math.log(mean_square) + k * math.log(n)
 
     def estimates(self, units: Mapping[str, str]) -> dict[str, Estimate]:
         """The unknowns with their intervals, by name; `units`: SI units by name."""

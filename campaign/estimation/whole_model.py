@@ -135,11 +135,13 @@ def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
     return {unknowns[i].name: float(each) for i, each in zip(others, moved, strict=True)}
 
 
-def refitted(unknowns: Sequence[Unknown], residuals: Residuals, begin: Array) -> Values:
-    """Values (SI) of a further fit to other residuals, from the shares `begin`."""
+def refitted(
+    unknowns: Sequence[Unknown], residuals: Residuals, begin: Array, used: Flags | None = None
+) -> Values:
+    """Values (SI) of a further fit to other residuals, or to some, from the shares `begin`."""
     settings = Settings(starts=1, stated=False, tolerance=1e-6)
-    end = fit_from(_objective(unknowns, residuals), begin, settings)
-    return tuple(values_at(unknowns, end.end))
+    end = fit_from(_objective(unknowns, residuals), begin, settings, used=used)
+    return values_at(unknowns, end.end)
 
 
 def held_out(
@@ -152,11 +154,7 @@ def held_out(
 
     left_out: for each recording, shape (n,).
     """
-    objective = _objective(unknowns, residuals)
-    unseen = np.concatenate(left_out)
-    settings = Settings(starts=1, stated=False, tolerance=1e-6)
-    end = fit_from(objective, begin, settings, used=~unseen)
-    found = residuals(tuple(values_at(unknowns, end.end)))
+    found = residuals(refitted(unknowns, residuals, begin, ~np.concatenate(left_out)))
     return tuple(own[mask] for own, mask in zip(found, left_out, strict=True))
 
 

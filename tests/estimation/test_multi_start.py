@@ -68,23 +68,6 @@ def test_a_straight_line_is_that_of_the_normal_equations() -> None:
     assert told["slope"].unit == "m"
 
 
-def test_the_criterion_compares_models_of_the_same_data() -> None:
-    """Known deviations: chi-square + k ln n; unknown ones: n ln(mean square) + k ln n."""
-    slopeless = (LINE[0],)
-    for stated in (True, False):
-        settings = replace(ONE, stated=stated)
-        two = search(Objective(LINE, line), settings)
-        one = search(Objective(slopeless, lambda values: line((values[0], 0.0))), settings)
-        squares = [
-            float(np.sum((Y - np.polyval(np.polyfit(X, Y, degree), X)) ** 2)) for degree in (0, 1)
-        ]
-        for found, square, count in zip((one, two), squares, (1, 2), strict=True):
-            misfit = square if stated else 6 * np.log(square / 6)
-            assert found.bic == pytest.approx(misfit + count * np.log(6), rel=1e-6)
-        assert two.bic < one.bic
-    assert np.isfinite(search(Objective(LINE, lambda v: 0.0 * line(v)), settings).bic)
-
-
 @pytest.mark.parametrize("loss", ["linear", "soft_l1", "cauchy"])
 def test_a_decay_with_an_outlier_is_scipys(loss: str) -> None:
     """Without bounds, in the parameters themselves, with scipy's own differences."""
