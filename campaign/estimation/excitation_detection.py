@@ -81,7 +81,7 @@ def found_sine(signal: Array, sample_rate: float, frequency: float | None = None
         if line < LEAST_CYCLES:
             raise ValueError(f"it holds fewer than {LEAST_CYCLES:g} cycles of its strongest sine")
         width = sample_rate / len(signal)
-        frequency = _best(time, signal, (line - 1) * width, (line + 1) * width)
+        frequency = _best(time, signal, line * width, width)
     fit, explained = _sine_at(time, signal, frequency)
     if not explained >= EXPLAINED:
         raise ValueError(
@@ -177,17 +177,17 @@ def _where_it_swings(
     return first, stop
 
 
-def _best(time: Array, signal: Array, low: float, high: float) -> float:
-    """The frequency at which a sine explains most."""
+def _best(time: Array, signal: Array, middle: float, width: float) -> float:
+    """The frequency within `width` of `middle` (Hz) at which a sine explains most."""
     from scipy.optimize import minimize_scalar
 
-    def left(frequency: float) -> float:
-        return -_sine_at(time, signal, frequency)[1]
+    def left(offset: float) -> float:
+        return -_sine_at(time, signal, middle + offset)[1]
 
-    found = minimize_scalar(
-        left, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high}
-    )
-    return float(found.x)
+    # Of an offset: the search resolves a share of what it varies.
+    fine = {"xatol": 1e-9 * width}
+    found = minimize_scalar(left, bounds=(-width, width), method="bounded", options=fine)
+    return middle + float(found.x)
 
 
 def _sine_at(time: Array, signal: Array, frequency: float) -> tuple[Array, float]:
