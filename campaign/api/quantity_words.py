@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
@@ -13,7 +13,7 @@ from campaign.axis_kind import axis_terms
 from campaign.estimate import Estimate
 from campaign.experiments.shared.common import OF_NO_OPTION
 from campaign.physics.bench_knowledge import number_at
-from campaign.result import Finding, Value
+from campaign.result import Finding, Table, Value
 from campaign.text import number, pretty_unit, quantity_words
 from campaign.units import DISPLAY, Quantity, convert
 
@@ -23,17 +23,22 @@ BENCH = "bench."
 
 def display_unit(test: AnalysedTest, finding: Finding) -> str:
     """The unit in which the test's own tables show this number, or else its quantity."""
+    return unit_in_tables(test.result.tables, finding.quantity, finding.value, finding.unit)
+
+
+def unit_in_tables(tables: Sequence[Table], quantity: str, value: float, unit: str) -> str:
+    """The unit in which tables show a number (SI) in `unit`, or else its quantity, or else any."""
     columns = [
         (table, column)
-        for table in test.result.tables
+        for table in tables
         for column in table.columns
-        if column.display and column.unit == finding.unit
+        if column.display and column.unit == unit
     ]
     for table, column in columns:
-        if any(_is(row.get(column.name), finding.value) for row in table.rows):
+        if any(_is(row.get(column.name), value) for row in table.rows):
             return column.display
-    own = (column.display for _, column in columns if column.name == finding.quantity)
-    return next(own, DISPLAY.get(finding.unit, finding.unit))
+    own = (column.display for _, column in columns if column.name == quantity)
+    return next(own, DISPLAY.get(unit, unit))
 
 
 def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:

@@ -1,21 +1,22 @@
-"""A calibration result as TOML, and the bench file with fitted values."""
+"""A calibration result as TOML, and the bench file with fitted values and how they are known."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from campaign.calibration.leave_out import deviations
+from campaign.calibration.leave_out import LeftOut, deviations
 from campaign.calibration.outcome import CalibrationOutcome
 from campaign.calibration.space import Parameter, Space
 from campaign.calibration.targets import Target, shortest
 from campaign.errors import CampaignError
 from campaign.estimation.linear_uncertainty import strong
-from campaign.estimation.multi_start import agreeing
+from campaign.estimation.multi_start import Start, agreeing
 from campaign.protocol.bench_edit import with_known
 from campaign.protocol.files import Source
 from campaign.units import convert, split_quantity
@@ -26,6 +27,8 @@ HEADER = """\
 """
 
 
+LEAST_CORRELATION = 0.1
+"""below which two values count as told apart."""
 ASSUMPTION = (
     "cells deviate independently, each by its standard deviation times the scatter; linear at the "
     "optimum; the structure of the bench counts as right"
@@ -40,38 +43,31 @@ def result_text(outcome: CalibrationOutcome, bench_name: str, bench: str = "") -
         bench_name: the file that the calibrated bench goes to.
         bench: its text, which states the fingerprint.
     """
+    import tomlkit
+
     problem, options = outcome.problem, outcome.problem.options
-    lines = [HEADER.format(protocol=problem.protocol.path.name)]
-    lines += _pairs(
-        {
-            "protocol": problem.protocol.path.name,
-            "bench": options.bench,
-            "calibrated_bench": bench_name,
-            "finished": not outcome.interrupted,
-            "loss": options.loss,
-            "starts": options.starts if outcome.was_fitted else 0,
-            "seed": options.seed,
-            "evaluations": outcome.evaluations,
-            "cells": shortest(problem.targets, problem.published),
-        }
-    )
-    lines += ["", "[fit]", *_pairs(dict(_fit(outcome)))]
-    for start in outcome.starts:
-        named = zip(problem.space.parameters, problem.space.values(start.end), strict=True)
-        values = {parameter.name: parameter.text(value) for parameter, value in named}
-        lines += ["", "[[start]]", *_pairs({"cost": _short(start.cost), "ended": start.reason})]
-        lines += _pairs({"values": values})
-    for index in range(len(problem.space.parameters)):
-        lines += ["", "[[parameter]]", *_pairs(dict(_parameter(outcome, index)))]
-    lines += _correlation(outcome)
-    lines += _covariance(outcome)
-    for target in problem.targets:
-        lines += ["", "[[cell]]", *_pairs(dict(_cell(outcome, target)))]
-    lines += _left_out(outcome)
-    lines += _propagation(outcome, bench)
-    text = "\n".join(lines) + "\n"
-    tomllib.loads(text)
-    return text
+    parameters = problem.space.parameters
+    document: dict[str, Any] = {
+        "protocol": problem.protocol.path.name,
+        "bench": options.bench,
+        "calibrated_bench": bench_name,
+        "finished": not outcome.interrupted,
+        "loss": options.loss,
+        "starts": options.starts if outcome.was_fitted else 0,
+        "seed": options.seed,
+        "evaluations": outcome.evaluations,
+        "cells": shortest(problem.targets, problem.published),
+        "fit": dict(_fit(outcome)),
+        "start": [_start(outcome, each) for each in outcome.starts],
+        "parameter": [dict(_parameter(outcome, index)) for index in range(len(parameters))],
+        "correlation": _correlation(outcome),
+        "covariance": _covariance(outcome),
+        "cell": [dict(_cell(outcome, target)) for target in problem.targets],
+        "leave_one_out": _left_out(outcome),
+        "propagation": _propagation(outcome, bench),
+    }
+    header = HEADER.format(protocol=problem.protocol.path.name)
+    return header + tomlkit.dumps({k: v for k, v in document.items() if v not in ({}, [])})
 
 
 def interruption(outcome: CalibrationOutcome) -> str:
@@ -103,13 +99,76 @@ def bench_text(
     return with_known(content.decode(), known, str(source.file))
 
 
+def known_entries(
+    outcome: CalibrationOutcome, fitted: Iterable[str], document: str
+) -> dict[str, Any]:
+    """Entries of a bench's table `known`, as TOML has them.
+
+    Every fitted value has an entry: one that the cells do not determine has no interval, and takes
+    away the one that an earlier calibration left there.
+
+    Args:
+        fitted: the cells, as a bench names them.
+        document: whose cells they are, as the bench names it.
+    """
+    entries: dict[str, Any] = {"document": document, "fitted": list(fitted)}
+    entries["values"] = dict(_values(outcome))
+    pairs = list(_correlations(outcome))
+    return {**entries, "correlations": pairs} if pairs else entries
+
+
+def _values(outcome: CalibrationOutcome) -> Iterator[tuple[str, dict[str, Any]]]:
+    for index, parameter in enumerate(outcome.problem.space.parameters):
+        ends = [parameter.unknown.value(end) for end in _ends(outcome, index)]
+        for path, factor in parameter.fields:
+            entry: dict[str, Any] = {"origin": "fitted"}
+            if ends:
+                low, high = sorted(factor * end for end in ends)
+                entry = {"interval": [parameter.text(low), parameter.text(high)], **entry}
+            yield path, entry
+
+
+def _ends(outcome: CalibrationOutcome, index: int) -> tuple[float, ...]:
+    """Of the 95 % interval, in shares of the range; empty where the cells determine nothing.
+
+    It holds wherever parameters are that ended at a bound.
+    """
+    certainty = outcome.uncertainty
+    if certainty is None or certainty.bound[index] or certainty.open[index]:
+        return ()
+    ends = float(certainty.low[index]), float(certainty.high[index])
+    return ends if all(map(math.isfinite, ends)) else ()
+
+
+def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
+    """Pairs of paths whose errors go together; fields of one parameter do so wholly."""
+    certainty = outcome.uncertainty
+    if certainty is None:
+        return
+    fields = [
+        (index, path, factor)
+        for index, parameter in enumerate(outcome.problem.space.parameters)
+        for path, factor in _determined(outcome, index, parameter)
+    ]
+    for (i, one, first), (j, other, second) in combinations(fields, 2):
+        share = float(certainty.correlation[i, j]) * math.copysign(1.0, first * second)
+        if math.isfinite(share) and abs(share) >= LEAST_CORRELATION:
+            yield [one, other, round(min(1.0, max(-1.0, share)), 3)]
+
+
+def _determined(
+    outcome: CalibrationOutcome, index: int, parameter: Parameter
+) -> tuple[tuple[str, float], ...]:
+    return parameter.fields if _ends(outcome, index) else ()
+
+
 def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: float) -> str:
     for key in keys:
         tree = tree[key]
     if parameter.quantity is None:
-        return _toml(float(f"{value:.6g}"))
+        return repr(float(f"{value:.6g}"))
     unit = split_quantity(tree)[1]
-    return _toml(f"{convert(value, parameter.quantity.si, unit):.6g} {unit}")
+    return f'"{convert(value, parameter.quantity.si, unit):.6g} {unit}"'
 
 
 def _fit(outcome: CalibrationOutcome) -> Iterator[tuple[str, Any]]:
@@ -167,46 +226,51 @@ def _parameter(outcome: CalibrationOutcome, index: int) -> Iterator[tuple[str, A
             yield "note", "not determined by these cells within its bounds"
 
 
-def _correlation(outcome: CalibrationOutcome) -> list[str]:
+def _start(outcome: CalibrationOutcome, start: Start) -> dict[str, Any]:
+    space = outcome.problem.space
+    named = zip(space.parameters, space.values(start.end), strict=True)
+    values = {parameter.name: parameter.text(value) for parameter, value in named}
+    return {"cost": _short(start.cost), "ended": start.reason, "values": values}
+
+
+def _correlation(outcome: CalibrationOutcome) -> dict[str, Any]:
     certainty = outcome.uncertainty
     if certainty is None:
-        return []
+        return {}
     names = [parameter.name for parameter in outcome.problem.space.parameters]
     pairs = strong(certainty.correlation, names)
     matrix = [
         [round(float(r), 3) + 0.0 if math.isfinite(r) else "" for r in row]
         for row in certainty.correlation
     ]
-    lines = ["", "[correlation]", *_pairs({"parameters": names})]
-    lines += ["strong = [", *(f"    {_toml([a, b, round(r, 3)])}," for a, b, r in pairs), "]"]
-    return [*lines, "matrix = [", *(f"    {_toml(row)}," for row in matrix), "]"]
+    told = [[a, b, round(r, 3)] for a, b, r in pairs]
+    return {"parameters": names, "strong": _rows(told), "matrix": _rows(matrix)}
 
 
-def _covariance(outcome: CalibrationOutcome) -> list[str]:
+def _covariance(outcome: CalibrationOutcome) -> dict[str, Any]:
     certainty = outcome.uncertainty
     matrix = None if certainty is None else certainty.covariance
     if certainty is None or matrix is None:
-        return []
+        return {}
     names = [parameter.name for parameter in outcome.problem.space.parameters]
-    rows = [f"    {_toml([_short(float(c)) for c in row])}," for row in matrix]
+    rows = _rows([[_short(float(c)) for c in row] for row in matrix])
     told = {"assumption": ASSUMPTION, "freedom": certainty.freedom, "parameters": names}
-    return ["", "[covariance]", *_pairs(told), "matrix = [", *rows, "]"]
+    return {**told, "matrix": rows}
 
 
-def _propagation(outcome: CalibrationOutcome, bench: str) -> list[str]:
+def _propagation(outcome: CalibrationOutcome, bench: str) -> dict[str, Any]:
     """What `published.calibrated` reads: written last, as most of it is for a program."""
     found = outcome.propagation
     if found is None:
-        return []
+        return {}
     stated = tomllib.loads(bench).get("known", {}).get("fingerprint", {})
-    told = {
+    return {
         "protocol": found.protocol,
         "fingerprint": stated.get("bench", ""),
         "freedom": found.freedom,
         "lost": found.lost,
+        "standard_uncertainty": {k: _short(v) for k, v in found.uncertainty.items()},
     }
-    lines = ["", "[propagation]", *_pairs(told), "", "[propagation.standard_uncertainty]"]
-    return [*lines, *(f"{_quoted(k)} = {_short(v)!r}" for k, v in found.uncertainty.items())]
 
 
 def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, Any]]:
@@ -224,52 +288,40 @@ def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, An
     yield "residual", _short(target.residual(found))
 
 
-def _left_out(outcome: CalibrationOutcome) -> list[str]:
+def _left_out(outcome: CalibrationOutcome) -> dict[str, Any]:
     if not outcome.left_out:
-        return []
+        return {}
     targets = [target for left in outcome.left_out for target in left.targets]
     overall = deviations(targets, [value for left in outcome.left_out for value in left.found])
     fitted = [outcome.fitted.found.get(target.cell.path) for target in targets]
-    beside = deviations(targets, fitted)
-    condition = outcome.problem.options.leave_out
-    lines = ["", "[leave_one_out]", *_pairs({"condition": condition, **dict(_summary(overall))})]
-    lines += _pairs({f"fitted_{name}": value for name, value in _summary(beside)})
-    for left in outcome.left_out:
-        percent = deviations(left.targets, left.found)
-        shown: dict[str, Any] = {
-            "value": left.value,
-            "cells": [target.cell.path for target in left.targets],
-            "predicted": ["" if f is None else _short(f) for f in left.found],
-            "deviation_percent": [_short(p) if math.isfinite(p) else "" for p in percent],
-        }
-        lines += ["", "[[leave_one_out.without]]", *_pairs(shown)]
-    return lines
+    beside = _summary(deviations(targets, fitted))
+    return {
+        "condition": outcome.problem.options.leave_out,
+        **dict(_summary(overall)),
+        **{f"fitted_{name}": value for name, value in beside},
+        "without": [_without(left) for left in outcome.left_out],
+    }
 
 
-def _pairs(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {_toml(value)}" for key, value in values.items()]
+def _without(left: LeftOut) -> dict[str, Any]:
+    percent = deviations(left.targets, left.found)
+    return {
+        "value": left.value,
+        "cells": [target.cell.path for target in left.targets],
+        "predicted": ["" if f is None else _short(f) for f in left.found],
+        "deviation_percent": [_short(p) if math.isfinite(p) else "" for p in percent],
+    }
+
+
+def _rows(rows: Sequence[Sequence[Any]]) -> Any:
+    """A TOML array with a row on each line."""
+    import tomlkit
+
+    array = tomlkit.array()
+    array.extend(rows)
+    return array.multiline(True)
 
 
 def _short(value: float) -> float:
     """To six digits, which no last bit of a sum reaches; -0 is 0."""
     return float(f"{value:.6g}") + 0.0
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML writes it, on one line."""
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case int() | float():
-            return repr(value)
-        case str():
-            return _quoted(value)
-        case Mapping():
-            return "{ " + ", ".join(_pairs(value)) + " }"
-    return "[" + ", ".join(_toml(item) for item in value) + "]"
-
-
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    safe = (c if c.isprintable() else f"\\U{ord(c):08X}" for c in escaped)
-    return '"' + "".join(safe) + '"'

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.calibration.objective import Simulation
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import Target
 from campaign.estimation.multi_start import Display, Settings, fit_from
 from campaign.estimation.objective import Objective
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

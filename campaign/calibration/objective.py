@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.axis_kind import axis_terms, sides_in
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.calibration.problem import CalibrationProblem
@@ -32,7 +32,6 @@ from campaign.published.scoreboard import score
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.trial import Trial
 
-Array = NDArray[np.float64]
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 

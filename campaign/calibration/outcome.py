@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from campaign.arrays import Array
 from campaign.calibration.leave_out import LeftOut, leave_one_out
 from campaign.calibration.objective import Evaluation, Simulation
 from campaign.calibration.problem import CalibrationProblem
@@ -18,8 +16,6 @@ from campaign.estimation.objective import Objective
 from campaign.experiments.interface import Experiment
 from campaign.protocol import Protocol
 from campaign.protocol.calibration import CalibrationOptions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.calibration.objective import Simulation
 from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import DEFAULT_WEIGHT, make_target
@@ -27,7 +27,6 @@ from campaign.experiments.interface import Experiment
 from campaign.protocol.schema import Test
 from campaign.published.values import NO_SIZE
 
-Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-12
 """Variance along a principal axis, as a share of the largest, below which nothing is moved."""
 

@@ -6,14 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from campaign.arrays import Array
 from campaign.estimation.unknowns import Unknown, values_at
 from campaign.protocol.schema import replaced
 from campaign.units import Quantity, convert
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.published import patterns
 from campaign.published.values import NO_SIZE, Cell, Published
 from campaign.published.verdicts import CLAIMS
@@ -79,7 +79,7 @@ class Target:
         return f"{self.sigma:.6g} {self.cell.unit}".strip()
 
 
-def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> NDArray[np.float64]:
+def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> Array:
     """Residual of each target, shape (n,)."""
     return np.array([target.residual(found.get(target.cell.path)) for target in targets])
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from campaign.archive.layout.files import write_atomically
-from campaign.calibration.document import bench_text, interruption, result_text
-from campaign.calibration.known_values import known_entries
+from campaign.calibration.document import bench_text, interruption, known_entries, result_text
 from campaign.calibration.outcome import CalibrationOutcome, calibrate
 from campaign.calibration.problem import make_problem
 from campaign.calibration.targets import shortest

@@ -19,12 +19,11 @@ from campaign.identify.bench_document import bench_text, keys_by_method, nothing
 from campaign.identify.identification import Identification, Section, identify
 from campaign.identify.material import ChosenRun, choose
 from campaign.identify.page import PAGE, next_measurement, write_identification
-from campaign.identify.tables import changes_table, parameter_text
+from campaign.identify.tables import changes_table, parameter_words, parameters_table
 from campaign.interrupts import unwinding
 from campaign.report.formats import chosen_formats
 from campaign.report.output import refuse_other
 from campaign.resources import templates_folder
-from campaign.text import pretty_unit, words
 
 
 @unwinding()
@@ -176,20 +175,15 @@ def _tell(section: Section) -> None:
     print_line(f"{section.model.name} ({section.model.summary})")
     for warning in section.identified.warnings:
         print_note(f"{section.model.name}: {warning.text}", style="yellow")
-    rows = [
-        (
-            words(each.estimate.name),
-            parameter_text(each.estimate, each.display),
-            pretty_unit(each.display or each.estimate.unit),
-            each.bench,
-        )
-        for each in section.identified.parameters
-    ]
-    print_table(("parameter", "value, 95 %", "unit", "key of the bench"), rows)
+    table = parameters_table([section])
+    shown = [[str(row[k]) for k in ("parameter", "value", "unit", "bench")] for row in table.rows]
+    print_table(("parameter", "value, 95 %", "unit", "key of the bench"), shown)
     reasons: dict[str, list[str]] = {}
     for each in section.identified.parameters:
         if each.estimate.reason:
-            reasons.setdefault(str(each.estimate.reason), []).append(words(each.estimate.name))
+            reasons.setdefault(str(each.estimate.reason), []).append(
+                parameter_words(each.estimate.name)
+            )
     for reason, names in reasons.items():
         print_line(f"{', '.join(names)}: {reason}.")
     for remark in of_unknown_size(each.estimate for each in section.identified.parameters):

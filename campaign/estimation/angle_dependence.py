@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.least_squares import Array
+from campaign.arrays import Array
 
 FEWEST = 10
 """stretches."""

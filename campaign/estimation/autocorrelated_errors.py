@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
 
 COEFFICIENTS = np.linspace(0.0, 0.95, 20)
 """Of AR(1) that are tried; residuals that avoid their neighbours count as white."""

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import refused
 from campaign.estimation.intervals import shifted_by, with_error
-from campaign.estimation.least_squares import Array
 from campaign.estimation.stribeck import PARAMETERS
 from campaign.estimation.velocity_map import (
     FORM,

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import polynomial
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.autocorrelated_errors import Array, FitErrors, errors_of
+from campaign.estimation.autocorrelated_errors import FitErrors, errors_of
 from campaign.estimation.intervals import shifted_by, student, with_error
 from campaign.estimation.relative_rate import mean, slides_from, slope
 from campaign.reason import Cause

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, Flags
 from campaign.estimation.autocorrelated_errors import FitErrors, errors_of
 from campaign.estimation.presliding_curve import (
     Interface,
@@ -20,8 +20,6 @@ from campaign.estimation.presliding_curve import (
     presliding_angle,
 )
 from campaign.estimation.torque_ramp import FEWEST_BINS, Ramp
-
-Array = NDArray[np.float64]
 
 EVALUATIONS = 100
 """of a fit at most; a curve that needs more is not determined."""
@@ -78,7 +76,7 @@ class BristleFit:
     """
 
     ramp: Ramp
-    used: NDArray[np.bool_]
+    used: Flags
     vector: Array
     interfaces: tuple[Interface, ...]
     of_stiffness: tuple[int, ...]

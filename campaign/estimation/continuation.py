@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.frequency_response import Array, Response
+from campaign.estimation.frequency_response import Response
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import LEVEL, student
 from campaign.reason import NONE, Cause

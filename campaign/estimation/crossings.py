@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.sine_point import Array
+from campaign.arrays import Array
 
 FALSE_ALARM = 0.01
 """Chance that noise decides the side of any point of a curve that lies on the level."""

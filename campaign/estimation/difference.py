@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.contrast import Contrast, contrast, left_over, ratio_ends
-from campaign.estimation.intervals import LEVEL
+from campaign.estimation.intervals import LEVEL, multiplied
 from campaign.reason import NONE, Cause, Reason
 from campaign.units import factor
 
@@ -85,23 +85,7 @@ def in_unit(estimate: Estimate, unit: str) -> Estimate:
     """The same number in another unit. Raises ValueError when it measures something else."""
     if estimate.unit == unit:
         return estimate
-    size = float(factor(estimate.unit, unit))
-
-    def scaled(number: float | None) -> float | None:
-        return None if number is None else number * size
-
-    return replace(
-        estimate,
-        value=estimate.value * size,
-        unit=unit,
-        low=scaled(estimate.low),
-        high=scaled(estimate.high),
-        standard_error=scaled(estimate.standard_error),
-        systematic=tuple(
-            replace(part, standard_uncertainty=scaled(part.standard_uncertainty))
-            for part in estimate.systematic
-        ),
-    )
+    return replace(multiplied(estimate, float(factor(estimate.unit, unit))), unit=unit)
 
 
 def _estimate(
@@ -201,7 +185,8 @@ def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
 
     Ends are subtracted as they stand, which needs no independence.
     """
-    (a_low, a_high), (b_low, b_high) = _reach(other), _reach(reference)
+    # Where each may lie: a bound to its side, a number within its interval.
+    (a_low, a_high), (b_low, b_high) = other.combined, reference.combined
     low = None if a_low is None or b_high is None else a_low - b_high
     high = None if a_high is None or b_low is None else a_high - b_low
     value = other.value - reference.value
@@ -222,8 +207,3 @@ def _of_bounds(reference: Estimate, other: Estimate) -> Difference:
         # Over a bound a share would not be one.
         share = Estimate.without_interval(CHANGE, math.nan, "", OF_A_BOUND())
     return Difference(told, share, None, WITH_A_BOUND())
-
-
-def _reach(estimate: Estimate) -> tuple[float | None, float | None]:
-    """Where the number may lie: a bound to its side, a number within its interval."""
-    return estimate.combined

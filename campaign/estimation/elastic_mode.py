@@ -14,10 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate
-from campaign.estimation.frequency_response import Array, ComplexArray, Response
+from campaign.estimation.frequency_response import Response
 from campaign.estimation.intervals import with_error
 
 SPAN = 2.0
@@ -72,8 +72,8 @@ def elastic_mode(response: Response) -> ElasticMode | None:
     return None if best is None else _refine(frequency, logarithm, best[1])
 
 
-def _window(frequency: Array, centre: float) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (frequency >= centre / SPAN) & (frequency <= centre * SPAN)
+def _window(frequency: Array, centre: float) -> Flags:
+    inside: Flags = (frequency >= centre / SPAN) & (frequency <= centre * SPAN)
     # A mode at the edge of the sweep cannot be told from the smooth part.
     whole = frequency[0] <= centre / SPAN**0.5 and frequency[-1] >= centre * SPAN**0.5
     return inside if whole else np.zeros_like(inside)

@@ -20,3 +20,11 @@ def adjusted(p: Sequence[float]) -> list[float]:
     from scipy.stats import false_discovery_control
 
     return [float(each) for each in false_discovery_control(list(p), method="bh")]
+
+
+def level_of(p: Sequence[float]) -> float:
+    """The p value at which one more of the family would be declared, given the others."""
+    if not p:
+        return RATE
+    declared = sum(each <= RATE for each in adjusted(p))
+    return RATE * min(declared + 1, len(p)) / len(p)

@@ -11,12 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.sine_point import SinePoint, mean_point
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 MOST_ERROR = 0.2
 """of a point's own size: with more its phase is hardly known, nor its level."""

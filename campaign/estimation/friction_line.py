@@ -12,13 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.autocorrelated_errors import errors_of
-from campaign.estimation.intervals import SINGLE_VALUE, with_error
-
-Array = NDArray[np.float64]
+from campaign.estimation.intervals import SINGLE_VALUE, student, with_error
+from campaign.estimation.least_squares import propagated
 
 APART = 1.5
 """Fastest over slowest of the speeds, at least: a line through one speed tells no slope."""
@@ -46,12 +45,9 @@ class FrictionLine:
 
     def band(self, speed: Array) -> tuple[Array, Array]:
         """Low and high of the line's 95 % band at speeds, each shape (n,)."""
-        from campaign.estimation.intervals import student
-
         columns = np.column_stack([np.ones(len(speed)), speed])
-        error = np.sqrt(np.einsum("ij,jk,ik->i", columns, self.covariance, columns))
         middle = columns @ np.array([self.coulomb.value, self.viscous.value])
-        half = student(self.freedom) * error
+        half = student(self.freedom) * propagated(columns, self.covariance)
         return middle - half, middle + half
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
 
 LEVELS = (0.5, 0.9)
 """of the settled torque, between which the load's displacement is taken."""

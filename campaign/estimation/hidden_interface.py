@@ -13,7 +13,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from campaign.estimation.autocorrelated_errors import whitened
 from campaign.estimation.bristle_fit import BristleFit
@@ -23,8 +22,6 @@ from campaign.estimation.presliding_curve import (
     angle_derivatives,
     presliding_angle,
 )
-
-Array = NDArray[np.float64]
 
 SHARES = (0.1, 0.15, 0.2, 0.3, 0.4)
 """of all torque that a hidden interface is taken to carry. One of less is never resolved: half of

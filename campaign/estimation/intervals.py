@@ -12,12 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.reason import Cause
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.95
 """Confidence of intervals, if nothing else is said."""
@@ -32,6 +30,7 @@ TOO_FEW_SAMPLES = Cause("too few samples", "{samples} samples are too few for {b
 NO_STANDARD_ERROR = Cause("no standard error", "one of {whom} has no standard error")
 NOT_POSITIVE = Cause("not positive", "a ratio of numbers that are not positive")
 MODEL_MISFIT = Cause("model misfit", "misfit: {why}")
+TOO_FEW_POSITIVE = Cause("too few positive values", "it takes two positive values or more")
 WIDEST = 0.5 * math.log(1e3)
 """Largest half-width of an interval in the logarithm: a factor of a thousand from end to end."""
 LARGEST = 700.0
@@ -48,15 +47,23 @@ def student(freedom: float, level: float = LEVEL) -> float:
 
 
 def with_error(
-    name: str, value: float, unit: str, error: float, freedom: float, method: str, **more: Any
+    name: str,
+    value: float,
+    unit: str,
+    error: float,
+    freedom: float,
+    method: str,
+    quantile: float | None = None,
+    **more: Any,
 ) -> Estimate:
     """An estimate from its standard error and the degrees of freedom of that error.
 
     No interval, and the reason, where there are no degrees of freedom or the error is not finite.
+    quantile: half-width over standard error; absent: Student's t.
     """
     if not freedom > 0 or not math.isfinite(error) or not math.isfinite(value):
         return Estimate.without_interval(name, value, unit, NO_FREEDOM(), method=method, **more)
-    half = student(freedom) * error
+    half = (student(freedom) if quantile is None else quantile) * error
     return Estimate(
         name,
         value,
@@ -101,6 +108,25 @@ def of_positive_repeats(
     return exponential(inner, unit)
 
 
+def of_next(name: str, values: Sequence[float] | Array, unit: str) -> Estimate:
+    """Where one further positive value will lie: prediction interval, t in the logarithm.
+
+    The interval of a mean says where the mean is. One further value scatters as a single trial
+    does, and is to be held against their distribution: wider by sqrt(n + 1). The value is the
+    geometric mean of `values`, shape (n,). No interval for fewer than two values, or for some that
+    are not positive.
+    """
+    found = np.asarray(values, dtype=float)
+    if len(found) < 2 or not np.all(found > 0):
+        mean = float(np.mean(found)) if len(found) else math.nan
+        return Estimate.without_interval(name, mean, unit, TOO_FEW_POSITIVE())
+    logs, freedom = np.log(found), len(found) - 1
+    error = float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / len(found))
+    method = f"where one more trial will lie, from {len(found)}; Student's t in the logarithm"
+    mean = float(np.mean(logs))
+    return exponential(with_error(name, mean, "", error, freedom, method, kind="quantile"), unit)
+
+
 def exponential(logarithm: Estimate, unit: str) -> Estimate:
     """The estimate of x from one of ln x; its standard error by the delta method.
 
@@ -111,17 +137,9 @@ def exponential(logarithm: Estimate, unit: str) -> Estimate:
     ends = (end for end in (logarithm.low, logarithm.high) if end is not None)
     if beyond or any(abs(end - logarithm.value) > WIDEST for end in ends):
         return replace(
-            logarithm,
-            value=value,
-            unit=unit,
-            low=None,
-            high=None,
-            level=None,
-            standard_error=None,
-            freedom=None,
-            origin=Origin.NOT_DETERMINED,
-            reason=SPANS_DECADES(),
-        )
+            logarithm, value=value, unit=unit, low=None, high=None, level=None, standard_error=None,
+            freedom=None, origin=Origin.NOT_DETERMINED, reason=SPANS_DECADES(),
+        )  # fmt: skip
     error = logarithm.standard_error
     return replace(
         logarithm,
@@ -133,23 +151,21 @@ def exponential(logarithm: Estimate, unit: str) -> Estimate:
     )
 
 
-def of_series(
-    name: str, samples: Array, unit: str, batches: int = BATCHES, **more: Any
-) -> Estimate:
-    """Mean of an autocorrelated series of shape (n,) by batch means: t with `batches` - 1.
+def of_series(name: str, samples: Array, unit: str, **more: Any) -> Estimate:
+    """Mean of an autocorrelated series of shape (n,) by batch means: t with `BATCHES` - 1.
 
     Holds where the correlation is short against a batch; what is slower must be modelled. Source:
     Schmeiser, "Batch size effects in the analysis of simulation output", Oper. Res. 30 (1982).
     """
-    if len(samples) < 2 * batches:
+    if len(samples) < 2 * BATCHES:
         mean = float(np.mean(samples)) if len(samples) else math.nan
-        reason = TOO_FEW_SAMPLES(samples=len(samples), batches=batches)
+        reason = TOO_FEW_SAMPLES(samples=len(samples), batches=BATCHES)
         return Estimate.without_interval(name, mean, unit, reason, **more)
-    used = len(samples) // batches * batches
-    means = samples[:used].reshape(batches, -1).mean(axis=1)
-    error = float(np.std(means, ddof=1)) / math.sqrt(batches)
-    method = f"mean, deviation from {batches} batches"
-    return with_error(name, float(np.mean(samples)), unit, error, batches - 1, method, **more)
+    used = len(samples) // BATCHES * BATCHES
+    means = samples[:used].reshape(BATCHES, -1).mean(axis=1)
+    error = float(np.std(means, ddof=1)) / math.sqrt(BATCHES)
+    method = f"mean, deviation from {BATCHES} batches"
+    return with_error(name, float(np.mean(samples)), unit, error, BATCHES - 1, method, **more)
 
 
 def difference(name: str, one: Estimate, other: Estimate, unit: str, **more: Any) -> Estimate:

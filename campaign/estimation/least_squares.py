@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array, Flags
 
 NULL = 1e-8
 """Singular values of the scaled Jacobian below this share of the largest are null."""
@@ -30,9 +29,7 @@ def refuse_too_few(points: int, parameters: int) -> None:
         )
 
 
-def covariance(
-    jacobian: Array, null: float = NULL, flat: float = 0.0
-) -> tuple[Array, NDArray[np.bool_]]:
+def covariance(jacobian: Array, null: float = NULL, flat: float = 0.0) -> tuple[Array, Flags]:
     """(JᵀJ)⁻¹ without null directions, shape (k, k), and which parameters these involve, (k,).
 
     Units of the parameters decide nothing: each column of J, shape (n, k), is scaled to length 1.
@@ -53,6 +50,26 @@ def covariance(
     return scaled / np.outer(safe, safe), np.asarray(nothing | involved)
 
 
+def straight_line(values: Array) -> Array:
+    """The straight line through values at even intervals, shape (n,)."""
+    place = np.linspace(-1.0, 1.0, len(values))
+    return np.asarray(values.mean() + place * (place @ values) / (place @ place))
+
+
+def gradients(function: Callable[[Array], Array], point: Array, steps: Array) -> Array:
+    """Derivatives of numbers (k,) by parameters (p,): central differences of `steps`, (k, p)."""
+    sides = [(function(point + step) - function(point - step)) for step in np.diag(steps)]
+    return np.asarray(np.stack(sides, axis=-1) / (2.0 * steps))
+
+
+def propagated(by: Array, covariance: Array) -> Array:
+    """Standard deviations of numbers by the delta method, shape (k,) (GUM 5.2.2).
+
+    by: their derivatives by parameters of that covariance (p, p), shape (k, p).
+    """
+    return np.asarray(np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", by, covariance, by), 0.0)))
+
+
 @dataclass(frozen=True)
 class Minimum:
     """Where a sum of squares is smallest between bounds.
@@ -66,7 +83,7 @@ class Minimum:
     point: Array
     residuals: Array
     jacobian: Array
-    held: NDArray[np.bool_]
+    held: Flags
 
     @property
     def cost(self) -> float:
@@ -125,19 +142,26 @@ def minimum(
     return Minimum(point, residuals, jacobian, held)
 
 
-def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
+def _held(point: Array, gradient: Array, lower: Array, upper: Array) -> Flags:
     """Which parameters are at a bound with the descent leading beyond it."""
     return ((point <= lower) & (gradient >= 0)) | ((point >= upper) & (gradient <= 0))
 
 
 def profile_limit(
-    cost_at: Callable[[float], float], start: float, step: float, most: float
+    cost_at: Callable[[float], float],
+    start: float,
+    step: float,
+    most: float,
+    accuracy: float = 1e-6,
+    doublings: int = 60,
 ) -> float:
     """Where a profile of the sum of squares has risen by `most` above its value at `start`.
 
     Args:
         cost_at: smallest sum of squares with the parameter held at a value.
         step: first step away from `start`, with its sign; doubled until the rise is passed.
+        accuracy: of the limit, as a share of it.
+        doublings: at most.
 
     Raises ValueError where it never rises so far: the data give no limit on that side.
     """
@@ -146,11 +170,11 @@ def profile_limit(
     cost_at = cache(cost_at)  # the ends are asked for by the search between them again
     bottom = cost_at(start)
     inner, outer = start, start + step
-    for _ in range(60):
+    for _ in range(doublings):
         if cost_at(outer) - bottom > most:
             break
         inner, outer = outer, start + 2.0 * (outer - start)
     else:
         raise ValueError("the data give no limit on that side")
-    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=1e-6)
+    found = brentq(lambda x: cost_at(x) - bottom - most, inner, outer, rtol=accuracy)
     return float(found)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.intervals import LEVEL, NO_FREEDOM, student
 from campaign.estimation.least_squares import covariance, profile_limit
@@ -21,7 +21,6 @@ from campaign.estimation.losses import Loss, weights
 from campaign.estimation.unknowns import Unknown
 from campaign.reason import Cause
 
-Array = NDArray[np.float64]
 Bound = Literal["", "lower", "upper"]
 AT_BOUND = 1e-3
 """Share of its range within which a parameter is at its bound."""

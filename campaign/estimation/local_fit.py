@@ -24,7 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.frequency_response import Array, ComplexArray, Response
+from campaign.arrays import Array, ComplexArray
+from campaign.estimation.frequency_response import Response
 
 WIDEST = 1.3
 """Half-width of a fit's window, in the logarithm of frequency: a factor of 3.7."""

@@ -5,47 +5,33 @@ Residuals are in standard deviations: at about one the robust losses begin to cu
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
+
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
+Curve = Callable[[Array], Array]
+CURVES: Mapping[str, tuple[Curve, Curve]] = {
+    "linear": (lambda z: z, np.ones_like),
+    "soft_l1": (lambda z: 2 * (np.sqrt(1 + z) - 1), lambda z: 1 / np.sqrt(1 + z)),
+    "huber": (
+        lambda z: np.where(z <= 1, z, 2 * np.sqrt(z) - 1),
+        lambda z: np.where(z <= 1, 1.0, 1 / np.sqrt(np.maximum(z, 1.0))),
+    ),
+    "cauchy": (np.log1p, lambda z: 1 / (1 + z)),
+    "arctan": (np.arctan, lambda z: 1 / (1 + z**2)),
+}
+"""Loss of a squared residual, and its derivative, by name."""
 
 
 def cost(loss: Loss, residuals: Array) -> float:
-    """Half the sum of the losses: what a fit makes smallest. ValueError for an unknown loss."""
-    z = residuals**2
-    match loss:
-        case "linear":
-            rho = z
-        case "soft_l1":
-            rho = 2 * (np.sqrt(1 + z) - 1)
-        case "huber":
-            rho = np.where(z <= 1, z, 2 * np.sqrt(z) - 1)
-        case "cauchy":
-            rho = np.log1p(z)
-        case "arctan":
-            rho = np.arctan(z)
-        case _:
-            raise ValueError(f"no loss is called {loss!r}")
-    return 0.5 * float(np.sum(rho))
+    """Half the sum of the losses: what a fit makes smallest."""
+    return 0.5 * float(np.sum(CURVES[loss][0](residuals**2)))
 
 
 def weights(loss: Loss, residuals: Array) -> Array:
     """Derivative of each loss by its squared residual, 1 where that counts in full; shape (n,)."""
-    z = residuals**2
-    match loss:
-        case "linear":
-            return np.ones_like(z)
-        case "soft_l1":
-            return np.asarray(1 / np.sqrt(1 + z))
-        case "huber":
-            return np.where(z <= 1, 1.0, 1 / np.sqrt(np.maximum(z, 1.0)))
-        case "cauchy":
-            return 1 / (1 + z)
-        case "arctan":
-            return 1 / (1 + z**2)
-        case _:
-            raise ValueError(f"no loss is called {loss!r}")
+    return np.asarray(CURVES[loss][1](residuals**2))

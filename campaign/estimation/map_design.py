@@ -19,11 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.stribeck import PARAMETERS, stribeck
-
-Array = NDArray[np.float64]
 
 COUNTED = {"static_torque": 2.0, "stribeck_velocity": 2.0}
 """How often the variance of a parameter counts; the others once."""

@@ -9,20 +9,18 @@ Each fit is `scipy.optimize.least_squares`: trust region reflective, between bou
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, Flags
 from campaign.estimate import Estimate
 from campaign.estimation.linear_uncertainty import Uncertainty, estimate_of, uncertainty
 from campaign.estimation.losses import Loss, cost
 from campaign.estimation.objective import Objective
 from campaign.estimation.unknowns import Unknown, values_at
 
-Array = NDArray[np.float64]
 AGREE = 0.01
 """Costs of starts that found the same optimum differ by less than this share."""
 EXACT = 1e-9
@@ -150,19 +148,6 @@ class SearchResult:
         """How many starts ended as low as the best one."""
         return agreeing(self.starts, 1.0 if self.settings.stated else EXACT * self.cost_before)
 
-    @property
-    def bic(self) -> float:
-        """Bayesian information criterion; lower is better.
-
-        It compares models of the same data, fitted with the same settings: the cost is minus the
-        logarithm of a likelihood whose deviations were stated, or else follow from the residuals.
-        """
-        n, k = len(self.residuals), len(self.unknowns)
-        if self.settings.stated:
-            return 2.0 * self.cost + k * math.log(n)
-        mean_square = max(2.0 * self.cost / n, float(np.finfo(float).tiny))
-        return n * math.log(mean_square) + k * math.log(n)
-
     def estimates(self, units: Mapping[str, str]) -> dict[str, Estimate]:
         """The unknowns with their intervals, by name; `units`: SI units by name."""
         return {
@@ -218,7 +203,7 @@ def fit_from(
     phase: str = "",
     display: Display = no_display,
     lowest: Lowest | None = None,
-    used: NDArray[np.bool_] | None = None,
+    used: Flags | None = None,
 ) -> Start:
     """One fit.
 

@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.unknowns import Unknown, shares_of, values_at
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 

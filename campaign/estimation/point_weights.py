@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import BATCHES
-from campaign.estimation.least_squares import Array
 from campaign.estimation.stribeck import StribeckFit, fit_stribeck
 
 Counts = NDArray[np.signedinteger[Any]]
@@ -122,13 +122,13 @@ def between_deviation(residuals: Array, window: Array, freedom: float) -> float:
     return math.exp(float(brentq(excess, smallest, highest, xtol=1e-6)))
 
 
-def smoothed_deviation(deviation: Array, place: Array, freedom: float = BATCHES - 1) -> Array:
-    """Deviations of windows that were each estimated with `freedom`, told better by all together.
+def smoothed_deviation(deviation: Array, place: Array) -> Array:
+    """Deviations of windows, each estimated from `BATCHES` means, told better by all together.
 
-    Each has an error of its own of 1 / sqrt(2 freedom), a quarter with ten batches, and weights
-    that follow it cost coverage. Their logarithms are drawn towards a parabola over `place`, by as
-    much as their scatter about it is explained by that error alone (Smyth, "Linear models and
-    empirical Bayes methods", Stat. Appl. Genet. Mol. Biol. 3 (2004), section 6.2).
+    Each has an error of its own of 1 / sqrt(2 (BATCHES - 1)), a quarter, and weights that follow it
+    cost coverage. Their logarithms are drawn towards a parabola over `place`, by as much as their
+    scatter about it is explained by that error alone (Smyth, "Linear models and empirical Bayes
+    methods", Stat. Appl. Genet. Mol. Biol. 3 (2004), section 6.2).
 
     deviation, place: shape (n,). What is not positive is unknown, and stays.
     """
@@ -137,7 +137,7 @@ def smoothed_deviation(deviation: Array, place: Array, freedom: float = BATCHES 
     known = deviation > 0
     if int(known.sum()) < FEWEST_TO_SMOOTH:
         return deviation
-    half = 0.5 * freedom
+    half = 0.5 * (BATCHES - 1)
     logarithm = 2.0 * np.log(deviation[known]) - (float(psi(half)) - math.log(half))
     design = np.vander((place[known] - place[known].mean()) / (np.ptp(place[known]) or 1.0), 3)
     trend = design @ np.linalg.lstsq(design, logarithm, rcond=None)[0]

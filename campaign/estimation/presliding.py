@@ -16,15 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Kind, Origin
 from campaign.estimation.autocorrelated_errors import MISFIT
-from campaign.estimation.bristle_fit import (
-    Array,
-    BristleFit,
-    fit_bristles,
-    one_interface,
-    two_interfaces,
-)
+from campaign.estimation.bristle_fit import BristleFit, fit_bristles, one_interface, two_interfaces
 from campaign.estimation.gate import admitted
 from campaign.estimation.hidden_interface import Shift, hidden_shift
 from campaign.estimation.intervals import exponential, shifted_by, student, with_error

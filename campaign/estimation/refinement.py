@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.frequency_response import Response
 from campaign.estimation.servo import characteristics
 
@@ -22,7 +22,7 @@ NEAREST = 1e-3
 """Relative distance at which a frequency counts as measured already."""
 
 
-def refinement(closed: Response) -> NDArray[np.float64]:
+def refinement(closed: Response) -> Array:
     """Frequencies (Hz), rising, that a coarse sweep of a closed loop T lacks; shape (n,).
 
     `POINTS` of them, in equal ratios, around each frequency at which T falls below -3 dB, and as
@@ -52,5 +52,5 @@ def _served(frequency: float, centres: list[float]) -> bool:
     return any(abs(frequency / centre - 1.0) < 0.5 * GAIN_SHARE for centre in centres)
 
 
-def _around(centre: float, share: float) -> NDArray[np.float64]:
+def _around(centre: float, share: float) -> Array:
     return np.asarray(np.geomspace(centre * (1.0 - share), centre * (1.0 + share), POINTS))

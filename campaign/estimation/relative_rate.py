@@ -12,11 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.time_stuck import SIGMAS, count_of, noise_of
-
-Array = NDArray[np.float64]
 
 WORST_COUNT = 1.5
 """Slope that one count, wherever in a window, adds at most: times a count per window."""

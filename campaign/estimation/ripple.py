@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import BATCHES, of_series
-from campaign.estimation.least_squares import Array
+from campaign.estimation.least_squares import straight_line
 
 LEAST_PERIODS = 0.8
 """that a window must span for its own cosine and sine to be told apart from its mean."""
@@ -106,7 +107,7 @@ def harmonic(angle: Array, rate: Array, torque: Array, inertia: float, periods: 
 
     Raises ValueError for a run that spans less than `LEAST_PERIODS`.
     """
-    steady = _line(angle)
+    steady = straight_line(angle)
     travel = abs(float(steady[-1] - steady[0]))
     if periods * travel < 2.0 * math.pi * LEAST_PERIODS:
         raise ValueError("the run is too short for a ripple of that period")
@@ -136,7 +137,7 @@ def dominant_periods(angle: Array, rate: Array, torque: Array, inertia: float) -
         return None
     used = len(angle) // count * count
     parts = [np.asarray(x[:used]).reshape(count, -1).mean(axis=1) for x in (angle, rate, torque)]
-    steady, speed = _line(parts[0]), float(np.mean(rate))
+    steady, speed = straight_line(parts[0]), float(np.mean(rate))
     travel = abs(float(steady[-1] - steady[0]))
     if travel == 0.0 or speed == 0.0:
         return None
@@ -146,7 +147,7 @@ def dominant_periods(angle: Array, rate: Array, torque: Array, inertia: float) -
         return None
     steady = steady - steady.mean()
     taper = np.hanning(count)
-    rest = [(x - _line(x)) * taper for x in parts[1:]]
+    rest = [(x - straight_line(x)) * taper for x in parts[1:]]
 
     def size(periods: Array, near: Array | float) -> Array:
         # The acceleration has the frequency of what ripples, also where the wave beside it is
@@ -221,9 +222,3 @@ def ripple_of_points(
         return np.zeros_like(dry), np.zeros_like(dry), None
     share, error = ripple.mean(first, last)
     return share / (1.0 + share) * dry, np.abs(error * dry), ripple
-
-
-def _line(values: Array) -> Array:
-    """The straight line through values at even intervals, shape (n,)."""
-    place = np.linspace(-1.0, 1.0, len(values))
-    return np.asarray(values.mean() + place * (place @ values) / (place @ place))

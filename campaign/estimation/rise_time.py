@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL, student
-from campaign.estimation.least_squares import Array
+from campaign.estimation.least_squares import straight_line
 from campaign.estimation.step_response import HIGH, LOW, SCATTERS, StepCharacteristics
 from campaign.reason import Cause
 
@@ -103,8 +104,7 @@ def rise_interval(
 
 def _noise(rest: Array) -> tuple[float, float]:
     """Standard deviation about a line, and by how much more a mean scatters than of white noise."""
-    place = np.linspace(-1.0, 1.0, len(rest))
-    left = rest - np.polynomial.Polynomial.fit(place, rest, 1)(place)
+    left = rest - straight_line(rest)
     square = float(left @ left)
     if square == 0.0:
         return 0.0, 1.0

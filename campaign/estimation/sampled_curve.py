@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import (
     LEVEL,
@@ -24,8 +24,6 @@ from campaign.estimation.intervals import (
     student,
 )
 from campaign.reason import Cause
-
-Array = NDArray[np.float64]
 
 SAMPLES = "time between samples"
 """Source of the systematic part that is left of brackets once repetitions are averaged."""

@@ -7,18 +7,19 @@ them is the same in every repetition of the sweep and stands beside it, as a sys
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.continuation import DECIBEL, gain_margin_beyond
 from campaign.estimation.crossings import LevelCrossing, passings, sides
-from campaign.estimation.frequency_response import Array, ComplexArray, Response, open_loop
+from campaign.estimation.difference import difference_of
+from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.gate import admitted
-from campaign.estimation.intervals import LEVEL, shifted_by, with_error
+from campaign.estimation.intervals import shifted_by, with_error
 from campaign.estimation.local_fit import Quantity, Reading, read
 from campaign.reason import Cause, Reason
 
@@ -106,7 +107,6 @@ GAIN_AT_LAST = Cause(
     "gain at last frequency",
     "gain at {frequency:.4g} Hz less 1.645 standard errors, if it rises no more above that",
 )
-NO_INTERVAL = Cause("no interval", "one of the two has no interval")
 
 
 def _not_found(name: str, unit: str, reason: Reason) -> Estimate:
@@ -203,7 +203,7 @@ def _phase_crossovers(
     return tuple(found), _gain_bound(loop, above, gain[-1].frequency.value)
 
 
-def _gain_bound(loop: Response, above: NDArray[np.bool_], crossover: float) -> Estimate | None:
+def _gain_bound(loop: Response, above: Flags, crossover: float) -> Estimate | None:
     """-|L| where the phase was last surely above -180 deg, less 1.645 standard errors (dB).
 
     None where that is below the gain crossover.
@@ -260,36 +260,13 @@ def _value(name: str, unit: str, reading: Reading, more: float = 0.0) -> Estimat
     return admitted(shifted_by(found, INTERPOLATION, reading.value_gap))
 
 
-def change(name: str, unit: str, bare: Estimate, other: Estimate) -> Estimate | None:
+def change(name: str, bare: Estimate, other: Estimate) -> Estimate | None:
     """What `other` has more than `bare`; None where one of them is a bound or not determined.
 
-    The interval follows from both intervals, which may be lopsided: half-widths towards and away
-    from each other add in squares (Zou and Donner, Statistics in Medicine 27 (2008) 1693). They
-    are of different trials; what interpolation does to both alike is not taken off.
+    They are of different trials; what interpolation does to both alike is not taken off.
     """
     if {bare.kind, other.kind} != {"number"}:
         return None
     if Origin.NOT_DETERMINED in (bare.origin, other.origin):
         return None
-    value = other.value - bare.value
-    (low, high), (bare_low, bare_high) = other.combined, bare.combined
-    method = "difference of two sweeps, their half-widths added in squares"
-
-    def width(one: float | None, two: float | None) -> float | None:
-        if one is None or two is None:
-            return None
-        return math.hypot(other.value - one, bare.value - two)
-
-    down, up = width(low, bare_high), width(high, bare_low)
-    if down is None and up is None:
-        reason = other.reason or bare.reason or NO_INTERVAL()
-        return Estimate.without_interval(name, value, unit, reason, method=method)
-    return Estimate(
-        name,
-        value,
-        unit,
-        None if down is None else value - down,
-        None if up is None else value + up,
-        LEVEL,
-        method,
-    )
+    return replace(difference_of(bare, other).difference, name=name)

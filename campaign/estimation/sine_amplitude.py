@@ -5,13 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import with_error
 from campaign.reason import Cause
 
-Array = NDArray[np.float64]
 LEAST_SAMPLES = 4
 """in a cycle, to tell sine, cosine and mean with something left over."""
 TOO_FEW_CYCLES = Cause(

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import student
-
-Array = NDArray[np.float64]
 
 HARMONICS = 9
 """fitted beside the fundamental, as far as the sampling shows them: friction makes odd ones."""

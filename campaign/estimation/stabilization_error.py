@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.estimation.intervals import (
     exponential,
@@ -25,9 +26,7 @@ from campaign.estimation.intervals import (
 from campaign.estimation.sampled_curve import LOST
 from campaign.reason import Cause, Reason
 
-Array = NDArray[np.float64]
-
-NAME = "stabilization_error"
+NAME, UNIT = "stabilization_error", "rad"
 ALIKE = 1e-5
 """Relative standard error below which nothing scatters: a simulation without noise, whose own error
 is of that size."""
@@ -50,7 +49,7 @@ MEMORY = 4.0
 """Least length of a block, in correlation times of the squared deviation."""
 
 
-def over_cycles(samples: Array, per_cycle: float, name: str = NAME, unit: str = "rad") -> Estimate:
+def over_cycles(samples: Array, per_cycle: float) -> Estimate:
     """Standard deviation over whole cycles; t over half cycles, in the logarithm.
 
     With the mean squares m of n half cycles about the common mean, ln s has the standard error
@@ -65,9 +64,9 @@ def over_cycles(samples: Array, per_cycle: float, name: str = NAME, unit: str = 
     whole = whole_cycles(len(samples), per_cycle)
     used = samples[: round(whole * per_cycle)] if whole else samples
     if not whole:
-        return _without(used, name, unit, SHORT())
+        return _without(used, NAME, UNIT, SHORT())
     edges = np.round(np.linspace(0, len(used), 2 * whole + 1)).astype(int)
-    return _of_parts(used, edges, name, unit, "half cycles")
+    return _of_parts(used, edges, NAME, UNIT, "half cycles")
 
 
 def whole_cycles(samples: int, per_cycle: float) -> int:
@@ -78,23 +77,21 @@ def whole_cycles(samples: int, per_cycle: float) -> int:
     return int((samples + 1) / per_cycle)
 
 
-def over_blocks(
-    samples: Array, name: str = NAME, unit: str = "rad", blocks: int = BLOCKS
-) -> Estimate:
+def over_blocks(samples: Array, name: str = NAME, unit: str = UNIT) -> Estimate:
     """Standard deviation of an irregular record, shape (k,); t over blocks, in the logarithm.
 
     Holds for any stretch of a motion like this one; of narrow-band noise with six periods in a
     block 91 % are covered. No interval where a block is shorter than
     `MEMORY` correlation times of the squared deviation: then neighbours know of each other.
     """
-    if len(samples) < 2 * blocks or not np.all(np.isfinite(samples)):
-        return _without(samples, name, unit, TOO_FEW_FOR_BLOCKS(blocks=blocks))
-    block = len(samples) / blocks
+    if len(samples) < 2 * BLOCKS or not np.all(np.isfinite(samples)):
+        return _without(samples, name, unit, TOO_FEW_FOR_BLOCKS(blocks=BLOCKS))
+    block = len(samples) / BLOCKS
     memory = correlation_time((samples - np.mean(samples)) ** 2, int(block))
     if block < MEMORY * memory:
         reason = SHORT_BLOCK(times=block / memory)
         return _without(samples, name, unit, reason)
-    edges = np.round(np.linspace(0, len(samples), blocks + 1)).astype(int)
+    edges = np.round(np.linspace(0, len(samples), BLOCKS + 1)).astype(int)
     return _of_parts(samples, edges, name, unit, "blocks")
 
 

@@ -15,12 +15,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import BATCHES, student
 from campaign.estimation.relative_rate import RelativeRate, resolved_rate
 from campaign.estimation.time_stuck import SIGMAS, count_of
 from campaign.reason import NONE, Cause, Reason
-
-Array = NDArray[np.float64]
 
 VARIES = 0.1
 """Share of its mean by which the rate may vary in a window (1 sigma): 1 % of Ts - Tc at most."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import of_series
-from campaign.estimation.least_squares import Array
+from campaign.estimation.intervals import BATCHES, of_series, with_error
 from campaign.estimation.ripple import LEAST_PERIODS, harmonics_of
 from campaign.estimation.steadiness import drifting, seen_rate, torque_drift, unsteady
 from campaign.reason import NONE, Reason
@@ -111,19 +111,8 @@ def steady_sliding(
         told = Estimate.without_interval("friction_torque", mean, "N m", of_torque.reason)
         return SteadySliding(of_rate, told, spread, slope, 1.0, first, last, *judged)
     both = math.hypot(error, (inertia or 0.0) * of_slope)
-    wide = (of_torque.high or 0.0) - of_torque.value
-    half = wide * both / error if error > 0 else 0.0
-    told = Estimate(
-        "friction_torque",
-        mean,
-        "N m",
-        mean - half,
-        mean + half,
-        of_torque.level,
-        METHOD if inertia is not None else WITHOUT_INERTIA,
-        standard_error=both,
-        freedom=of_torque.freedom,
-    )
+    method = METHOD if inertia is not None else WITHOUT_INERTIA
+    told = with_error("friction_torque", mean, "N m", both, BATCHES - 1, method)
     effective = (float(np.std(noise)) / both) ** 2 if both > 0 else float(len(time))
     return SteadySliding(of_rate, told, spread, slope, effective, first, last, *judged)
 

@@ -7,12 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.least_squares import Array
+from campaign.arrays import Array, Flags
+from campaign.estimation.least_squares import straight_line
 from campaign.reason import Cause, Reason
-
-Flags = NDArray[np.bool_]
 
 FINAL_SHARE = 0.2
 """Last part of the recording over which the steady state is averaged."""
@@ -179,9 +177,7 @@ MOST_LINE = 10
 
 def _scatter(samples: Array) -> float:
     """Standard deviation about a line."""
-    place = np.linspace(-1.0, 1.0, len(samples))
-    left = samples - np.mean(samples)
-    left = left - place * (float(place @ left) / float(place @ place))
+    left = samples - straight_line(samples)
     return math.sqrt(float(left @ left) / (len(samples) - 2))
 
 

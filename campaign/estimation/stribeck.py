@@ -13,13 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.least_squares import (
-    Array,
-    Minimum,
-    covariance,
-    minimum,
-    refuse_too_few,
-)
+from campaign.arrays import Array
+from campaign.estimation.least_squares import Minimum, covariance, minimum, refuse_too_few
 
 PARAMETERS = (
     "viscous_friction",

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Systematic
 from campaign.estimation.intervals import LEVEL
 from campaign.reason import Cause, Reason
-
-Array = NDArray[np.float64]
 
 BEYOND_WITHOUT_CHANGE = Cause(
     "beyond without change", "the error is beyond the threshold without any change"

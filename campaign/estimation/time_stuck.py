@@ -12,13 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Systematic
 from campaign.estimation.intervals import of_repeats
 from campaign.reason import Cause
-
-Array = NDArray[np.float64]
 
 NAME = "time_stuck"
 THRESHOLD = 0.001

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array, Flags
 
 BINS = 250
 """of a ramp: each shows a small part of the curve, and knows little of its neighbour's noise."""
@@ -53,9 +52,9 @@ class Ramp:
             rate=self.rate[:count],
         )
 
-    def used(self, first: float) -> NDArray[np.bool_]:
+    def used(self, first: float) -> Flags:
         """Which bins are fitted, shape (n,): those at rest, and those from `first` (N m) on."""
-        used: NDArray[np.bool_] = self.torque[:-1] >= first
+        used: Flags = self.torque[:-1] >= first
         used[: self.resting] = True
         return used
 

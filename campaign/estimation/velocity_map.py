@@ -25,11 +25,16 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
-from campaign.estimation.extrapolation import extrapolated
 from campaign.estimation.gate import USELESS, admitted, mattering, refused
 from campaign.estimation.intervals import shifted_by, student, with_error
-from campaign.estimation.least_squares import Array, profile_limit, refuse_too_few
+from campaign.estimation.least_squares import (
+    gradients,
+    profile_limit,
+    propagated,
+    refuse_too_few,
+)
 from campaign.estimation.point_weights import (
     Scatter,
     fit_with_scatter,
@@ -66,6 +71,14 @@ TINY = 1e-300
 """In place of zero, where something is divided by it."""
 LACKING = 0.05
 """p-value below which a model does not describe the points, or the repeated points."""
+FEWEST_BELOW = 3
+"""speeds below vs, for Ts not to be extrapolated."""
+FAR = 3.0
+"""times vs, where a twentieth of the fall from Ts is left (delta = 1): without a speed beyond that
+Tc is extrapolated."""
+EXTRAPOLATED = Cause("extrapolated", "{symbol} is extrapolated: {why}")
+FEW_BELOW = Cause("too few speeds below vs", "{counted} below vs")
+NONE_ABOVE = Cause("no speed far above vs", "no speed is above {times:g} times vs")
 HELD_EXPONENT = Cause("held", "held at {value:g}")
 LEFT_OPEN = Cause("left open by points", "these points leave it open")
 NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effect")
@@ -169,6 +182,23 @@ class DirectionFit:
         if model == "none" or self.shows_stribeck_effect or name not in line.free:
             return 0.0
         return abs(self.fits[model].values[name] - line.values[name]) / math.sqrt(3.0)
+
+
+def extrapolated(parameter: str, speed: Array, velocity: float) -> Reason:
+    """Why a parameter is extrapolated; none where it is not.
+
+    speed: of the points (rad/s), shape (n,); velocity: the Stribeck velocity (rad/s).
+    """
+    below = int(np.sum(speed < velocity))
+    if parameter == "static_torque" and below < FEWEST_BELOW:
+        return EXTRAPOLATED(symbol="Ts", why=FEW_BELOW(counted=_speeds(below), speeds=below))
+    if parameter == "coulomb_torque" and not np.any(speed > FAR * velocity):
+        return EXTRAPOLATED(symbol="Tc", why=NONE_ABOVE(times=FAR))
+    return NONE
+
+
+def _speeds(count: int) -> str:
+    return "1 speed is" if count == 1 else f"{count or 'no'} speeds are"
 
 
 def fit_direction(
@@ -361,17 +391,13 @@ def shifts(found: StribeckFit, torque_shift: Array) -> dict[str, float]:
 def band(fit: DirectionFit, model: Model, speed: Array) -> Array:
     """Half-width of the 95 % band of the fitted curve (N m) at `speed` (rad/s), shape (m,)."""
     found = fit.fits[model]
-    columns = np.array([_slope(found, name, speed) for name in found.free])
-    variance = np.einsum("km,kl,lm->m", columns, found.covariance, columns)
-    return np.asarray(student(fit.freedom) * np.sqrt(np.maximum(variance, 0.0)))
+    point = np.array([found.values[name] for name in found.free])
 
+    def torque(values: Array) -> Array:
+        return stribeck(speed, {**found.values, **dict(zip(found.free, values, strict=True))})
 
-def _slope(found: StribeckFit, name: str, speed: Array) -> Array:
-    """Derivative of the torque by a parameter, by central differences; shape (m,)."""
-    value = found.values[name]
-    step = 1e-5 * (abs(value) or 1.0)
-    up, down = ({**found.values, name: value + s} for s in (step, -step))
-    return np.asarray((stribeck(speed, up) - stribeck(speed, down)) / (2.0 * step))
+    by = gradients(torque, point, 1e-5 * np.where(point != 0.0, np.abs(point), 1.0))
+    return np.asarray(student(fit.freedom) * propagated(by, found.covariance))
 
 
 def doubts(fit: DirectionFit) -> Iterator[str]:

@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array, Flags
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.inverse.motion import Array
 from campaign.estimation.inverse.regression import (
     Piece,
     Regression,
@@ -65,7 +64,7 @@ class ModelFit:
     values: Values
     residuals: tuple[Array, ...]
     regression: Regression | None
-    free: NDArray[np.bool_]
+    free: Flags
 
     @property
     def correlation(self) -> dict[tuple[str, str], float]:
@@ -86,7 +85,6 @@ def fit_model(
     residuals: Residuals,
     *,
     starts: int = 3,
-    seed: int = 1,
     display: Display = no_display,
 ) -> ModelFit:
     """Fit from several starts, and say how sure each unknown is.
@@ -99,7 +97,7 @@ def fit_model(
     Raises KeyboardInterrupt where it is interrupted: half a fit is none.
     """
     objective = _objective(unknowns, residuals)
-    settings = Settings(starts=starts, seed=seed, stated=False, tolerance=1e-6)
+    settings = Settings(starts=starts, stated=False, tolerance=1e-6)
     found = search(objective, settings, display)
     if found.interrupted or found.jacobian is None or found.uncertainty is None:
         raise KeyboardInterrupt
@@ -137,28 +135,26 @@ def moved_with(fit: ModelFit, name: str, shift: float) -> dict[str, float]:
     return {unknowns[i].name: float(each) for i, each in zip(others, moved, strict=True)}
 
 
-def refitted(unknowns: Sequence[Unknown], residuals: Residuals, begin: Array) -> Values:
-    """Values (SI) of a further fit to other residuals, from the shares `begin`."""
+def refitted(
+    unknowns: Sequence[Unknown], residuals: Residuals, begin: Array, used: Flags | None = None
+) -> Values:
+    """Values (SI) of a further fit to other residuals, or to some, from the shares `begin`."""
     settings = Settings(starts=1, stated=False, tolerance=1e-6)
-    end = fit_from(_objective(unknowns, residuals), begin, settings)
-    return tuple(values_at(unknowns, end.end))
+    end = fit_from(_objective(unknowns, residuals), begin, settings, used=used)
+    return values_at(unknowns, end.end)
 
 
 def held_out(
     unknowns: Sequence[Unknown],
     residuals: Residuals,
     begin: Array,
-    left_out: Sequence[NDArray[np.bool_]],
+    left_out: Sequence[Flags],
 ) -> tuple[Array, ...]:
     """Residuals of rows that a further fit, from the shares `begin`, did not see.
 
     left_out: for each recording, shape (n,).
     """
-    objective = _objective(unknowns, residuals)
-    unseen = np.concatenate(left_out)
-    settings = Settings(starts=1, stated=False, tolerance=1e-6)
-    end = fit_from(objective, begin, settings, used=~unseen)
-    found = residuals(tuple(values_at(unknowns, end.end)))
+    found = residuals(refitted(unknowns, residuals, begin, ~np.concatenate(left_out)))
     return tuple(own[mask] for own, mask in zip(found, left_out, strict=True))
 
 
@@ -184,7 +180,7 @@ def _estimate(
     index: int,
     found: SearchResult,
     regression: Regression | None,
-    free: NDArray[np.bool_],
+    free: Flags,
     left_open: bool,
 ) -> Estimate:
     name, share = unknown.name, float(found.shares[index])

@@ -7,8 +7,8 @@ from itertools import combinations
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Section
-from campaign.identify.tables import parameter_text
-from campaign.text import words
+from campaign.identify.tables import parameter_text, parameter_unit, parameter_words
+from campaign.text import pretty_unit
 
 SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
 """Names of one method for what others call so."""
@@ -35,7 +35,7 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
             if name.split("_")[0] in COMPARED and measured:
                 at_one = f"{name.split('_')[0]}{OVER_TEMPERATURE}" in names
                 found.setdefault((name, at_one), []).append(
-                    (section.model.name, each.estimate, each.display)
+                    (section.model.name, each.estimate, parameter_unit(section, each.estimate))
                 )
     for (name, _), several in found.items():
         pairs = [(_gap(one[1], other[1]), one, other) for one, other in combinations(several, 2)]
@@ -43,8 +43,9 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
         if gap <= 0 or one is None or other is None:
             continue
         yield (
-            f"Methods disagree about {words(name)}: {one[0]} finds "
-            f"{parameter_text(one[1], one[2])}, {other[0]} {parameter_text(other[1], other[2])}. "
+            f"Methods disagree about {parameter_words(name)}: {one[0]} finds "
+            f"{parameter_text(*one[1:])} {pretty_unit(one[2])}, {other[0]} "
+            f"{parameter_text(*other[1:])} {pretty_unit(other[2])}. "
             "At least one model lacks something of this rig (look at what is left over), or the "
             "motion confuses place with direction: slide over the same travel in both."
         )

@@ -9,9 +9,13 @@ from campaign import __version__
 from campaign.axis_kind import axis_terms, axis_unit
 from campaign.errors import CampaignError
 from campaign.estimate import Estimate
-from campaign.identify.compensations import identified_compensations, without_identified
+from campaign.identify.compensations import (
+    amount,
+    identified_compensations,
+    known_of,
+    without_identified,
+)
 from campaign.identify.identification import Identification, Section
-from campaign.identify.toml_numbers import amount, known_of
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.physics.friction import coulomb, friction_models

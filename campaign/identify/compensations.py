@@ -22,11 +22,12 @@ from typing import Any
 
 from campaign.estimate import Estimate, Origin
 from campaign.identify.identification import Identification, Section
-from campaign.identify.toml_numbers import amount, known_of
 from campaign.parameter import Parameter
 from campaign.physics.compensation.identified import ENDING, identified_name, stated_name
 from campaign.physics.loop import at_load
 
+DIGITS = 6
+"""of a number in a bench file."""
 WEAKER = "weaker"
 """What the interface is called that stands for all which slip before the strongest."""
 TORQUES = ("coulomb_torque", "static_torque")
@@ -255,3 +256,17 @@ def _around(one: Estimate, value: float, half: float) -> Estimate:
     return replace(
         one, value=value, low=value - half, high=value + half, standard_error=None, systematic=()
     )
+
+
+def amount(value: float, unit: str) -> Any:
+    """With its unit; a number where it has none."""
+    return f"{value:.{DIGITS}g} {unit}" if unit else float(f"{value:.{DIGITS}g}")
+
+
+def known_of(estimate: Estimate) -> dict[str, Any]:
+    """Its entry in `known.values`."""
+    low, high = estimate.combined
+    if low is None or high is None:
+        return {"origin": "measured"}
+    ends = [amount(end, estimate.unit) for end in (low, high)]
+    return {"interval": ends, "origin": "measured"}

@@ -15,7 +15,7 @@ from campaign.api.estimates import row_of
 from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.identify.agreement import disagreements
 from campaign.identify.identification import Identification, Section, widest
-from campaign.identify.tables import changes_table, parameters_table
+from campaign.identify.tables import changes_table, parameter_words, parameters_table
 from campaign.parameter import Parameter
 from campaign.report.article import write_article
 from campaign.report.drawing.figures import series_of
@@ -24,7 +24,6 @@ from campaign.report.page.article import Article, PageParts, Part, problems_part
 from campaign.report.page.pieces import Items, Paragraph, Piece
 from campaign.report.palette import Look, looks_of_page
 from campaign.result import Result
-from campaign.text import words
 
 CURES = {
     "window": "it depends on how far a ramp is fitted; record the angle more finely",
@@ -143,7 +142,8 @@ def _advice(parameter: Parameter) -> str:
     if estimate.low is not None and estimate.high is not None:
         scatter = 0.5 * (estimate.high - estimate.low)
     share = abs(estimate.half_width / estimate.value)
-    begin = f"The widest interval is that of {words(estimate.name)}: ± {100 * share:.2g} % of it."
+    name = parameter_words(estimate.name)
+    begin = f"The widest interval is that of {name}: ± {100 * share:.2g} % of it."
     parts = [part for part in estimate.systematic if part.standard_uncertainty]
     parts.sort(key=lambda part: -(part.standard_uncertainty or 0.0))
     if parts and 2.0 * estimate.systematic_uncertainty > scatter:

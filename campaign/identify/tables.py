@@ -3,34 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
+from campaign.api.quantity_words import unit_in_tables
 from campaign.axis_kind import in_axis_terms
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.identify.identification import Section
+from campaign.parameter import Parameter
 from campaign.references.verdict import JudgedNumber
 from campaign.result import Cell, Column, Table
-from campaign.text import interval, number, pretty_unit, words
-from campaign.units import convert
+from campaign.text import QUANTITIES, interval, number, pretty_unit, quantity_words, words
 
 BOUNDS = {"at least": "≥", "at most": "≤"}
 
 
+def parameter_words(name: str) -> str:
+    """What a report calls it: `coulomb_torque_negative` as `Coulomb friction Tc (negative)`."""
+    whole = next((key for key in QUANTITIES if name.startswith(f"{key}_")), name)
+    rest = words(name.removeprefix(whole).removeprefix("_"))
+    return f"{quantity_words(whole)} ({rest})" if rest else quantity_words(name)
+
+
+def parameter_unit(section: Section, estimate: Estimate) -> str:
+    """The unit in which a report shows a parameter of a section."""
+    name, unit = estimate.name, estimate.unit
+    own = (each.display for each in section.identified.parameters if each.estimate.name == name)
+    tables = section.result.tables if section.result is not None else ()
+    return next(own, "") or unit_in_tables(tables, name, estimate.value, unit)
+
+
 def parameters_table(sections: Sequence[Section]) -> Table:
     """Every parameter of every method, each in its own unit."""
-    rows: list[Mapping[str, Cell]] = [
-        {
-            "parameter": words(parameter.estimate.name),
-            "value": parameter_text(parameter.estimate, parameter.display),
-            "unit": pretty_unit(parameter.display or parameter.estimate.unit),
-            "origin": parameter.estimate.origin.value,
-            "systematic": systematic(parameter.estimate, parameter.display),
-            "meaning": parameter.meaning,
-            "bench": parameter.bench,
-            "method": section.model.name,
-            "reason": str(parameter.estimate.reason),
-        }
+    rows = [
+        _parameter_row(section, parameter)
         for section in sections
         for parameter in section.identified.parameters
     ]
@@ -52,9 +58,26 @@ def parameters_table(sections: Sequence[Section]) -> Table:
     return Table("parameters", "Parameters", columns, tuple(rows), note=note)
 
 
+def _parameter_row(section: Section, parameter: Parameter) -> Mapping[str, Cell]:
+    estimate, unit = parameter.estimate, parameter_unit(section, parameter.estimate)
+    return {
+        "parameter": parameter_words(estimate.name),
+        "value": parameter_text(estimate, unit),
+        "unit": pretty_unit(unit),
+        "origin": estimate.origin.value,
+        "systematic": systematic(estimate, unit),
+        "meaning": parameter.meaning,
+        "bench": parameter.bench,
+        "method": section.model.name,
+        "reason": str(estimate.reason),
+    }
+
+
 def changes_table(before: str, after: str, section: Section) -> Table:
     """A method's parameters of both runs, which have these names."""
-    rows = tuple(_change_row(each) for each in section.changes)
+    rows = tuple(
+        _change_row(each, parameter_unit(section, each.reference)) for each in section.changes
+    )
     columns = (
         Column("parameter", "Parameter"),
         Column("unit", "Unit"),
@@ -74,47 +97,38 @@ def changes_table(before: str, after: str, section: Section) -> Table:
     )  # fmt: skip
 
 
-def _change_row(change: JudgedNumber) -> Mapping[str, Cell]:
+def _change_row(change: JudgedNumber, unit: str) -> Mapping[str, Cell]:
     p = change.adjusted
     return {
-        "parameter": words(change.quantity),
-        "unit": pretty_unit(change.reference.unit),
-        "before": parameter_text(change.reference),
-        "after": parameter_text(change.other),
-        "change": parameter_text(change.found.difference),
+        "parameter": parameter_words(change.quantity),
+        "unit": pretty_unit(unit),
+        "before": parameter_text(change.reference, unit),
+        "after": parameter_text(change.other, unit),
+        "change": parameter_text(change.found.difference, unit),
         "p": "" if p is None else f"{p:.2g}",
         "verdict": change.outcome,
     }
 
 
-def parameter_text(estimate: Estimate, display: str = "") -> str:
-    """`20.14 ± 0.41`; a bound, or that it is not determined."""
+def parameter_text(estimate: Estimate, unit: str) -> str:
+    """`20.14 ± 0.41` in a unit; a bound, or that it is not determined."""
     if estimate.origin is Origin.NOT_DETERMINED:
         return "not determined"
-    low, high = estimate.combined
-
-    def shown(size: float | None) -> Any:
-        if size is None or not display:
-            return size
-        return float(convert(size, estimate.unit, display))
-
+    shown = in_unit(estimate, unit)
+    low, high = shown.combined
     if estimate.kind in BOUNDS:
-        return f"{BOUNDS[estimate.kind]} {number(shown(high if low is None else low), 3)}"
-    text = interval(shown(estimate.value), shown(low), shown(high))
+        end = next(end for end in (low, high) if end is not None)
+        return f"{BOUNDS[estimate.kind]} {number(end, 3)}"
+    text = interval(shown.value, low, high)
     if low is None and high is None:
         return f"{text} (no interval: {estimate.reason})" if estimate.reason else text
     return text
 
 
-def systematic(estimate: Estimate, display: str = "") -> str:
+def systematic(estimate: Estimate, unit: str) -> str:
     """`low-pass 0.03, delay 0.2`, in the unit that the estimate is shown in."""
-
-    def shown(size: float | None) -> str:
-        if size is None:
-            return "unknown"
-        return f"{float(convert(size, estimate.unit, display)) if display else size:.2g}"
-
     return ", ".join(
-        f"{in_axis_terms(part.source)} {shown(part.standard_uncertainty)}"
-        for part in estimate.systematic
+        f"{in_axis_terms(part.source)} "
+        + ("unknown" if (size := part.standard_uncertainty) is None else f"{size:.2g}")
+        for part in in_unit(estimate, unit).systematic
     )

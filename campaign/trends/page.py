@@ -12,7 +12,7 @@ from campaign.api.estimates import row_of
 from campaign.axis_kind import axis_terms, in_axis_terms
 from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
-from campaign.estimation.trends.family import POWER
+from campaign.estimation.trends.changes import POWER
 from campaign.report.article import write_article
 from campaign.report.content.tables import table_csv
 from campaign.report.formats.interface import Format

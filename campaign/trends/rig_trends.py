@@ -17,10 +17,9 @@ from campaign.channels import TEMPERATURE
 from campaign.comparison.circumstances import Change as Circumstance
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
-from campaign.estimation.family import RATE, adjusted
+from campaign.estimation.family import RATE, adjusted, level_of
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.trends.changes import Change, Jump, change, jumps_of
-from campaign.estimation.trends.family import detectable, level_of
+from campaign.estimation.trends.changes import Change, Jump, change, detectable, jumps_of
 from campaign.estimation.trends.scatter import Mixture
 from campaign.experiments.interface import Experiment
 from campaign.reason import NONE, Cause, Reason

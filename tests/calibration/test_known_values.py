@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.calibration.known_values import known_entries
+from campaign.calibration.document import known_entries
 from campaign.calibration.objective import Evaluation
 from campaign.calibration.outcome import CalibrationOutcome
 from campaign.estimation.linear_uncertainty import Uncertainty

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.physics.true_values import DIRECTIONS, stribeck_parameters
 from campaign.physics.variation import of_its_day
 from campaign.result import Finding
@@ -25,7 +25,6 @@ NAMES = (
     "stribeck_velocity",
     "stribeck_exponent",
 )
-Array = NDArray[np.float64]
 
 
 def bound_of(run: Run, finding: Finding) -> float | None:

@@ -8,8 +8,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.stribeck import fit_stribeck, stribeck
 from campaign.experiments import experiments
 from campaign.experiments.friction_map.curves import Curves, fit_map
@@ -26,8 +26,6 @@ from campaign.result import Finding
 from campaign.trial import Task, Tree, Trial, canonical_json
 from tests.coverage.benches import Case, make_case
 from tests.coverage.laboratory import Run, plan
-
-Array = NDArray[np.float64]
 
 IN_TORQUE = frozenset(
     {

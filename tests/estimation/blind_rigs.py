@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
+
 Draw = np.random.Generator
 
 RATE = 1000.0

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
+
 Torque = Callable[[Array], Array]
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from campaign.arrays import Array
 from campaign.estimation.frequency_response import Response
 
-Array = np.ndarray
 Transfer = Callable[[Array], Array]
 """Of s (1/s)."""
 

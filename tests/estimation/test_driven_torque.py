@@ -29,7 +29,7 @@ DRIVE, BACK_EMF = 0.01, 60.0
 LINES = 0.375 * np.arange(1, 40, 2)
 NOISE = 0.12
 """of the torque's sensor (N m); the torque itself is of 0.5 N m rms."""
-TRUTH = {"bristle_stiffness": STIFFNESS, "bristle_damping": DAMPING, "inertia": INERTIA}
+TRUTH = {"bristle_stiffness": STIFFNESS, "damping": DAMPING, "inertia": INERTIA}
 
 
 class Command:

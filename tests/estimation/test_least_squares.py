@@ -7,12 +7,15 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.estimation.least_squares import (
-    Array,
     covariance,
+    gradients,
     minimum,
     profile_limit,
+    propagated,
     refuse_too_few,
+    straight_line,
 )
 
 # The Jacobian itself
@@ -169,3 +172,22 @@ def test_a_profile_of_a_parabola_ends_where_it_has_risen() -> None:
     assert far == pytest.approx(1.0 + 6e4, rel=1e-5)
     with pytest.raises(ValueError, match="no limit on that side"):
         profile_limit(lambda x: 0.0 * x, 1.0, 0.1, 9.0)
+
+
+def test_derivatives_and_deviations_of_a_product_and_a_quotient() -> None:
+    """Of a b and a / b at a = 2, b = 4, with deviations 0.1 and 0.2 and a covariance of 0.01."""
+
+    def numbers(point: Array) -> Array:
+        return np.array([point[0] * point[1], point[0] / point[1]])
+
+    by = gradients(numbers, np.array([2.0, 4.0]), np.array([1e-4, 1e-3]))
+    assert by == pytest.approx(np.array([[4.0, 2.0], [0.25, -0.125]]), rel=1e-6)
+    covariance_ = np.array([[0.01, 0.01], [0.01, 0.04]])
+    expected = np.sqrt([0.16 + 0.16 + 0.16, 0.000625 + 0.000625 - 0.000625])
+    assert propagated(by, covariance_) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_straight_line_is_that_of_a_regression() -> None:
+    values = np.array([1.0, 3.0, 2.0, 7.0, 5.0])
+    fitted = np.polyval(np.polyfit(np.arange(5.0), values, 1), np.arange(5.0))
+    assert straight_line(values) == pytest.approx(fitted)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from campaign.arrays import Array
 from campaign.estimate import Origin
 from campaign.estimation.intervals import NO_FREEDOM
 from campaign.estimation.linear_uncertainty import (
     NO_LIMIT,
     NOT_DETERMINED,
-    Array,
     Uncertainty,
     estimate_of,
     strong,

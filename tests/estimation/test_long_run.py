@@ -2,37 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from campaign.estimation.presliding_dynamics.long_run import bandwidth, long_run_covariance
+from campaign.estimation.long_run import bandwidth, long_run
 from campaign.estimation.presliding_dynamics.record import Record
+from tests.estimation.coverage import autoregressive
 
 STEP = 0.005
 
 
-def test_the_covariance_of_a_sum_is_that_of_the_weighted_lags() -> None:
-    series = np.cumsum(np.random.default_rng(3).standard_normal((300, 3)), axis=0)
-    for width in (1.0, 7.3, 40.0):
-        expected = series.T @ series
-        for lag in range(1, 300):
-            product = series[lag:].T @ series[:-lag]
-            expected += max(0.0, 1.0 - lag / width) * (product + product.T)
-        (found,) = long_run_covariance(series, width)
-        assert found == pytest.approx(expected, rel=1e-9)
+def test_the_bandwidth_is_that_of_andrews_for_an_autoregression() -> None:
+    """1.1447 (a n)^(1/3) with a = 4 r^2 / ((1 - r)^2 (1 + r)^2) for one column."""
+    draw = np.random.default_rng(2)
+    n, r = 100_000, 0.5
+    series = autoregressive(draw, n, r)
+    expected = 1.1447 * (4 * r**2 / ((1 - r) ** 2 * (1 + r) ** 2) * n) ** (1 / 3)
+    assert bandwidth([series[:, None]]) == pytest.approx(expected, rel=0.03)
 
 
-def test_the_bandwidth_follows_the_correlation() -> None:
-    rng = np.random.default_rng(1)
-    white = rng.standard_normal((2000, 1))
-    coloured = lfilter([1.0], [1.0, -0.8], white, axis=0)
-    # Andrews (1991), equation 6.4, by hand for a coefficient of 0.8.
-    by_hand = 1.1447 * (4.0 * 0.64 / (0.2 * 1.8) ** 2 * 2000) ** (1.0 / 3.0)
-    assert bandwidth(coloured) == pytest.approx(by_hand, rel=0.15)
-    assert bandwidth(white) < 0.3 * bandwidth(coloured)
+@pytest.mark.parametrize("lags", [0.5, 1.0, 1.4, 2.0, 7.3, 60.0, 133.7])
+def test_sums_over_windows_are_bartletts_weights(lags: float) -> None:
+    random = np.random.default_rng(2)
+    scores = [random.standard_normal((count, 3)).cumsum(axis=0) for count in (500, 90, 300)]
+    expected = sum((each.T @ each for each in scores), np.zeros((3, 3)))
+    for lag in range(1, math.ceil(lags)):
+        for each in scores:
+            across = each[lag:].T @ each[:-lag]
+            expected = expected + (1.0 - lag / lags) * (across + across.T)
+    np.testing.assert_allclose(long_run(scores, lags), expected, rtol=1e-9)
 
 
 def test_a_quantised_channel_errs_alike_in_each_period_of_the_torque() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from campaign.arrays import Array
 from campaign.estimation.both_directions import correlation, cross_covariance, fitted_nominal
 from campaign.estimation.ripple import harmonic, ripple_of_points, window_noise
 from campaign.estimation.steady_sliding import steady_sliding
@@ -27,7 +28,6 @@ from tests.estimation.coverage import holds, rejected
 
 MANY = pytest.mark.statistics
 Random = np.random.Generator
-Array = np.ndarray
 TRUE = dict(zip(PARAMETERS, (3.87, 25.3, 32.7, 0.0271, 0.96), strict=True))
 SPEED = np.deg2rad(np.geomspace(0.05, 65.0, 16))
 EXACT = stribeck(SPEED, TRUE)

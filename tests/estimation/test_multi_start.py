@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from campaign.arrays import Array
 from campaign.estimate import Origin
 from campaign.estimation.intervals import NO_FREEDOM
 from campaign.estimation.linear_uncertainty import INTERRUPTED, NOT_DETERMINED
 from campaign.estimation.losses import cost
 from campaign.estimation.multi_start import (
-    Array,
     Progress,
     SearchResult,
     Settings,
@@ -66,23 +66,6 @@ def test_a_straight_line_is_that_of_the_normal_equations() -> None:
         assert told[name].half_width == pytest.approx(2.7764451 * error, rel=1e-6)  # t(4)
         assert told[name].freedom == 4
     assert told["slope"].unit == "m"
-
-
-def test_the_criterion_compares_models_of_the_same_data() -> None:
-    """Known deviations: chi-square + k ln n; unknown ones: n ln(mean square) + k ln n."""
-    slopeless = (LINE[0],)
-    for stated in (True, False):
-        settings = replace(ONE, stated=stated)
-        two = search(Objective(LINE, line), settings)
-        one = search(Objective(slopeless, lambda values: line((values[0], 0.0))), settings)
-        squares = [
-            float(np.sum((Y - np.polyval(np.polyfit(X, Y, degree), X)) ** 2)) for degree in (0, 1)
-        ]
-        for found, square, count in zip((one, two), squares, (1, 2), strict=True):
-            misfit = square if stated else 6 * np.log(square / 6)
-            assert found.bic == pytest.approx(misfit + count * np.log(6), rel=1e-6)
-        assert two.bic < one.bic
-    assert np.isfinite(search(Objective(LINE, lambda v: 0.0 * line(v)), settings).bic)
 
 
 @pytest.mark.parametrize("loss", ["linear", "soft_l1", "cauchy"])

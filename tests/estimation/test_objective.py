@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from campaign.estimation.objective import Array, Objective, Values
+from campaign.arrays import Array
+from campaign.estimation.objective import Objective, Values
 from campaign.estimation.unknowns import Unknown
 
 UNKNOWNS = (Unknown("a", 0.0, 4.0, 1.0), Unknown("b", 1.0, 100.0, 10.0, logarithmic=True))

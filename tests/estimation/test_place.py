@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from campaign.estimation.prediction_interval import of_next
+from campaign.estimation.intervals import of_next
 from tests.estimation.coverage import draws, rejected
 
 T2 = 4.302653  # Student's t with 2 degrees of freedom, 97.5 %: any table

@@ -27,7 +27,6 @@ from campaign.estimation.presliding_dynamics.uncertainty import spread_of
 from tests.estimation.bristle_plants import LUGRE_1995, Array, Interface, Torque, Truth, multisine
 from tests.estimation.coverage import holds
 
-CURVE_1995 = Assumptions(0.4, coulomb_share=1.0 / 1.5, stribeck_velocity=0.001)
 SLOW = Truth(2.0, 0.0, (Interface(2000.0, 40.0, 5.0, 5.0, 1.0),))
 """5 Hz, damping ratio 0.32, a curve that does not fall."""
 TWO = Truth(
@@ -35,7 +34,7 @@ TWO = Truth(
 )
 """Most of the stiffness slips early."""
 STEP = 0.005
-MEASURED = ("bristle_stiffness", "bristle_damping", "inertia")
+MEASURED = ("bristle_stiffness", "damping", "inertia")
 
 
 def plant_of(truth: Truth) -> Plant:
@@ -82,7 +81,8 @@ def records(
 
 def true_values(truth: Truth) -> dict[str, float]:
     (one,) = truth.interfaces
-    return {"bristle_stiffness": one.s0, "bristle_damping": one.s1, "inertia": truth.inertia}
+    whole = one.s1 + truth.s2
+    return {"bristle_stiffness": one.s0, "damping": whole, "inertia": truth.inertia}
 
 
 # The simulation ----------------------------------------------------------------------------------
@@ -114,19 +114,15 @@ def test_the_simulation_agrees_with_radau(truth: Truth, amplitude: float, highes
     angle, rate = truth.answer(torque, time, "Radau", max_step=2e-4)
     plant = plant_of(truth)
     finer = steps_per_sample(plant, 1e-3, highest)
-    motion = simulate(plant, torque_on_grid(torque(time), finer, "smooth"), 1e-3, per_sample=finer)
+    motion = simulate(plant, torque_on_grid(torque(time), finer), 1e-3, per_sample=finer)
     assert np.max(np.abs(motion.rate_at(0.0) - rate)) < 1.5e-4 * np.max(np.abs(rate))
     assert np.max(np.abs(motion.angle_at(0.0) - angle)) < 1.5e-4 * np.max(np.abs(angle))
 
 
 def test_a_held_torque_moves_a_spring_as_the_closed_form_has_it() -> None:
     torque = np.random.default_rng(5).standard_normal(200)
-    motion = simulate(
-        Plant(2.0, (Bristles(800.0, 9.0),), 1.0),
-        torque_on_grid(torque, 1, "held"),
-        0.01,
-        bristle_torque=0.0,
-    )
+    held = np.column_stack([torque[:-1]] * 3)
+    motion = simulate(Plant(2.0, (Bristles(800.0, 9.0),), 1.0), held, 0.01, bristle_torque=0.0)
     system = np.array([[0.0, 1.0, 0.0], [-400.0, -5.0, 0.5], [0.0, 0.0, 0.0]])
     step = expm(system * 0.01)
     state = np.zeros(2)
@@ -139,10 +135,8 @@ def test_a_held_torque_moves_a_spring_as_the_closed_form_has_it() -> None:
 def test_a_delayed_channel_shows_what_was_before() -> None:
     plant, time = plant_of(SLOW), STEP * np.arange(400)
     torque = multisine(1, 1.0, 0.5, 10.0)
-    late = simulate(
-        plant, torque_on_grid(torque(time - 0.3 * STEP), 4, "smooth"), STEP, per_sample=4
-    )
-    motion = simulate(plant, torque_on_grid(torque(time), 4, "smooth"), STEP, per_sample=4)
+    late = simulate(plant, torque_on_grid(torque(time - 0.3 * STEP), 4), STEP, per_sample=4)
+    motion = simulate(plant, torque_on_grid(torque(time), 4), STEP, per_sample=4)
     size = np.max(np.abs(motion.rate))
     shown = motion.rate_at(0.3 * STEP)
     assert shown == pytest.approx(late.rate_at(0.0), abs=1e-4 * size)
@@ -153,14 +147,15 @@ def test_a_delayed_channel_shows_what_was_before() -> None:
 
 
 def test_the_parameters_of_1995_are_found_without_noise() -> None:
+    truth = replace(LUGRE_1995, interfaces=(replace(LUGRE_1995.interfaces[0], tc=1.5),))
     found = []
     for number, amplitude in enumerate((0.15, 0.5)):
-        torque, _, rate = answered(LUGRE_1995, number, amplitude, 1e-3, 1000, 120.0)
+        torque, _, rate = answered(truth, number, amplitude, 1e-3, 1000, 120.0)
         found.append(Record(1e-3, torque, rate=rate + 1e-3))
-    fit = fit_presliding_dynamics(found, CURVE_1995)
+    fit = fit_presliding_dynamics(found)
     (bristles,) = fit.plant.bristles
     assert bristles.stiffness == pytest.approx(1e5, rel=3e-4)
-    assert bristles.damping == pytest.approx(np.sqrt(1e5), rel=4e-4)
+    assert bristles.damping + fit.plant.viscous == pytest.approx(np.sqrt(1e5) + 0.4, rel=4e-4)
     assert fit.plant.inertia == pytest.approx(1.0, rel=4e-4)
     assert 1.0 / bristles.compliance == pytest.approx(1.5, rel=5e-3)
 
@@ -207,15 +202,21 @@ def test_lost_samples_cost_only_themselves() -> None:
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize("draws", [10, pytest.param(32, marks=pytest.mark.statistics)])
 def test_intervals_hold_the_truth_as_often_as_they_say(draws: int, correlation: float) -> None:
-    """Of 32 draws of noise 25 or fewer would be a chance of 1 in 1000, of 10 it is 6 or fewer."""
-    hits = dict.fromkeys(MEASURED, 0)
+    """Of 32 draws of noise 25 or fewer would be a chance of 1 in 1000, of 10 it is 6 or fewer.
+
+    Of 64 draws one is refused: noise of that correlation looks like another shape of the bristles.
+    """
+    hits, refused = dict.fromkeys(MEASURED, 0), 0
     for seed in range(draws):
         every = records(SLOW, (1.0, 2.0), 0.1, seed=seed, count=600, correlation=correlation)
         found = identify_presliding_dynamics(every)
-        assert not found.reason
+        if found.reason:
+            refused += 1
+            continue
         for name, truth in true_values(SLOW).items():
             hits[name] += holds(found.estimates[name], truth)
-    assert binomtest(min(hits.values()), draws, 0.95, "less").pvalue > 0.0015, hits
+    assert refused <= draws // 30
+    assert binomtest(min(hits.values()), draws - refused, 0.95, "less").pvalue > 0.0015, hits
 
 
 @pytest.mark.slow
@@ -248,7 +249,7 @@ def test_an_elastic_part_that_nobody_tells_is_a_misfit_and_one_that_is_told_is_n
     own = {"appendage_inertia": 0.2, "appendage_frequency": 7.0, "appendage_damping_ratio": 0.02}
     for name, value in (true_values(truth) | own).items():
         assert holds(told.estimates[name], value), name
-    assert told.estimates["bristle_damping"].half_width < 0.05 * 40.0
+    assert told.estimates["damping"].half_width < 0.05 * 40.0
 
 
 def test_what_is_missed_for_certain_but_is_little_widens_the_interval() -> None:
@@ -272,7 +273,7 @@ def test_below_the_first_slip_they_are_one_bristle_and_their_sum_is_found() -> N
     found = identify_presliding_dynamics(records(TWO, (0.005, 0.01), 0.02))
     assert not found.reason
     assert holds(found.estimates["bristle_stiffness"], 2000.0)
-    assert holds(found.estimates["bristle_damping"], 40.0)
+    assert holds(found.estimates["damping"], 40.0)
 
 
 def test_a_load_that_breaks_away_is_refused() -> None:
@@ -297,9 +298,9 @@ def test_slow_reversals_say_nothing_of_inertia_and_damping() -> None:
     def slow(time: Array) -> Array:
         return np.asarray(3.0 * np.sin(2.0 * np.pi * 0.05 * time))
 
-    found = identify_presliding_dynamics([_slow_motion(slow, 4000, 1.0)], Assumptions(delay=0.0))
+    found = identify_presliding_dynamics([_slow_motion(slow, 4000, 1.0)])
     assert holds(found.estimates["bristle_stiffness"], 2000.0)
-    for name in ("bristle_damping", "inertia"):
+    for name in ("damping", "inertia"):
         assert found.estimates[name].origin in (Origin.NOT_DETERMINED, Origin.AT_BOUND), name
         assert found.estimates[name].reason
 
@@ -319,14 +320,11 @@ def test_errors_that_repeat_with_the_torque_make_no_interval_narrower() -> None:
 
 
 def test_both_dampings_cannot_be_told_apart_below_the_first_slip() -> None:
-    every = records(SLOW, (0.2, 0.4), 0.02)
-    sum_known = identify_presliding_dynamics(every)
-    assert holds(sum_known.estimates["bristle_damping"], 40.0)
-    free = identify_presliding_dynamics(every, Assumptions(viscous_free=True))
-    assert free.estimates["viscous_friction"].origin is not Origin.MEASURED
-    assert holds(free.estimates["bristle_damping"], 40.0)
-    both = (each.estimates["bristle_damping"].half_width for each in (sum_known, free))
-    assert 20.0 * next(both) < next(both)
+    found = identify_presliding_dynamics(records(SLOW, (0.2, 0.4), 0.02)).estimates
+    assert found["viscous_friction"].origin is not Origin.MEASURED
+    assert holds(found["damping"], 40.0)
+    assert holds(found["bristle_damping"], 40.0)
+    assert 20.0 * found["damping"].half_width < found["bristle_damping"].half_width
 
 
 def test_what_does_not_come_back_has_no_stiffness() -> None:

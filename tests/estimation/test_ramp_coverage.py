@@ -11,17 +11,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.breakaway_torque import NO_FALL, STILL_RISING, breakaway_torque
 from campaign.estimation.presliding import fit_presliding
 from campaign.estimation.presliding_curve import Interface, presliding_angle
-from campaign.estimation.readings import deviation_of_readings, mean_of_readings
+from campaign.estimation.scatter import deviation_of_readings, mean_of_readings
 from tests.estimation.coverage import autoregressive as correlated
 from tests.estimation.coverage import holds, rejected
 
 MANY = pytest.mark.statistics
 Random = np.random.Generator
-Array = np.ndarray
 INTERVAL, INERTIA = 1e-3, 70.0
 COUNT = np.deg2rad(0.002)
 """One count of a coarse gyro."""

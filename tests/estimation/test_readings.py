@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from campaign.estimation.readings import deviation_of_readings, mean_of_readings
+from campaign.estimation.scatter import deviation_of_readings, mean_of_readings
 
 
 def test_of_a_fine_sensor_they_are_the_textbook_s() -> None:

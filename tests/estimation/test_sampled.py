@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import with_error
 from campaign.estimation.sampled_curve import (
@@ -27,7 +28,6 @@ from campaign.estimation.sampled_curve import (
 from campaign.reason import Cause
 from tests.estimation.coverage import holds, rejected
 
-Array = np.ndarray
 DRAWS = 4000
 
 CONCAVE: dict[str, Callable[[Array], Array]] = {

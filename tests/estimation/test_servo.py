@@ -246,9 +246,9 @@ def number(value: float, low: float, high: float) -> Estimate:
 
 
 def test_a_change_adds_half_widths_in_squares_and_a_bound_has_none() -> None:
-    found = change("bandwidth_change", "Hz", number(7.0, 6.7, 7.4), number(9.0, 8.7, 9.3))
+    found = change("bandwidth_change", number(7.0, 6.7, 7.4), number(9.0, 8.7, 9.3))
     assert found.value == pytest.approx(2.0)
     assert found.low == pytest.approx(2.0 - np.hypot(0.3, 0.4))
     assert found.high == pytest.approx(2.0 + np.hypot(0.3, 0.3))
     bound = replace(number(7.0, 6.7, 7.4), kind="at least", low=None, high=None)
-    assert change("bandwidth_change", "Hz", bound, number(9.0, 8.7, 9.3)) is None
+    assert change("bandwidth_change", bound, number(9.0, 8.7, 9.3)) is None

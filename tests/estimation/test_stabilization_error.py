@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.sampled_curve import LOST
 from campaign.estimation.stabilization_error import (
@@ -25,7 +26,6 @@ from campaign.estimation.stabilization_error import (
 )
 from tests.estimation.coverage import autoregressive, draws, holds, rejected
 
-Array = np.ndarray
 PER_CYCLE = 400
 T3 = 3.182446  # Student's t with 3 degrees of freedom, 97.5 %: any table
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from campaign.estimation.family import RATE, adjusted
+from campaign.estimation.family import RATE, adjusted, level_of
 from campaign.estimation.intervals import student
 from campaign.estimation.trends import scatter
-from campaign.estimation.trends.changes import change, jumps_of, steps_of
-from campaign.estimation.trends.family import detectable, level_of
+from campaign.estimation.trends.changes import change, detectable, jumps_of, steps_of
 from campaign.estimation.trends.own_errors import moderated
 from campaign.estimation.trends.scatter import Mixture, fits
 

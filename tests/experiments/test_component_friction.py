@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from campaign.estimation.readings import WITHIN_A_COUNT
+from campaign.estimation.scatter import WITHIN_A_COUNT
 from campaign.experiments.interface import bench_of
 from campaign.result import Result
 from tests.experiments.laboratory import analyse, execute, failed, finding, table, trials

@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import (
-    Array,
     FilterSettings,
     Motion,
     motion_of_position,

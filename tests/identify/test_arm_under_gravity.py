@@ -175,11 +175,12 @@ def test_methods_that_disagree_are_told() -> None:
         found = [one, *(replace(one, name=each) for each in beside)]
         parameters = tuple(SimpleNamespace(estimate=each, display="") for each in found)
         identified = SimpleNamespace(parameters=parameters)
-        return SimpleNamespace(model=SimpleNamespace(name=method), identified=identified)
+        model = SimpleNamespace(name=method)
+        return SimpleNamespace(model=model, identified=identified, result=None)
 
     first = section("friction_map", "coulomb_torque_positive", 1.55, 0.08)
     (said,) = disagreements([first, section("inverse_dynamics", "coulomb_positive", 3.07, 0.16)])
-    assert "about coulomb positive: friction_map finds 1.550" in said
+    assert "about coulomb positive: friction_map finds 1.550 ± 0.080 N·m, inverse" in said
     for other in (("coulomb_positive", 1.7, 0.2), ("coulomb_negative", 3.0, 0.1),
                   ("coulomb_positive", 1.65, 0.001)):  # fmt: skip
         assert not list(disagreements([first, section("inverse_dynamics", *other)]))

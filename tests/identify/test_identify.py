@@ -21,13 +21,12 @@ from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, _compared, _section, identify, widest
 from campaign.identify.material import choose
 from campaign.identify.page import _advice, next_measurement, write_identification
-from campaign.identify.tables import parameters_table
+from campaign.identify.tables import parameter_unit, parameter_words, parameters_table
 from campaign.parameter import Parameter, Unseen
 from campaign.physics.bench import Bench
 from campaign.protocol.problems import find_faults
 from campaign.resources import templates_folder
 from campaign.result import Finding
-from campaign.text import words
 from tests.estimation.coverage import holds
 from tests.estimation.rigs import Rig
 
@@ -93,9 +92,8 @@ def test_what_to_measure_next_is_told_of_the_widest_interval(found: Identificati
     parameter = widest(found.parameters)
     assert parameter is not None
     share = 100.0 * parameter.estimate.half_width / abs(parameter.estimate.value)
-    told = (
-        f"The widest interval is that of {words(parameter.estimate.name)}: ± {share:.2g} % of it."
-    )
+    name = parameter_words(parameter.estimate.name)
+    told = f"The widest interval is that of {name}: ± {share:.2g} % of it."
     assert told in next_measurement(found)
     nothing = replace(found, sections=())
     assert next_measurement(nothing) == ""
@@ -337,6 +335,14 @@ def test_systematic_parts_are_in_the_unit_that_is_shown(found: Identification) -
     assert row["unit"] == "ms"
     band, held = (f"{1e3 * (size or 0.0):.2g}" for size in sizes)
     assert row["systematic"] == f"band {band}, instruments {held}"
+
+
+def test_parameters_have_the_names_and_units_of_a_report(found: Identification) -> None:
+    assert parameter_words("stribeck_velocity_negative") == "Stribeck velocity vs (negative)"
+    assert parameter_words("coulomb_positive") == "coulomb positive"
+    (section,) = found.sections
+    for unit, shown in (("rad/s", "deg/s"), ("m/s", "mm/s"), ("N m", "N m")):
+        assert parameter_unit(section, Estimate("stribeck_velocity", 0.5, unit)) == shown
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from campaign.arrays import Array
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.identify import experiments_by_model
@@ -21,8 +22,6 @@ from campaign.identify.material import choose
 from campaign.result import Table
 from tests.estimation.coverage import holds
 from tests.estimation.frequency.drives import Drive
-
-Array = np.ndarray
 
 DRIVE = Drive(2.0, 1.0, 4000.0, 3.0, 8.0)
 """Antiresonance 10.07 Hz, resonance 12.33 Hz."""

@@ -15,7 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion
 from campaign.estimation.inverse.terms import TERMS
 from campaign.signals import MultiSine
 
@@ -114,15 +115,6 @@ def _conditions(columns: Array) -> Array:
     with np.errstate(divide="ignore"):
         found[whole] = np.sqrt(values[:, -1] / np.maximum(values[:, 0], 0.0))
     return found
-
-
-def random_series(
-    period: float, harmonics: int, room: Room, count: int, seed: int
-) -> list[FourierSeries]:
-    """Series with random coefficients, each as large as the room lets it; see `best_series`."""
-    random = np.random.default_rng(seed)
-    drawn = _allowed(random.standard_normal((count, 2 * harmonics)), period, room)
-    return [_series(period, each) for each in drawn]
 
 
 @lru_cache(maxsize=32)  # a plan asks for the same one again and again

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from campaign.estimation.excitation_design.passage import first_passage
-from campaign.estimation.frequency.multisine import Lines, OddGrid, random_phases
-from campaign.estimation.inverse.motion import Array
+from campaign.arrays import Array
+from campaign.estimation.frequency.multisine import Lines, OddGrid, course, random_phases
 from campaign.signals import MultiSine
 
 POINTS = 16
 """Points per cycle of the highest line."""
 CLIPPED = (0.75, 0.98)
 """of its peak at which a signal is clipped, in the first round and in the last."""
+BISECTIONS = 60
+"""of a search for a passage, after which the interval is 1e-18 of the first one."""
 ROUNDS = 400
-"""of the search, if nothing else is said."""
+"""of the search."""
 
 
 def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order: int) -> MultiSine:
@@ -37,7 +40,7 @@ def odd_multisine(grid: OddGrid, seed: int, draws: int, *, lowered: bool, order:
     )
 
 
-def low_crest(lines: Lines, phases: Array, rounds: int = ROUNDS) -> Array:
+def low_crest(lines: Lines, phases: Array) -> Array:
     """Phases (rad) of sines of equal size with a lower crest factor than those that it begins with.
 
     A signal is clipped, and its phases are kept (Van der Ouderaa, Schoukens and Renneboog, IEEE
@@ -46,13 +49,13 @@ def low_crest(lines: Lines, phases: Array, rounds: int = ROUNDS) -> Array:
     """
     count = POINTS * int(lines[-1])
     best, lowest = phases, np.inf
-    for share in np.linspace(*CLIPPED, rounds):
-        course = _course(lines, phases, count)
-        peak = float(np.max(np.abs(course)))
+    for share in np.linspace(*CLIPPED, ROUNDS):
+        signal = course(lines, phases, count)
+        peak = float(np.max(np.abs(signal)))
         if peak < lowest:
             best, lowest = phases, peak
         level = share * peak
-        spectrum = np.fft.rfft(np.clip(course, -level, level))
+        spectrum = np.fft.rfft(np.clip(signal, -level, level))
         phases = np.angle(spectrum[lines]) + 0.5 * np.pi
     return np.asarray(best % (2.0 * np.pi))
 
@@ -62,7 +65,7 @@ def peak(signal: MultiSine, period: float) -> float:
     count = 4 * POINTS * round(max(signal.frequencies) * period)
     lines = np.round(np.array(signal.frequencies) * period).astype(int)
     phases = np.array(signal.phases)
-    return float(np.max(np.abs(_course(lines, phases, count, np.array(signal.amplitudes)))))
+    return float(np.max(np.abs(course(lines, phases, count, np.array(signal.amplitudes)))))
 
 
 def crest_factor(signal: MultiSine, period: float) -> float:
@@ -71,23 +74,31 @@ def crest_factor(signal: MultiSine, period: float) -> float:
     return peak(signal, period) / float(rms)
 
 
-def _course(
-    lines: Lines, phases: Array, count: int, amplitudes: Array | float = 1.0, order: int = 0
-) -> Array:
-    """One period of sines in `count` points, or its `order`-th integral but for its scale."""
-    spectrum = np.zeros(count // 2 + 1, dtype=complex)
-    spectrum[lines] = amplitudes * np.exp(1j * (phases - 0.5 * np.pi)) / (1j * lines) ** order
-    return np.asarray(np.fft.irfft(spectrum, count) * count / 2.0)
-
-
 def _begun(lines: Lines, phases: Array, order: int) -> Array:
     """The same signal from where its `order`-th integral first passes zero."""
     count = POINTS * int(lines[-1])
-    course = _course(lines, phases, count, 1.0, order)
+    signal = course(lines, phases, count, 1.0, order)
     size = 1.0 / lines.astype(float) ** order
 
     def value(share: float) -> float:
         turned = 2.0 * np.pi * lines * share + phases - 0.5 * np.pi * order
         return float(np.sum(size * np.sin(turned)))
 
-    return np.asarray((phases + 2.0 * np.pi * first_passage(course, value) * lines) % (2.0 * np.pi))
+    return np.asarray((phases + 2.0 * np.pi * first_passage(signal, value) * lines) % (2.0 * np.pi))
+
+
+def first_passage(course: Array, value: Callable[[float], float]) -> float:
+    """Share of its period at which a signal first passes zero, to all digits.
+
+    course: one period of it, evenly sampled, finely enough that its first change of sign between
+    two samples is a single passage. value: the signal itself, at a share of its period.
+    """
+    index = int(np.flatnonzero(course * np.roll(course, -1) <= 0.0)[0])
+    low, high = index / len(course), (index + 1) / len(course)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if value(low) * value(middle) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.excitation_design.passage import first_passage
+from campaign.arrays import Array, ComplexArray
+from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.estimation.frequency.multisine import Lines
-from campaign.estimation.inverse.motion import Array
 
-Spectrum = NDArray[np.complex128]
+Spectrum = ComplexArray
 
 
 def band_noise(

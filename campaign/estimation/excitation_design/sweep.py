@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array
+from campaign.arrays import Array
 
 Law = Literal["linear", "logarithmic"]
 PER_CYCLE = 32

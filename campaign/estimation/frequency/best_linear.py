@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.distortion import Distortion, detected
 from campaign.estimation.frequency.line_spectra import LineSpectra, line_spectra
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.welch import Excited
-from campaign.estimation.frequency_response import Array, ComplexArray
 
 FEWEST_REALISATIONS = 7
 """below which a variance over realisations is no weight for a fit (Pintelon, Schoukens: 4.3.1)."""
@@ -68,8 +68,6 @@ class BestLinear:
         response: its variance is that over realisations, noise and stochastic nonlinear part alike;
             of a single realisation that of noise alone (see `undetermined`).
         noise: variance of the response by noise, shape (n,); NaN for a single period.
-        nonlinear: variance of the response of *one* realisation by the stochastic nonlinear part,
-            shape (n,); NaN where it is not determined.
         distortion: what the output holds at detection lines; None for a single period.
         transient: largest share of the output that transient or drift had at an excited line.
         undetermined: what this measurement cannot tell, and why, in sentences.
@@ -77,7 +75,6 @@ class BestLinear:
 
     response: MeasuredResponse
     noise: Array
-    nonlinear: Array
     distortion: Distortion | None
     excitation: Excitation
     transient: float
@@ -121,7 +118,7 @@ def best_linear(
         raise ValueError("the highest excited line lies above half the sampling rate")
     leading = found.lines[2 if reference is not None else 0]
     phase = leading / np.maximum(np.abs(leading), 1e-300)
-    response, noise, nonlinear = _response(found.conjugated(phase), excited - 1)
+    response, noise = _response(found.conjugated(phase), excited - 1)
     described = _excitation(signals[0], found, excited)
     distortion = None
     if found.noise is not None:
@@ -131,7 +128,6 @@ def best_linear(
     return BestLinear(
         response,
         noise,
-        nonlinear,
         distortion,
         described,
         float(np.max(passing / np.maximum(level, 1e-300))),
@@ -139,8 +135,8 @@ def best_linear(
     )
 
 
-def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array, Array]:
-    """Response, its variance by noise, and the nonlinear variance of one realisation."""
+def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array]:
+    """Response, and its variance by noise."""
     lines = found.lines[:2][..., at]
     realisations = lines.shape[1]
     mean = np.mean(lines, axis=1)
@@ -148,8 +144,7 @@ def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array, A
     if np.any(np.abs(mean[0]) <= NOTHING * largest):
         raise ValueError("an excited line has no input; are these its lines?")
     values = mean[1] / mean[0]
-    nothing = np.full(len(at), np.nan)
-    noise = nothing
+    noise = np.full(len(at), np.nan)
     if found.noise is not None:
         noise = _spread(values, found.noise[at, :2, :2], mean[0]) / realisations
     if realisations > 1:
@@ -157,9 +152,8 @@ def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array, A
         spread = np.einsum("amk,bmk->kab", apart, np.conj(apart)) / (realisations - 1)
         variance = _spread(values, spread, mean[0]) / realisations
         freedom = 2.0 * (realisations - 1)
-        nonlinear = np.maximum(realisations * (variance - noise), 0.0)
     else:
-        variance, freedom, nonlinear = noise, found.freedom, nothing
+        variance, freedom = noise, found.freedom
     power = np.mean(np.abs(lines[1]) ** 2, axis=0)
     linear = np.abs(values) ** 2 * np.mean(np.abs(lines[0]) ** 2, axis=0)
     response = MeasuredResponse(
@@ -171,7 +165,7 @@ def _response(found: LineSpectra, at: Lines) -> tuple[MeasuredResponse, Array, A
         np.zeros(len(at)),
         "best linear approximation",
     )
-    return response, noise, nonlinear
+    return response, noise
 
 
 def _spread(values: ComplexArray, covariance: ComplexArray, input_: ComplexArray) -> Array:

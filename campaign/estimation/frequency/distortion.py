@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.line_spectra import LineSpectra
 from campaign.estimation.frequency.multisine import Lines
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.intervals import LEVEL, student
 from campaign.reason import Cause, Reason
 

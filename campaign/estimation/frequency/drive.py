@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.rational import RationalFit
 from campaign.estimation.frequency.two_mass_model import (
@@ -16,17 +18,22 @@ from campaign.estimation.frequency.two_mass_model import (
     model_jacobian,
     polynomials,
 )
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.reason import Reason
 
-PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
-HIDDEN_BY_PLACE = {
-    **dict(zip(PARTS, ("kg m^2", "kg m^2", "N m/rad", "N m s/rad"), strict=True)),
+UNITS = {
+    "motor_inertia": "kg m^2",
+    "load_inertia": "kg m^2",
+    "total_inertia": "kg m^2",
+    "stiffness": "N m/rad",
+    "damping": "N m s/rad",
+    "resonance": "Hz",
+    "resonance_damping": "",
     "antiresonance": "Hz",
     "antiresonance_damping": "",
     "inertia_ratio": "",
 }
-"""What a sensor at the load alone cannot tell, with units."""
+"""Of the estimates of `TwoMass`."""
+PARTS = ("motor_inertia", "load_inertia", "stiffness", "damping")
 Correlations = Mapping[tuple[str, str], float]
 
 
@@ -100,6 +107,11 @@ class TwoMass:
         if self.function is not None:
             return self.function.polynomials
         return polynomials(self.point, side)
+
+
+def untold(names: Iterable[str], reason: Reason) -> dict[str, Any]:
+    """Estimates of these names that are not determined."""
+    return {name: Estimate.without_interval(name, math.nan, UNITS[name], reason) for name in names}
 
 
 def correlations_of(names: Sequence[str], gradients: Array, spread: Array) -> Correlations:

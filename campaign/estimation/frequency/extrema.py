@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.modes import Mode
-from campaign.estimation.frequency_response import Array
 from campaign.estimation.intervals import LEVEL
 from campaign.reason import Cause, Reason
 

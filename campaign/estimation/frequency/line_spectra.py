@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.frequency_response import Array, ComplexArray
+from campaign.arrays import Array, ComplexArray
 
 ORDER = 2
 """of the polynomial through the transient ..."""

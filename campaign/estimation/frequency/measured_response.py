@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.frequency_response import Array, ComplexArray, Response
-from campaign.estimation.intervals import LEVEL, student
+from campaign.arrays import Array, ComplexArray, Flags
+from campaign.estimation.frequency_response import Response
+from campaign.estimation.intervals import student
 
 ALIKE = 8.0
 """Neighbours that a bias shifts alike: so many times its square counts against scatter in a fit."""
@@ -65,25 +66,12 @@ class MeasuredResponse:
         few = np.array([student(float(each)) for each in self.freedom]) / normal
         return np.asarray(np.sqrt(0.5 * (self.variance * few**2 + self.bias**2)))
 
-    def radius(self, level: float = LEVEL) -> Array:
-        """Of the disc around each value that holds the true one with that chance, shape (n,).
-
-        |error|² / variance follows F(2, freedom); Bendat and Piersol, "Random Data" (2010), 9.2.
-        The bias adds in squares.
-        """
-        from scipy.stats import chi2, f
-
-        known = np.isinf(self.freedom)
-        with np.errstate(invalid="ignore"):
-            ratio = np.where(known, chi2.ppf(level, 2) / 2.0, f.ppf(level, 2, self.freedom))
-        return np.asarray(np.hypot(np.sqrt(ratio * self.variance), 1.96 * self.bias))
-
     @property
     def response(self) -> Response:
         """As the functions for sines take it; few degrees of freedom widen its errors."""
         return Response(self.frequency, self.values, self.widened, self.coherence)
 
-    def at(self, kept: NDArray[np.bool_] | NDArray[np.intp] | slice) -> MeasuredResponse:
+    def at(self, kept: Flags | NDArray[np.intp] | slice) -> MeasuredResponse:
         """Some of its points."""
         parts = ("frequency", "values", "variance", "freedom", "coherence", "bias")
         return replace(self, **{name: getattr(self, name)[kept] for name in parts})

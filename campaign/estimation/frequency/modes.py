@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.frequency.orders import ChosenOrder, root_jacobian, with_order
 from campaign.estimation.frequency.rational import RationalFit
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import MODEL_MISFIT, with_error
 from campaign.reason import Cause, Reason

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.frequency_response import Array
+from campaign.arrays import Array
 from campaign.signals import MultiSine
 
 Lines = NDArray[np.int64]
@@ -28,14 +28,10 @@ class OddGrid:
     Attributes:
         period: (s).
         excited: rising odd lines, shape (k,).
-        odd_detection: odd lines left out between them.
-        even_detection: even lines between the first and the last excited one.
     """
 
     period: float
     excited: Lines
-    odd_detection: Lines
-    even_detection: Lines
 
     @property
     def frequency(self) -> Array:
@@ -66,24 +62,18 @@ def odd_grid(lowest: float, highest: float, period: float, seed: int, group: int
         left_out.append(int(random.choice(choice)))
     kept = np.ones(len(odd), dtype=bool)
     kept[left_out] = False
-    even = np.arange(odd[0] + 1, odd[-1], 2, dtype=np.int64)
-    return OddGrid(period, odd[kept], odd[~kept], even)
+    return OddGrid(period, odd[kept])
 
 
-def random_phases(
-    grid: OddGrid, rms: float, seed: int, shape: Array | None = None, draws: int = 1
-) -> MultiSine:
-    """One realisation: uniform random phases, of that rms (in the unit of the input).
+def random_phases(grid: OddGrid, rms: float, seed: int, draws: int = 1) -> MultiSine:
+    """One realisation: sines alike, of that rms together (in the unit of the input), with uniform
+    random phases.
 
-    Args:
-        shape: relative amplitudes of the excited lines, shape (k,); absent: all alike.
-        draws: how many to draw, of which the one with the lowest crest factor is kept. Of a few
-            tens the phases still count as random; a search would make them depend on each other.
+    draws: how many to draw, of which the one with the lowest crest factor is kept. Of a few tens
+        the phases still count as random; a search would make them depend on each other.
     """
     random = np.random.default_rng(seed)
-    size = np.ones(len(grid.excited)) if shape is None else np.asarray(shape, dtype=float)
-    if size.shape != grid.excited.shape:
-        raise ValueError("shape has one amplitude for each excited line")
+    size = np.ones(len(grid.excited))
     amplitude = rms * size / np.sqrt(0.5 * np.sum(size**2))
     phases = random.uniform(0.0, 2.0 * np.pi, (max(draws, 1), len(size)))
     if draws > 1:
@@ -98,16 +88,17 @@ def random_phases(
 
 def _crest(lines: Lines, amplitude: Array, phases: Array) -> float:
     """Largest value over rms."""
-    samples = CREST_SAMPLES * int(lines[-1])
-    spectrum = np.zeros(samples // 2 + 1, dtype=complex)
-    spectrum[lines] = amplitude * np.exp(1j * (phases - 0.5 * np.pi))  # of sines
-    signal = np.fft.irfft(spectrum, samples) * samples / 2.0
+    signal = course(lines, phases, CREST_SAMPLES * int(lines[-1]), amplitude)
     return float(np.max(np.abs(signal)) / np.std(signal))
 
 
-def crest_factor(signal: Array) -> float:
-    """Largest value over rms of one period, shape (n,)."""
-    return float(np.max(np.abs(signal)) / np.sqrt(np.mean(np.square(signal))))
+def course(
+    lines: Lines, phases: Array, count: int, amplitudes: Array | float = 1.0, order: int = 0
+) -> Array:
+    """One period of sines in `count` points, or its `order`-th integral but for its scale."""
+    spectrum = np.zeros(count // 2 + 1, dtype=complex)
+    spectrum[lines] = amplitudes * np.exp(1j * (phases - 0.5 * np.pi)) / (1j * lines) ** order
+    return np.asarray(np.fft.irfft(spectrum, count) * count / 2.0)
 
 
 ALIKE = 1e-3

@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from campaign.estimate import Estimate
+from campaign.arrays import Array
 from campaign.estimation.frequency.drive import (
-    HIDDEN_BY_PLACE,
+    UNITS,
     TwoMass,
     correlations_of,
+    untold,
 )
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
 from campaign.estimation.frequency.rational import rational_fit
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array
+from campaign.estimation.least_squares import gradients, propagated
 from campaign.reason import Cause
 
 HIDDEN = Cause(
@@ -33,8 +34,10 @@ RIGID = Cause(
 NEGATIVE_INERTIA = Cause("negative inertia", "its inertia would be negative")
 NO_RESONANCE = Cause("no resonance in band", "no resonance of two inertias lies in the band")
 METHOD = "One inertia with viscous friction and a delay, least squares weighted by scatter"
-NOT_OF_ONE = {**HIDDEN_BY_PLACE, "resonance": "Hz", "resonance_damping": ""}
-"""What one inertia has not, with units."""
+OF_ONE = ("total_inertia",)
+"""What one inertia has of a drive."""
+AT_LOAD = (*OF_ONE, "resonance", "resonance_damping")
+"""What a sensor at the load alone tells."""
 
 
 def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
@@ -49,12 +52,8 @@ def rigid_fit(measured: MeasuredResponse, side: Side) -> TwoMass:
     if not misfit and inertia <= 0:
         misfit = NEGATIVE_INERTIA()
     told = of_fit("total_inertia", inertia, "kg m^2", error, misfit, METHOD)
-    nothing: dict[str, Any] = {
-        name: Estimate.without_interval(name, math.nan, of, RIGID())
-        for name, of in NOT_OF_ONE.items()
-    }
     return TwoMass(
-        **nothing,
+        **untold(UNITS.keys() - OF_ONE, RIGID()),
         total_inertia=told,
         misfit=misfit,
         excess=fit.excess,
@@ -95,22 +94,19 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
 
     theta = np.concatenate([fit.numerator, fit.denominator, [fit.delay]])
     found = told(theta)
-    steps = np.diag(np.maximum(1e-5 * np.abs(theta), 1e-12))
-    by = np.array([(told(theta + h) - told(theta - h)) / (2.0 * np.sum(h)) for h in steps])
-    error = np.sqrt(np.maximum(np.einsum("pi,pq,qi->i", by, fit.scatter, by), 0.0))
+    by = gradients(told, theta, np.maximum(1e-5 * np.abs(theta), 1e-12))
+    error = propagated(by, fit.scatter)
     method = "function of third order with a delay, friction taken to be at one of the inertias"
     misfit = fit.misfit
     if not misfit and (found[0] <= 0 or not fit.lowest <= found[1] <= fit.highest):
         misfit = NO_RESONANCE()
-    names = (("total_inertia", "kg m^2"), ("resonance", "Hz"), ("resonance_damping", ""))
     estimates: dict[str, Any] = {
-        name: of_fit(name, float(value), of, float(by_fit), misfit, method)
-        for (name, of), value, by_fit in zip(names, found, error, strict=True)
+        name: of_fit(name, float(value), UNITS[name], float(by_fit), misfit, method)
+        for name, value, by_fit in zip(AT_LOAD, found, error, strict=True)
     }
-    for name, of in HIDDEN_BY_PLACE.items():
-        estimates[name] = Estimate.without_interval(name, math.nan, of, HIDDEN())
     return TwoMass(
         **estimates,
+        **untold(UNITS.keys() - AT_LOAD, HIDDEN()),
         misfit=misfit,
         excess=fit.excess,
         criterion=fit.criterion,
@@ -119,8 +115,6 @@ def load_side_fit(measured: MeasuredResponse) -> TwoMass:
         grounded=False,
         function=fit,
         covariance=fit.scatter,
-        correlations={}
-        if misfit
-        else correlations_of([each for each, _ in names], by.T, fit.scatter),
+        correlations={} if misfit else correlations_of(AT_LOAD, by, fit.scatter),
         condition=fit.condition,
     )

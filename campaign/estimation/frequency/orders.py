@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import RationalFit, delays_to_try, rational_fit
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.intervals import shifted_by
 
 HIGHEST = 6
@@ -53,43 +53,31 @@ def order_of(fit: RationalFit) -> tuple[int, int]:
     return len(fit.numerator) - 1, len(fit.denominator) - 1
 
 
-def chosen_order(
-    measured: MeasuredResponse,
-    highest: int = HIGHEST,
-    orders: Sequence[tuple[int, int]] | None = None,
-    with_delay: bool = True,
-    stable: bool = True,
-) -> ChosenOrder:
+def chosen_order(measured: MeasuredResponse, highest: int = HIGHEST) -> ChosenOrder:
     """Fits of all orders up to `highest`, and the one with the lowest criterion.
 
-    Args:
-        orders: to try instead of all; pairs of numerator and denominator.
-        stable: whether a fit with an unstable pole is refused.
-
     Orders are tried upwards, until two in a row of the denominator's bring no better criterion.
-    Raises ValueError where none can be fitted, or all are refused.
+    Raises ValueError where none can be fitted, or all are refused, as those with an unstable pole.
     """
     tried: dict[tuple[int, int], RationalFit] = {}
     refused: dict[tuple[int, int], str] = {}
-    delays = delays_to_try(measured) if with_delay else np.zeros(1)
+    delays = delays_to_try(measured)
     best, without = math.inf, 0
     for down in range(1, highest + 1):
-        some = [(up, down) for up in range(max(0, down - FEWER_ZEROS), down + 1)]
-        some = [each for each in some if orders is None or each in orders]
         better = False
-        for order in some:
+        for order in [(up, down) for up in range(max(0, down - FEWER_ZEROS), down + 1)]:
             try:
-                fit = rational_fit(measured, order, with_delay, delays)
+                fit = rational_fit(measured, order, delays)
             except (ValueError, np.linalg.LinAlgError) as error:
                 refused[order] = str(error)
                 continue
             tried[order] = fit
-            why = _unusable(fit, stable)
+            why = _unusable(fit)
             if why:
                 refused[order] = why
             elif fit.criterion < best - NEAR:
                 best, better = fit.criterion, True
-        without = 0 if better or not some else without + 1
+        without = 0 if better else without + 1
         if without >= 2 and math.isfinite(best):
             break
     usable = [order for order in tried if order not in refused]
@@ -114,11 +102,9 @@ def with_order(estimate: Estimate, others: Sequence[float]) -> Estimate:
     return shifted_by(estimate, "order of the function", max(told) / math.sqrt(3.0))
 
 
-def _unusable(fit: RationalFit, stable: bool) -> str:
+def _unusable(fit: RationalFit) -> str:
     if not np.all(np.isfinite(fit.covariance)):
         return "its covariance is not finite"
-    if not stable:
-        return ""
     first = len(fit.numerator)
     part = slice(first, first + len(fit.denominator))
     covariance = fit.scatter[part, part]

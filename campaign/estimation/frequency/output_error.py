@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.intervals import of_positive_repeats
 
 ORDER = 3

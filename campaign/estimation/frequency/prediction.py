@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import SURE, Weights
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.reason import NONE, Cause, Reason
 
 NO_DEVIATION = Cause(

@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import ALIKE, LEAST_FREEDOM, MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.estimation.least_squares import covariance, minimum
 from campaign.reason import NONE, Cause, Reason
 
@@ -89,7 +89,6 @@ class RationalFit:
         excess: weighted square over what a right model leaves in the mean.
         misfit: why it is no model of the response; none where it may be one.
         parameters: how many are free.
-        with_delay: whether the delay is one of them.
         lowest, highest: of the frequencies (Hz).
         condition: number of the weighted Jacobian, its columns scaled to length 1.
     """
@@ -103,7 +102,6 @@ class RationalFit:
     excess: float
     misfit: Reason
     parameters: int
-    with_delay: bool
     lowest: float
     highest: float
     condition: float = math.nan
@@ -118,7 +116,8 @@ class RationalFit:
     def log_jacobian(self, frequency: Array) -> ComplexArray:
         """Derivative of log G by (numerator, denominator, delay), shape (n, p)."""
         s = 1j * np.asarray(frequency, dtype=float) / self.scale
-        return _log_jacobian(s, self.numerator, self.denominator, self.scale)
+        powers = _powers(s, self.numerator, self.denominator)
+        return _log_jacobian(powers, s, self.numerator, self.denominator, self.scale)
 
     @property
     def polynomials(self) -> tuple[Array, Array]:
@@ -155,18 +154,12 @@ def _roots(coefficients: Array, scale: float) -> ComplexArray:
     return np.asarray(found * (2.0 * np.pi * scale), dtype=complex)
 
 
-def _log_jacobian(
-    s: ComplexArray, numerator: Array, denominator: Array, scale: float
-) -> ComplexArray:
-    return _log_jacobian_of(_powers(s, numerator, denominator), s, numerator, denominator, scale)
-
-
 def _powers(s: ComplexArray, numerator: Array, denominator: Array) -> ComplexArray:
     """Powers of s, shape (n, most coefficients)."""
     return np.asarray(s[:, None] ** np.arange(max(len(numerator), len(denominator))))
 
 
-def _log_jacobian_of(
+def _log_jacobian(
     powers: ComplexArray, s: ComplexArray, numerator: Array, denominator: Array, scale: float
 ) -> ComplexArray:
     up = powers[:, : len(numerator)] / (powers[:, : len(numerator)] @ numerator)[:, None]
@@ -177,7 +170,6 @@ def _log_jacobian_of(
 def rational_fit(
     measured: MeasuredResponse,
     order: tuple[int, int],
-    with_delay: bool = True,
     delays: Array | None = None,
     start: Array | None = None,
 ) -> RationalFit:
@@ -185,7 +177,6 @@ def rational_fit(
 
     Args:
         measured: at n frequencies, with a variance of enough degrees of freedom.
-        with_delay: whether a delay is fitted; else it is zero.
         delays: (s) to start from; absent: from none to what the phase falls at the upper end.
         start: (numerator, denominator, delay) to start from instead.
 
@@ -193,7 +184,7 @@ def rational_fit(
     are no weights.
     """
     up, down = order
-    free = up + down + 1 + with_delay
+    free = up + down + 2
     if up > down or up < 0 or down < 1:
         raise ValueError("the numerator's order must not be above the denominator's")
     if 2 * len(measured.frequency) < free + 4:
@@ -203,11 +194,9 @@ def rational_fit(
     scale = float(np.sqrt(frequency[0] * frequency[-1]))
     s = np.asarray(1j * frequency / scale)
     if start is not None:
-        return _refined(measured, weights, s, scale, up, start, with_delay)
-    if delays is None:
-        delays = delays_to_try(measured) if with_delay else np.zeros(1)
+        return _refined(measured, weights, s, scale, up, start)
     starts = []
-    for delay in delays:
+    for delay in delays_to_try(measured) if delays is None else delays:
         advanced = measured.values * np.exp(s * (2.0 * np.pi * scale * delay))
         starts.append(np.append(_sanathanan(s, advanced, weights.error, order), delay))
 
@@ -215,7 +204,7 @@ def rational_fit(
         left = (_model(theta, s, up, scale) - measured.values) / weights.error
         return float(np.sum(np.abs(left) ** 2))
 
-    return _refined(measured, weights, s, scale, up, min(starts, key=square), with_delay)
+    return _refined(measured, weights, s, scale, up, min(starts, key=square))
 
 
 def delays_to_try(measured: MeasuredResponse) -> Array:
@@ -276,7 +265,6 @@ def _refined(
     scale: float,
     up: int,
     start: Array,
-    with_delay: bool,
 ) -> RationalFit:
     values, error = measured.values, weights.error
     # The largest term of the denominator is held: a common factor of all coefficients is free.
@@ -291,20 +279,16 @@ def _refined(
         theta = scaled * size
         model = _model(theta, s, up, scale)
         left = (model - values) / error
-        by = _log_jacobian_of(powers_of_s, s, theta[: up + 1], theta[up + 1 : -1], scale)
+        by = _log_jacobian(powers_of_s, s, theta[: up + 1], theta[up + 1 : -1], scale)
         by = by * (model / error)[:, None] * size
         return np.concatenate([left.real, left.imag]), np.concatenate([by.real, by.imag])
 
     low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
     scaled = start / size
     low[held] = high[held] = scaled[held]
-    fixed = [held]
-    if not with_delay:
-        low[-1] = high[-1] = scaled[-1]
-        fixed.append(len(start) - 1)
     with np.errstate(all="ignore"):
         found = minimum(function, scaled, low, high, steps=200)
-    free = np.setdiff1d(np.arange(len(start)), fixed)
+    free = np.setdiff1d(np.arange(len(start)), held)
     inner, _ = covariance(found.jacobian[:, free])
     spread = np.zeros((len(start), len(start)))
     spread[np.ix_(free, free)] = inner * np.outer(size[free], size[free]) * weights.inflation
@@ -323,7 +307,6 @@ def _refined(
         excess,
         misfit,
         len(free),
-        with_delay,
         float(measured.frequency[0]),
         float(measured.frequency[-1]),
         condition_of(found.jacobian[:, free]),

@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from campaign.estimate import Estimate, Origin, Systematic
-from campaign.estimation.frequency.drive import PARTS, TwoMass, correlations_of
+from campaign.arrays import Array
+from campaign.estimate import Origin
+from campaign.estimation.frequency.drive import PARTS, UNITS, TwoMass, correlations_of
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.modes import of_fit
-from campaign.estimation.frequency.one_inertia import HIDDEN, load_side_fit, rigid_fit
+from campaign.estimation.frequency.one_inertia import load_side_fit, rigid_fit
 from campaign.estimation.frequency.rational import (
     Weights,
     condition_of,
@@ -35,10 +36,15 @@ from campaign.estimation.frequency.two_mass_model import (
     sizes,
     starts,
 )
-from campaign.estimation.frequency_response import Array
-from campaign.estimation.intervals import TORQUE_CONSTANT
-from campaign.estimation.least_squares import Minimum, covariance, minimum
-from campaign.reason import Cause, Reason
+from campaign.estimation.intervals import TORQUE_CONSTANT, shifted_by
+from campaign.estimation.least_squares import (
+    Minimum,
+    covariance,
+    gradients,
+    minimum,
+    propagated,
+)
+from campaign.reason import Cause
 
 ROUGH = 10
 """Steps after which most starts are given up ..."""
@@ -49,10 +55,6 @@ LARGEST = 50.0
 WIDEST_RATIO = 8.0
 """Largest logarithm of J2 / J1, either way."""
 METHOD = "Two inertias on a spring with viscous friction, least squares weighted by scatter"
-NO_SCALE = Cause(
-    "input not a torque",
-    "the input is not a torque in N m, so that only frequencies and ratios are known",
-)
 OPEN_COMBINATION = Cause(
     "combination left open",
     "the data leave a combination of the inertias and the stiffness open",
@@ -61,7 +63,6 @@ OPEN_COMBINATION = Cause(
 
 def two_mass(
     responses: Mapping[Side, MeasuredResponse],
-    torque_known: bool = True,
     torque_uncertainty: float | None = None,
     rigid: bool | None = None,
 ) -> TwoMass:
@@ -69,8 +70,6 @@ def two_mass(
 
     Args:
         responses: of torque at the motor (N m) to rate (rad/s), by where the rate was measured.
-        torque_known: whether the input is a torque in N m; else only frequencies and the ratio of
-            inertias are told.
         torque_uncertainty: relative standard uncertainty of the torque (torque constant), a
             systematic part of all that is in N m.
         rigid: whether it is one inertia; None: where that explains the response of a sensor.
@@ -82,13 +81,13 @@ def two_mass(
         raise ValueError("no response of a motor or a load")
     if set(responses) == {"load"}:
         found = _or_rigid(load_side_fit(responses["load"]), responses, rigid)
-        return _told(found, torque_known, torque_uncertainty)
+        return _with_torque(found, torque_uncertainty)
     free = two_mass_fit(responses, False)
     held = two_mass_fit(responses, True)
     best = held if held.criterion < free.criterion - 6.0 else free
     if best.misfit and not held.misfit:
         best = held
-    return _told(_or_rigid(best, responses, rigid), torque_known, torque_uncertainty)
+    return _with_torque(_or_rigid(best, responses, rigid), torque_uncertainty)
 
 
 def _or_rigid(
@@ -159,91 +158,49 @@ def two_mass_fit(responses: Mapping[Side, MeasuredResponse], grounded: bool) -> 
     excess, misfit = judged_fit(left, len(free), weights[0])
     if not misfit and np.any(open_[:3]):
         misfit = OPEN_COMBINATION()
-    criterion = best.cost + len(free) * math.log(2 * n)
-    found = _estimates(point, spread * max(excess, 1.0), sides, misfit, excess, criterion, grounded)
-    return replace(found, condition=condition_of(best.jacobian[:, free]))
+    spread *= max(excess, 1.0)
+    by = gradients(_numbers, point, np.maximum(1e-4 * np.abs(point), 1e-9))
+    told = zip(UNITS.items(), _numbers(point), propagated(by, spread), strict=True)
+    estimates: dict[str, Any] = {
+        name: of_fit(name, float(value), unit, float(error), misfit, METHOD)
+        for (name, unit), value, error in told
+    }
+    return TwoMass(
+        **estimates,
+        misfit=misfit,
+        excess=excess,
+        criterion=best.cost + len(free) * math.log(2 * n),
+        sides=sides,
+        point=point,
+        grounded=grounded,
+        covariance=spread,
+        correlations={} if misfit else correlations_of(list(UNITS), by, spread),
+        condition=condition_of(best.jacobian[:, free]),
+    )
 
 
 def _cost(found: Minimum) -> float:
     return found.cost if math.isfinite(found.cost) else math.inf
 
 
-def _estimates(
-    point: Array,
-    spread: Array,
-    sides: tuple[Side, ...],
-    misfit: Reason,
-    excess: float,
-    criterion: float,
-    grounded: bool,
-) -> TwoMass:
-    first, ratio, spring = (float(each) for each in np.exp(point[:3]))
-    unit = np.eye(len(point))
-    second = first * ratio
-    total = first + second
+def _numbers(point: Array) -> Array:
+    """Those of `UNITS` that follow from a point, shape (10,)."""
+    first, ratio, spring = np.exp(point[:3])
+    second, damping = first * ratio, point[3]
     rise = math.sqrt(spring * (1.0 / first + 1.0 / second)) / (2.0 * math.pi)
     dip = math.sqrt(spring / second) / (2.0 * math.pi)
-    # d log of each by (log J1, log J2 / J1, log k).
-    share = second / total
-    of_second, of_total = unit[0] + unit[1], unit[0] + share * unit[1]
-    by_rise = 0.5 * (unit[2] + of_total - unit[0] - of_second)
-    by_dip = 0.5 * (unit[2] - of_second)
-
-    share_of = 0.5 / math.sqrt(spring * second)
-    by_share = share_of * (unit[3] - 0.5 * float(point[3]) * (unit[2] + of_second))
-    damping = mode_damping(point)
-    apart = np.maximum(1e-4 * np.abs(point), 1e-9)
-    by_damping = [
-        (mode_damping(point + step) - mode_damping(point - step)) / (2.0 * np.sum(step))
-        for step in np.diag(apart)
-    ]
-    rows: Mapping[str, tuple[float, str, Array]] = {
-        "motor_inertia": (first, "kg m^2", first * unit[0]),
-        "load_inertia": (second, "kg m^2", second * of_second),
-        "total_inertia": (total, "kg m^2", total * of_total),
-        "stiffness": (spring, "N m/rad", spring * unit[2]),
-        "damping": (float(point[3]), "N m s/rad", unit[3]),
-        "resonance": (rise, "Hz", rise * by_rise),
-        "resonance_damping": (damping, "", np.array(by_damping)),
-        "antiresonance": (dip, "Hz", dip * by_dip),
-        "antiresonance_damping": (share_of * float(point[3]), "", by_share),
-        "inertia_ratio": (ratio, "", ratio * unit[1]),
-    }
-    gradients = np.array([gradient for _, _, gradient in rows.values()])
-    error = np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", gradients, spread, gradients), 0.0))
-    estimates: dict[str, Any] = {
-        name: of_fit(name, value, of, float(by_fit), misfit, METHOD)
-        for (name, (value, of, _)), by_fit in zip(rows.items(), error, strict=True)
-    }
-    return TwoMass(
-        **estimates,
-        misfit=misfit,
-        excess=excess,
-        criterion=criterion,
-        sides=sides,
-        point=point,
-        grounded=grounded,
-        covariance=spread,
-        correlations={} if misfit else correlations_of(list(rows), gradients, spread),
-    )
+    share = 0.5 * damping / math.sqrt(spring * second)
+    return np.array(
+        [first, second, first + second, spring, damping, rise, mode_damping(point), dip, share,
+         ratio]
+    )  # fmt: skip
 
 
-def _told(found: TwoMass, torque_known: bool, torque_uncertainty: float | None) -> TwoMass:
-    """What can be told from these sides, and with this knowledge of the torque."""
-    hidden: dict[str, Reason] = {}
-    if not torque_known:
-        hidden = dict.fromkeys((*PARTS, "total_inertia"), NO_SCALE())
-    if found.sides == ("load",) and not found.rigid:
-        hidden |= dict.fromkeys(PARTS, HIDDEN())
+def _with_torque(found: TwoMass, uncertainty: float | None) -> TwoMass:
+    """With the relative uncertainty of the torque as a systematic part of all that is in N m."""
     changed: dict[str, Any] = {
-        name: Estimate.without_interval(name, math.nan, getattr(found, name).unit, reason)
-        for name, reason in hidden.items()
+        name: shifted_by(each, TORQUE_CONSTANT, abs(each.value) * uncertainty)
+        for name in (*PARTS, "total_inertia")
+        if uncertainty is not None and (each := getattr(found, name)).has_interval
     }
-    for name in (*PARTS, "total_inertia"):
-        each = getattr(found, name)
-        if name in changed or not each.has_interval or torque_uncertainty is None:
-            continue
-        part = Systematic(TORQUE_CONSTANT, abs(each.value) * torque_uncertainty)
-        changed[name] = replace(each, systematic=(*each.systematic, part))
-    kept = {pair: share for pair, share in found.correlations.items() if not {*pair} & {*hidden}}
-    return replace(found, **changed, correlations=kept)
+    return replace(found, **changed)

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import delays_to_try
-from campaign.estimation.frequency_response import Array, ComplexArray
 
 Side = Literal["motor", "load"]
 STARTS = 8

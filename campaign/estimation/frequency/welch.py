@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-from campaign.estimation.frequency_response import Array, ComplexArray
 
 Estimator = Literal["H1", "H2", "Hv"]
 Excited = Literal["input", "reference"]
@@ -24,6 +24,8 @@ SEGMENTS = 16
 """lengths of a segment that a recording has, unless told otherwise."""
 FEWEST_AVERAGES = 4.0
 """Effective averages below which spectra say nothing about their own scatter."""
+WINDOW, OVERLAP = "hann", 0.5
+"""of the segments: its name in `scipy.signal`, and what of a segment the next one shares."""
 FIRST_LINE = 2
 """Lines below are those of the mean and what a window makes of it."""
 STRONG = 10.0
@@ -72,19 +74,11 @@ def _coherence(cross: ComplexArray, one: Array, other: Array) -> Array:
     return np.asarray(np.minimum(np.abs(cross) ** 2 / product, 1.0))
 
 
-def spectra(
-    records: Sequence[Record],
-    segment: int | None = None,
-    overlap: float = 0.5,
-    window: str = "hann",
-) -> Spectra:
+def spectra(records: Sequence[Record], segment: int | None = None) -> Spectra:
     """Averaged over the segments of all records (Welch, IEEE Trans. AU-15 (1967) 70).
 
-    Args:
-        segment: its length in samples: the resolution is rate / segment. Absent: a 16th of them
-            all, as far as the shortest record has it.
-        overlap: share of a segment that the next one shares.
-        window: by its name in `scipy.signal.get_window`.
+    segment: its length in samples: the resolution is rate / segment. Absent: a 16th of them all, as
+        far as the shortest record has it.
 
     Raises ValueError for records of different rates, or too short for enough averages.
     """
@@ -95,14 +89,12 @@ def spectra(
     rates = {record.rate for record in records}
     if len(rates) > 1:
         raise ValueError("the records were sampled at different rates")
-    if not 0.0 <= overlap < 1.0:
-        raise ValueError("overlap is a share of a segment, below 1")
     shortest, total = (of(len(record.output) for record in records) for of in (min, sum))
     length = segment or min(max(total // SEGMENTS, 8), shortest)
     if length < 8 or length > shortest:
         raise ValueError(f"a segment of {length} samples; the shortest record has {shortest}")
-    shape = get_window(window, length)
-    step = max(1, round(length * (1.0 - overlap)))
+    shape = get_window(WINDOW, length)
+    step = round(length * (1.0 - OVERLAP))
     with_reference = all(record.reference is not None for record in records)
     parts = [_segments(record, shape, step, with_reference) for record in records]
     weight = _worth(shape, step, [part.shape[1] for part in parts])
@@ -124,7 +116,7 @@ def spectra(
         r = lines[2]
         of_reference = (mean(r, r).real, mean(y, r), mean(u, r))
     method = (
-        f"{window} segments of {length / rate:.4g} s, overlap {100 * overlap:.0f} %, "
+        f"{WINDOW} segments of {length / rate:.4g} s, overlap {100 * OVERLAP:.0f} %, "
         f"{weight:.1f} effective averages"
     )
     return Spectra(
@@ -163,8 +155,6 @@ def welch_response(
     excited: Excited,
     estimator: Estimator = "H1",
     segment: int | None = None,
-    overlap: float = 0.5,
-    window: str = "hann",
 ) -> MeasuredResponse:
     """Output over input, with scatter from coherence and averages, bias from half the segment.
 
@@ -183,11 +173,11 @@ def welch_response(
             "a closed loop without its reference: output over input would be a mixture of the "
             "plant and its controller; record what comes into the loop from outside"
         )
-    whole = spectra(records, segment, overlap, window)
+    whole = spectra(records, segment)
     length = segment or _length(whole, records[0].rate)
     found = _of_spectra(whole, excited, estimator)
     if length // 2 >= 8:
-        half = _of_spectra(spectra(records, length // 2, overlap, window), excited, estimator)
+        half = _of_spectra(spectra(records, length // 2), excited, estimator)
         found = _with_bias(found, half)
     if excited == "input" or whole.of_reference is None:
         return found

@@ -9,9 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.intervals import shifted_by, with_error
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Regression, regress
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import Term
@@ -34,16 +35,12 @@ def estimates(
     found = {}
     for index, term in enumerate(terms):
         value, error = float(fit.values[index]), float(fit.robust[index])
-        wide = fit.quantile * error
-        if fit.freedom < 1.0 or not math.isfinite(wide):
+        if fit.freedom < 1.0 or not math.isfinite(fit.quantile * error):
             found[term.name] = Estimate.without_interval(
                 term.name, value, term.unit, TOO_FEW_ROWS()
             )
             continue
-        one = Estimate(
-            term.name, value, term.unit, value - wide, value + wide, LEVEL, METHOD,
-            standard_error=error, freedom=fit.freedom,
-        )  # fmt: skip
+        one = with_error(term.name, value, term.unit, error, fit.freedom, METHOD, fit.quantile)
         for source, far in parts.items():
             one = shifted_by(one, source, None if far is None else float(far[index]))
         found[term.name] = one

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import LEVEL, shifted_by
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.intervals import shifted_by, with_error
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece, fitted, regress, stacked
 from campaign.estimation.inverse.rows import all_rows, late_force, moving, rows
 from campaign.estimation.inverse.terms import Terms
@@ -101,13 +102,10 @@ def _with_interval(
         reason = LIKE_OTHER_TERMS(own_percent=100 * own)
         return Estimate.without_interval("delay", math.nan, "s", reason, method=METHOD)
     fit = fitted(wider, np.asarray(np.linalg.pinv(design)), design, force)
-    half = fit.quantile * float(fit.robust[-1])
-    if not half < reach:
+    error = float(fit.robust[-1])
+    if not fit.quantile * error < reach:
         return Estimate.without_interval("delay", math.nan, "s", STEADY_FORCE(), method=METHOD)
-    return Estimate(
-        "delay", delay, "s", delay - half, delay + half, LEVEL, METHOD,
-        standard_error=float(fit.robust[-1]), freedom=fit.freedom,
-    )  # fmt: skip
+    return with_error("delay", delay, "s", error, fit.freedom, METHOD, fit.quantile)
 
 
 def _own_share(design: Array) -> float:

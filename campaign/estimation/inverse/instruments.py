@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array
+from campaign.arrays import Array
 from campaign.estimation.inverse.regression import (
     Piece,
     Regression,

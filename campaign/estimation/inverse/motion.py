@@ -13,9 +13,8 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array, Flags
 
 ORDER = 4
 """of the Butterworth low-pass, which runs forward and backward."""
@@ -220,7 +219,7 @@ class LateRows:
         return np.asarray(self._between(wanted))
 
 
-def whole_pieces(good: NDArray[np.bool_], fewest: int) -> Sequence[slice]:
+def whole_pieces(good: Flags, fewest: int) -> Sequence[slice]:
     """Runs of at least `fewest` samples that are all there; good: shape (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2)

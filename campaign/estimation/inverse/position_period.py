@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array
+from campaign.arrays import Array
 
 FEWEST, MOST = 1.0, 400.0
 """Periods in the travel between which one is looked for."""

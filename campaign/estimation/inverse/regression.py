@@ -1,10 +1,9 @@
 """Linear regression with autocorrelated residuals over several recordings.
 
 Ordinary deviations of an inverse dynamic model are 4 to 5 times too small: what it leaves over is
-no white noise. The covariance here is that of Newey and West (Econometrica 55, 1987) with
-Bartlett's weights; the bandwidth follows Andrews' rule (Econometrica 59, 1991, equations 6.2 and
-6.4), and half and twice of it are shown beside it. Quantiles know of the bandwidth (Kiefer and
-Vogelsang, Econom. Theory 21, 2005, Table 1): with a long one plain Student's t holds too little.
+no white noise. The covariance here is that of `long_run`. Quantiles know of the bandwidth (Kiefer
+and Vogelsang, Econom. Theory 21, 2005, Table 1): with a long one plain Student's t holds too
+little.
 """
 
 from __future__ import annotations
@@ -15,18 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.gate import MATTERS
 from campaign.estimation.intervals import student
-from campaign.estimation.inverse.motion import Array
+from campaign.estimation.long_run import bandwidths, long_run, safe_deviations, scaled_to
 
-DIFFER = 1.3
-"""Deviations at half and twice the bandwidth that differ by more than this: the largest counts."""
 COLLINEAR = 1e10
 """Condition number of the scaled columns above which some cannot be told apart."""
 KIEFER = (1.0, 1.51500, 0.21224, -0.27163)
 """Polynomial in bandwidth over samples by which a normal quantile grows (Bartlett, 97.5 %)."""
-MOST_LAGS = 0.2
-"""of a piece's samples."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class Regression:
         values: coefficients, shape (k,).
         ordinary: deviations for independent residuals, shape (k,).
         robust: deviations with autocorrelation, shape (k,): those at the rule's bandwidth, or the
-            largest of half, rule and twice where they differ by more than `DIFFER`.
+            largest of half, rule and twice where they differ (`long_run.safe_deviations`).
         by_bandwidth: at half, rule and twice the bandwidth.
         covariance: robust, shape (k, k), scaled so that its diagonal is `robust` squared.
         lags: bandwidth of the rule.
@@ -96,16 +92,13 @@ class Regression:
         return float(student(max(self.freedom, 1.0)) * grown)
 
 
-def regress(pieces: Sequence[Piece], weights: Sequence[Array] | None = None) -> Regression:
+def regress(pieces: Sequence[Piece]) -> Regression:
     """Least squares of the force by the columns, all pieces together.
-
-    weights: of the rows of each piece, shape (n,), inverse deviations; 1 when absent.
 
     Raises ValueError where there are too few rows, or columns that cannot be told apart.
     """
-    weighted = _weighted(pieces, weights)
-    design, force = stacked(weighted)
-    return fitted(weighted, np.asarray(np.linalg.pinv(_checked(design))), design, force)
+    design, force = stacked(pieces)
+    return fitted(pieces, np.asarray(np.linalg.pinv(_checked(design))), design, force)
 
 
 def stacked(pieces: Sequence[Piece]) -> tuple[Array, Array]:
@@ -132,22 +125,18 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
     # Each row's share in each coefficient's error; pieces do not know of each other.
     scores = [s * e[:, None] for s, e in zip(np.split(inverse.T, cuts), residuals, strict=True)]
     scores = [s * math.sqrt(n / (n - k)) for s in scores]
-    most = MOST_LAGS * max(len(each) for each in scores)
-    lags = min(bandwidth(scores), most)
-    tried = (0.5 * lags, lags, min(2.0 * lags, most))
+    tried = bandwidths(scores)
     covariances = [long_run(scores, each) for each in tried]
-    found = [np.sqrt(np.diag(each)) for each in covariances]
-    largest = np.max(found, axis=0)
-    robust = np.where(largest > DIFFER * np.min(found, axis=0), largest, found[1])
-    scale = robust / found[1]
+    found = np.sqrt([np.diag(each) for each in covariances])
+    robust = safe_deviations(found)
     effective = effective_count(residuals) * n / len(force)
     return Regression(
         values=values,
         ordinary=ordinary,
         robust=robust,
         by_bandwidth=tuple(Deviations(lag, sd) for lag, sd in zip(tried, found, strict=True)),
-        covariance=covariances[1] * np.outer(scale, scale),
-        lags=lags,
+        covariance=scaled_to(covariances[1], robust),
+        lags=tried[1],
         freedom=effective - k,
         effective=effective,
         residuals=residuals,
@@ -157,44 +146,6 @@ def fitted(pieces: Sequence[Piece], inverse: Array, design: Array, force: Array)
         likeness=float(np.linalg.cond(design / np.linalg.norm(design, axis=0))),
         matters=MATTERS * float(np.abs(force).max()) / np.abs(design).max(axis=0),
     )
-
-
-def long_run(scores: Sequence[Array], lags: float) -> Array:
-    """Covariance of the sum of scores, each (n, k), by Bartlett's weights up to `lags`."""
-    # Whole numbers of lags are sums over a window; those between two are a mean of theirs.
-    below = max(math.floor(lags), 1)
-    above = max(math.ceil(lags), 1)
-    share = above * (lags - below) / lags if above > below else 0.0
-    found = (1.0 - share) * _windowed(scores, below)
-    return found if share == 0.0 else found + share * _windowed(scores, above)
-
-
-def _windowed(scores: Sequence[Array], length: int) -> Array:
-    """The same for a whole number: squares of sums over that many rows, at every place."""
-    total = np.zeros((scores[0].shape[1],) * 2)
-    for each in scores:
-        sums = np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
-        place = np.arange(1, len(each) + length)
-        window = sums[np.minimum(place, len(each))] - sums[np.maximum(place - length, 0)]
-        total += window.T @ window
-    return total / length
-
-
-def bandwidth(scores: Sequence[Array]) -> float:
-    """Lags by Andrews' rule for Bartlett's weights: an AR(1) to each column of the scores."""
-    over, under, count = 0.0, 0.0, sum(len(each) for each in scores)
-    for column in range(scores[0].shape[1]):
-        parts = [each[:, column] for each in scores]
-        square = sum(float(part @ part) for part in parts)
-        if square == 0.0:
-            continue
-        neighbours = sum(float(part[1:] @ part[:-1]) for part in parts)
-        rho = min(max(neighbours / square, -0.97), 0.97)
-        innovations = 1.0 - rho**2  # of scores scaled to unit variance
-        over += 4.0 * rho**2 * innovations**2 / ((1.0 - rho) ** 6 * (1.0 + rho) ** 2)
-        under += innovations**2 / (1.0 - rho) ** 4
-    share = float(over / under) if under > 0 else 0.0
-    return max(1.1447 * float((share * count) ** (1.0 / 3.0)), 1.0)
 
 
 def effective_count(residuals: Sequence[Array]) -> float:
@@ -220,15 +171,6 @@ def effective_count(residuals: Sequence[Array]) -> float:
             break
         time, lag = time + 2.0 * pair, lag + 2
     return count / max(time, 1.0)
-
-
-def _weighted(pieces: Sequence[Piece], weights: Sequence[Array] | None) -> Sequence[Piece]:
-    if weights is None:
-        return pieces
-    return [
-        Piece(piece.columns * each[:, None], piece.force * each, piece.time)
-        for piece, each in zip(pieces, weights, strict=True)
-    ]
 
 
 def _checked(design: Array) -> Array:

@@ -10,8 +10,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.inverse.motion import (
-    Array,
     FilterSettings,
     LateRows,
     Motion,

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.inverse.motion import Array, Motion, later, zero_phase
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion, later, zero_phase
 from campaign.estimation.inverse.terms import Terms
 
 STRETCH = 1.0
@@ -71,25 +72,14 @@ def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
     return Loop(float(values[0]), float(values[1]), ahead, explained)
 
 
-def simulated_rate(
-    motion: Motion, terms: Terms, values: Array, delay: float = 0.0, stretch: float = STRETCH
-) -> tuple[NDArray[np.int64], Array]:
-    """Samples of whole stretches, (m,) indices, and the rate that is simulated there, (m,)."""
-    found = driven_motion(motion, terms, values, delay, stretch)
-    count = len(found.time)
-    return np.arange(count, dtype=np.int64), found.rate
-
-
-def driven_motion(
-    motion: Motion, terms: Terms, values: Array, delay: float = 0.0, stretch: float = STRETCH
-) -> Motion:
+def driven_motion(motion: Motion, terms: Terms, values: Array, delay: float = 0.0) -> Motion:
     """Whole stretches of a motion as the model makes them of the recorded force.
 
     values: of the terms, the first of which is the inertia. Semi-implicit Euler at the sample rate:
     good to the step, as the force is held over it. Raises ValueError without a positive inertia or
     a whole stretch.
     """
-    count, steps = _stretches(motion, stretch)
+    count, steps = _stretches(motion)
     force = later(motion.force, delay, motion.sample_rate)[: count * steps].reshape(count, steps)
     start = slice(0, count * steps, steps)
     warm = _heat(motion, np.arange(count * steps).reshape(count, steps))
@@ -107,7 +97,7 @@ def followed_motion(
 
     Raises ValueError as `driven_motion` does.
     """
-    count, steps = _stretches(motion, STRETCH)
+    count, steps = _stretches(motion)
     lead = round(LEAD * motion.sample_rate)
     first = np.arange(count) * steps - lead
     where = np.clip(first[:, None] + np.arange(steps + lead), 0, None)
@@ -127,11 +117,11 @@ def followed_motion(
     return _joined(motion, made, lead)
 
 
-def _stretches(motion: Motion, stretch: float) -> tuple[int, int]:
-    steps = round(stretch * motion.sample_rate)
+def _stretches(motion: Motion) -> tuple[int, int]:
+    steps = round(STRETCH * motion.sample_rate)
     count = len(motion.time) // max(steps, 1)
     if count < 1 or steps < 2:
-        raise ValueError(f"the motion is shorter than {stretch:g} s")
+        raise ValueError(f"the motion is shorter than {STRETCH:g} s")
     return count, steps
 
 
@@ -206,7 +196,7 @@ def relative_rate_error(
     for motion in motions:
         # Friction that drives, as a swapped sign makes it, runs away: infinite, and no warning.
         with np.errstate(over="ignore", invalid="ignore"):
-            where, rate = simulated_rate(motion, terms, values, delay)
-            over += float(np.sum((rate - motion.rate[where]) ** 2))
-        under += float(np.sum(motion.rate[where] ** 2))
+            rate = driven_motion(motion, terms, values, delay).rate
+            over += float(np.sum((rate - motion.rate[: len(rate)]) ** 2))
+        under += float(np.sum(motion.rate[: len(rate)] ** 2))
     return float(np.sqrt(over / under))

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece, Regression, regress
 from campaign.estimation.inverse.rows import in_blocks, part, rows
 from campaign.estimation.inverse.terms import Term

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion
 
 Terms = Sequence["Term"]
 
@@ -109,21 +110,20 @@ DIRECTIONAL = (
 """Both directions of their own; a constant besides could not be told from their difference."""
 
 
-def periodic(period: float, number: int = 1) -> tuple[Term, ...]:
+def periodic(period: float) -> tuple[Term, ...]:
     """Force and friction that repeat every `period` (rad, or m): sine and cosine of each."""
 
     def wave(motion: Motion, shape: Callable[[Array], Array]) -> Array:
         return np.asarray(shape(2.0 * np.pi * motion.position / period))
 
-    tail = f"_{number}" if number > 1 else ""
     cogging = "Force over position, whatever the direction."
     ripple = "Friction over position."
     return (
-        Term(f"cogging_sine{tail}", "sin(2πq/p)", "N m", cogging, lambda m: wave(m, np.sin)),
-        Term(f"cogging_cosine{tail}", "cos(2πq/p)", "N m", cogging, lambda m: wave(m, np.cos)),
-        Term(f"ripple_sine{tail}", "sign v sin(2πq/p)", "N m", ripple,
+        Term("cogging_sine", "sin(2πq/p)", "N m", cogging, lambda m: wave(m, np.sin)),
+        Term("cogging_cosine", "cos(2πq/p)", "N m", cogging, lambda m: wave(m, np.cos)),
+        Term("ripple_sine", "sign v sin(2πq/p)", "N m", ripple,
              lambda m: np.sign(m.rate) * wave(m, np.sin)),
-        Term(f"ripple_cosine{tail}", "sign v cos(2πq/p)", "N m", ripple,
+        Term("ripple_cosine", "sign v cos(2πq/p)", "N m", ripple,
              lambda m: np.sign(m.rate) * wave(m, np.cos)),
     )  # fmt: skip
 

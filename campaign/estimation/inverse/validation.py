@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.intervals import LEVEL
-from campaign.estimation.inverse.motion import Array
 from campaign.estimation.inverse.regression import effective_count
 from campaign.reason import Cause
 
-REPEATS = 2000
+REPEATS, SEED = 2000, 1
 """of the resampling."""
 FEWEST_BLOCKS = 8
 """Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
@@ -42,17 +42,17 @@ class Prediction:
         return float(np.linalg.norm(self.residuals) / np.linalg.norm(self.force))
 
 
-def relative_error(name: str, prediction: Prediction, seed: int = 1) -> Estimate:
+def relative_error(name: str, prediction: Prediction) -> Estimate:
     """The relative residual, with an interval over blocks of the motion."""
-    return _by_blocks(name, (prediction,), seed)
+    return _by_blocks(name, (prediction,))
 
 
-def improvement(name: str, one: Prediction, other: Prediction, seed: int = 1) -> Estimate:
+def improvement(name: str, one: Prediction, other: Prediction) -> Estimate:
     """How much lower the relative residual of `other` is than that of `one`, on the same rows."""
-    return _by_blocks(name, (one, other), seed)
+    return _by_blocks(name, (one, other))
 
 
-def _by_blocks(name: str, sides: tuple[Prediction, ...], seed: int) -> Estimate:
+def _by_blocks(name: str, sides: tuple[Prediction, ...]) -> Estimate:
     """Circular blocks, longer than residuals know of each other (Politis and Romano, 1992)."""
     squares = [side.residuals**2 for side in sides]
     norm = sides[0].force ** 2
@@ -70,7 +70,7 @@ def _by_blocks(name: str, sides: tuple[Prediction, ...], seed: int) -> Estimate:
     if blocks < FEWEST_BLOCKS:
         reason = TOO_FEW_BLOCKS(blocks=blocks)
         return Estimate.without_interval(name, here, "", reason, method=method)
-    random = np.random.Generator(np.random.PCG64(seed))
+    random = np.random.Generator(np.random.PCG64(SEED))
     starts = random.integers(0, count, (REPEATS, blocks, 1))
     rows = (starts + np.arange(length)).reshape(REPEATS, -1) % count
     low, high = np.quantile(value(rows), (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))

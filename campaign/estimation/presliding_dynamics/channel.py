@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.presliding_dynamics.plant import Array
+from campaign.arrays import Array, Flags
 
 MOST_ORDER = 12
 """Of the autoregression of a channel's noise."""
@@ -31,7 +30,7 @@ class Channel:
 
     name: str
     samples: Array
-    kept: NDArray[np.bool_]
+    kept: Flags
     there: Array
     basis: Array
     deviation: float
@@ -39,7 +38,7 @@ class Channel:
 
     @classmethod
     def of(
-        cls, name: str, samples: Array, kept: NDArray[np.bool_], deviation: float, whitening: Array
+        cls, name: str, samples: Array, kept: Flags, deviation: float, whitening: Array
     ) -> Channel:
         """With what follows from those: a sample after a lost one cannot be whitened."""
         there = kept.copy()

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Array
+from campaign.arrays import Array
 
 PER_PERIOD = 3.0
 """Lags in a period of the highest frequency: more would tell the same."""

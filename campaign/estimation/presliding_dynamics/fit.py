@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.channel import (
     Channel,
     autoregression,
@@ -29,7 +30,7 @@ from campaign.estimation.presliding_dynamics.fit_result import (
     with_slopes,
 )
 from campaign.estimation.presliding_dynamics.parameters import Parameters
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
+from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
 from campaign.estimation.presliding_dynamics.start import first_plant
 
@@ -45,21 +46,20 @@ ROUNDS = 1
 
 
 def fit_presliding_dynamics(
-    records: Sequence[Record], assumed: Assumptions | None = None, first: Plant | None = None
+    records: Sequence[Record], assumed: Assumptions | None = None
 ) -> JointFit:
     """Fit sigma0, sigma1, J and what else is free to all records at once.
 
-    `first`: where the search begins; absent: a linear fit of the spectra. Raises ValueError with
-    the reason where there is no start, and where no start leads to a minimum.
+    The search begins at a linear fit of the spectra. Raises ValueError with the reason where there
+    is no start, and where no start leads to a minimum.
     """
     if not records:
         raise ValueError("there is no record to fit")
     if len({record.doubts.shape[1] for record in records}) > 1:
         raise ValueError("the records differ in how many columns of doubt their torques have")
     known = assumed or Assumptions()
-    begin = first or first_plant(records, known)
     best: JointFit | None = None
-    for start in _starts(begin):
+    for start in _starts(first_plant(records, known)):
         try:
             found = search(_prepared(records, start, known))
         except ValueError:
@@ -88,10 +88,9 @@ def _prepared(records: Sequence[Record], first: Plant, assumed: Assumptions) -> 
     parameters = Parameters.of(records, first, assumed)
     priors = np.zeros(parameters.size)
     priors[len(parameters.names) :] = 1.0
-    viscous = parameters.index("viscous_friction")
-    if viscous is not None:
-        priors[viscous] = 1.0  # of the order of critical damping: all that is known beforehand
-    grids = tuple(Grid.of(record, first, assumed.between) for record in records)
+    # Of the order of critical damping: all that is known of it beforehand.
+    priors[parameters.names.index("viscous_friction")] = 1.0
+    grids = tuple(Grid.of(record, first) for record in records)
     channels = tuple(
         tuple(
             Channel.of(name, samples, there, white_noise(samples), np.ones(1))

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimation.presliding_dynamics.channel import Channel
 from campaign.estimation.presliding_dynamics.parameters import LARGEST_OFFSET, Parameters
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
-from campaign.estimation.presliding_dynamics.record import Record
+from campaign.estimation.presliding_dynamics.plant import Plant
+from campaign.estimation.presliding_dynamics.record import Record, measured
 from campaign.estimation.presliding_dynamics.simulation import (
-    Between,
     Motion,
     simulate,
     steps_per_sample,
@@ -37,10 +37,10 @@ class Grid:
     per_sample: int
 
     @classmethod
-    def of(cls, record: Record, plant: Plant, between: Between) -> Grid:
+    def of(cls, record: Record, plant: Plant) -> Grid:
         """Fine enough for a plant."""
         count = steps_per_sample(plant, record.step, record.highest_frequency())
-        return cls(torque_on_grid(record.torque, count, between), count)
+        return cls(torque_on_grid(record.torque, count), count)
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ class JointFit:
         """That fits best."""
         return self.parameters.plant(self.vector)
 
-    def motion(self, number: int, plant: Plant | None = None) -> Motion:
-        """Simulated motion of a record, of this plant or of another."""
-        return _motion(self, number, self.vector, plant)
+    def motion(self, number: int) -> Motion:
+        """Simulated motion of a record."""
+        return _motion(self, number, self.vector)
 
     def answers(self, number: int, plant: Plant | None = None) -> Array:
         """Simulated samples of a record's channels, shape (channels, n)."""
@@ -144,7 +144,7 @@ def centred(fit: JointFit) -> JointFit:
 
 
 def _on_grid(fit: JointFit, number: int, torque: Array) -> Array:
-    return torque_on_grid(torque, fit.grids[number].per_sample, fit.parameters.assumed.between)
+    return torque_on_grid(torque, fit.grids[number].per_sample)
 
 
 def with_torque(fit: JointFit, number: int, torque: Array) -> JointFit:
@@ -154,7 +154,7 @@ def with_torque(fit: JointFit, number: int, torque: Array) -> JointFit:
     return replace(fit, grids=tuple(grids))
 
 
-def _motion(fit: JointFit, number: int, vector: Array, plant: Plant | None) -> Motion:
+def _motion(fit: JointFit, number: int, vector: Array, plant: Plant | None = None) -> Motion:
     parameters, record = fit.parameters, fit.records[number]
     grid, own = fit.grids[number], vector[parameters.of_record(number)]
     scale = LARGEST_OFFSET * record.amplitude
@@ -197,7 +197,7 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
     """Of the simulated, in deviations, shape (channels, n, size): forward differences."""
     parameters, channels = fit.parameters, fit.channels[number]
     own = parameters.of_record(number)
-    here = _motion(fit, number, vector, None)
+    here = _motion(fit, number, vector)
     answers = _seen(fit, number, here, vector)
     found = np.zeros((len(channels), len(fit.records[number].torque), len(vector)))
     doubts = zip(channels, fit.doubt_answers[number], strict=True)
@@ -206,7 +206,34 @@ def slopes_of(fit: JointFit, number: int, vector: Array) -> Array:
         moved = vector.copy()
         moved[index] += DIFFERENCE
         delay = parameters.names[index : index + 1] in DELAYS
-        motion = here if delay else _motion(fit, number, moved, None)
+        motion = here if delay else _motion(fit, number, moved)
         slope = (_seen(fit, number, motion, moved) - answers) / DIFFERENCE
         found[:, :, index] = [c.left(each) for c, each in zip(channels, slope, strict=True)]
     return found
+
+
+def unexplained(fit: JointFit, record: Record) -> float:
+    """Rms of what the fitted plant misses of another record, over that of the record's own motion.
+
+    Of its first channel, offset and drift taken out of both. Nothing is fitted but those.
+    """
+    grid = Grid.of(record, fit.plant)
+    channels = tuple(
+        Channel.of(name, samples, there, 1.0, np.ones(1))
+        for name, samples, there in measured(record)
+    )
+    own = 1 if record.at_rest else 3
+    shared = fit.vector[: len(fit.parameters.names)]
+    other = replace(
+        fit,
+        records=(record,),
+        parameters=replace(fit.parameters, factors=0, own=(own,)),
+        vector=np.append(shared, np.zeros(own)),
+        channels=(channels,),
+        grids=(grid,),
+        taken=np.zeros(0),
+        doubt_answers=(np.zeros((len(channels), len(record.torque), 0)),),
+    )
+    first, answer = channels[0], other.answers(0)[0]
+    missed = first.left(first.samples - answer)
+    return float(np.linalg.norm(missed) / np.linalg.norm(first.left(first.samples)))

@@ -10,20 +10,25 @@ so. Everything is scaled to be of order one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Appendage, Array, Bristles, Plant
+from campaign.arrays import Array
+from campaign.estimation.presliding_dynamics.plant import Appendage, Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 
-LONGEST_DELAY = 20.0
-"""Samples that a channel may lag behind, either way."""
 LOGARITHMIC = ("bristle_stiffness", "inertia", "appendage_frequency", "appendage_inertia")
 FARTHEST = 7.0
 """Logarithm by which a parameter may end away from its start: a factor of 1000."""
-MOST_YIELDING = 2.0
-"""Largest torque over that at which the bristles would slip; above 1 the load breaks away."""
+BOUNDS = {
+    "damping": (-2.0, 50.0),
+    "yielding": (-2.0, 2.0),
+    "rate_delay": (-20.0, 20.0),
+    "angle_delay": (-20.0, 20.0),
+}
+"""Between which others are looked for: over critical damping; largest torque over that at which the
+bristles would slip, above 1 of which the load breaks away; samples that a channel lags behind."""
 LARGEST_OFFSET = 1.0
 """Scatter of what loads an axis besides its drive, over the largest torque: all that is said of it
 beforehand."""
@@ -34,8 +39,7 @@ class Parameters:
     """Layout and scale of the vector: shared parameters, then those of each record.
 
     Attributes:
-        names: of the shared ones: `bristle_stiffness`, then `bristle_damping`, or `damping` (with
-            the viscous one) where both are free, then `yielding`.
+        names: of the shared ones; `damping` is the sum of sigma1 and sigma2, which is known well.
         first: the plant that scales are taken from.
         step: sampling step that delays are scaled by (s).
         torque: that yielding is scaled by (N m), the largest of all records.
@@ -55,16 +59,9 @@ class Parameters:
     @classmethod
     def of(cls, records: Sequence[Record], first: Plant, assumed: Assumptions) -> Parameters:
         """Those that the records and what is assumed leave open."""
-        # Where viscous friction is free, too, what is known well is the sum of both dampings.
-        whole = "damping" if assumed.viscous_free else "bristle_damping"
-        names = ["bristle_stiffness", whole, "yielding"]
-        if assumed.inertia is None:
-            names.append("inertia")
-        if assumed.viscous_free:
-            names.append("viscous_friction")
-        if assumed.delay is None:
-            names += ["rate_delay"] if any(r.rate is not None for r in records) else []
-            names += ["angle_delay"] if any(r.angle is not None for r in records) else []
+        names = ["bristle_stiffness", "damping", "yielding", "inertia", "viscous_friction"]
+        names += ["rate_delay"] if any(r.rate is not None for r in records) else []
+        names += ["angle_delay"] if any(r.angle is not None for r in records) else []
         if assumed.appendage is not None and assumed.appendage_free:
             names += ["appendage_frequency", "appendage_inertia", "appendage_damping_ratio"]
         return cls(
@@ -92,10 +89,6 @@ class Parameters:
         """Where the factors of what the torque may be off by stand."""
         return slice(len(self.names), self.common)
 
-    def index(self, name: str) -> int | None:
-        """Where a shared parameter stands; None: it is not free."""
-        return self.names.index(name) if name in self.names else None
-
     def of_record(self, number: int) -> slice:
         """Where the parameters of a record stand."""
         begin = self.common + sum(self.own[:number])
@@ -103,23 +96,20 @@ class Parameters:
 
     def start(self) -> Array:
         """The vector of the first plant."""
+        first, bristles, part = self.first, self.first.bristles[0], self.first.appendage
+        values = {
+            "bristle_stiffness": np.log(bristles.stiffness),
+            "damping": (bristles.damping + first.viscous) / self.damping_scale,
+            "yielding": bristles.compliance * self.torque,
+            "inertia": np.log(first.inertia),
+            "viscous_friction": first.viscous / self.damping_scale,
+        }
+        if part is not None:
+            values["appendage_frequency"] = np.log(part.frequency)
+            values["appendage_inertia"] = np.log(part.inertia)
+            values["appendage_damping_ratio"] = part.damping_ratio
         vector = np.zeros(self.size)
-        bristles = self.first.bristles[0]
-        vector[0] = np.log(bristles.stiffness)
-        whole = bristles.damping + (self.first.viscous if self.names[1] == "damping" else 0.0)
-        vector[1] = whole / self.damping_scale
-        vector[2] = bristles.compliance * self.torque
-        part = self.first.appendage
-        for name, value in (
-            ("inertia", np.log(self.first.inertia)),
-            ("viscous_friction", self.first.viscous / self.damping_scale),
-            ("appendage_frequency", np.log(part.frequency) if part else 0.0),
-            ("appendage_inertia", np.log(part.inertia) if part else 0.0),
-            ("appendage_damping_ratio", part.damping_ratio if part else 0.0),
-        ):
-            index = self.index(name)
-            if index is not None:
-                vector[index] = value
+        vector[: len(self.names)] = [values.get(name, 0.0) for name in self.names]
         return vector
 
     @property
@@ -130,54 +120,38 @@ class Parameters:
     def bounds(self) -> tuple[Array, Array]:
         """Between which the vector is looked for: wide, and no end of them is an answer."""
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        low[1], high[1] = -2.0, 50.0
-        low[2], high[2] = -MOST_YIELDING, MOST_YIELDING
         start = self.start()
-        for name in LOGARITHMIC:
-            index = self.index(name)
-            if index is not None:
+        for index, name in enumerate(self.names):
+            if name in LOGARITHMIC:
                 low[index], high[index] = start[index] - FARTHEST, start[index] + FARTHEST
-        for name in ("rate_delay", "angle_delay"):
-            index = self.index(name)
-            if index is not None:
-                low[index], high[index] = -LONGEST_DELAY, LONGEST_DELAY
+            elif name in BOUNDS:
+                low[index], high[index] = BOUNDS[name]
         return low, high
 
     def plant(self, vector: Array) -> Plant:
         """What the shared parameters say."""
         told = dict(zip(self.names, map(float, vector), strict=False))
-        assumed = self.assumed
-        free = told.get("viscous_friction")
-        viscous = assumed.viscous if free is None else free * self.damping_scale
-        damping = float(vector[1]) * self.damping_scale
+        viscous = told["viscous_friction"] * self.damping_scale
         bristles = Bristles(
             float(np.exp(told["bristle_stiffness"])),
-            damping if free is None else damping - viscous,
+            told["damping"] * self.damping_scale - viscous,
             told["yielding"] / self.torque,
-            assumed.coulomb_share,
-            assumed.stribeck_velocity,
-            assumed.stribeck_exponent,
         )
-        part: Appendage | None = assumed.appendage
+        part: Appendage | None = self.assumed.appendage
         if part is not None and "appendage_frequency" in told:
-            part = replace(
-                part,
-                frequency=float(np.exp(told["appendage_frequency"])),
-                inertia=float(np.exp(told["appendage_inertia"])),
-                damping_ratio=told["appendage_damping_ratio"],
+            part = Appendage(
+                float(np.exp(told["appendage_inertia"])),
+                float(np.exp(told["appendage_frequency"])),
+                told["appendage_damping_ratio"],
             )
-        inertia = float(np.exp(told["inertia"])) if "inertia" in told else assumed.inertia
-        return Plant(
-            self.first.inertia if inertia is None else inertia,
-            (bristles,),
-            viscous,
-            part,
-        )
+        return Plant(float(np.exp(told["inertia"])), (bristles,), viscous, part)
 
     def delay(self, vector: Array, channel: str) -> float:
-        """Of a channel behind the torque (s)."""
-        index = self.index(f"{channel}_delay")
-        return (self.assumed.delay or 0.0) if index is None else float(vector[index]) * self.step
+        """Of a channel behind the torque (s); 0 of one that no record of the fit has."""
+        name = f"{channel}_delay"
+        if name not in self.names:
+            return 0.0
+        return float(vector[self.names.index(name)]) * self.step
 
     def in_units(self, vector: Array, name: str) -> tuple[float, float]:
         """A parameter's value (SI), and what a change by 1 in the vector is worth there."""
@@ -186,7 +160,6 @@ class Parameters:
         if name in LOGARITHMIC:
             return float(np.exp(value)), float(np.exp(value))
         scale = {
-            "bristle_damping": self.damping_scale,
             "damping": self.damping_scale,
             "viscous_friction": self.damping_scale,
             "yielding": 1.0 / self.torque,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import (
@@ -22,7 +23,7 @@ from campaign.estimation.intervals import (
 from campaign.estimation.presliding_dynamics.fit import fit_presliding_dynamics, whitened
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
 from campaign.estimation.presliding_dynamics.parameters import LOGARITHMIC
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record
 from campaign.estimation.presliding_dynamics.shape import SURELY, Misfit, misfit_of
 from campaign.estimation.presliding_dynamics.uncertainty import (
@@ -36,7 +37,6 @@ from campaign.reason import NONE, Cause, Reason
 METHOD = "joint output-error fit below breakaway"
 UNITS = {
     "bristle_stiffness": "N m/rad",
-    "bristle_damping": "N m s/rad",
     "damping": "N m s/rad",
     "inertia": "kg m^2",
     "yielding": "1/(N m)",
@@ -47,10 +47,10 @@ UNITS = {
     "appendage_inertia": "kg m^2",
     "appendage_damping_ratio": "",
 }
-POSITIVE = ("bristle_damping", "damping", "viscous_friction", "appendage_damping_ratio")
+POSITIVE = ("damping", "viscous_friction", "appendage_damping_ratio")
 UNSCALED = ("rate_delay", "angle_delay", "yielding")
 """Whose size says nothing of how far an error of the model may move them."""
-PROFILED = ("bristle_stiffness", "bristle_damping", "damping", "inertia")
+PROFILED = ("bristle_stiffness", "damping", "inertia")
 """Whose limits are looked for along the profile where an interval is wide."""
 SLIPPING = 0.95
 """Bristle torque over that at which they slip, as fitted, from which on a load breaks away."""
@@ -70,9 +70,9 @@ class PreslidingDynamics:
     """Result of a joint fit below breakaway.
 
     Attributes:
-        estimates: by name, all of `UNITS` that were free, and what follows from them: `damping`,
-            the sum of sigma1 and sigma2 (N m s/rad), `damping_ratio` of that, and
-            `natural_frequency` (Hz).
+        estimates: by name, all of `UNITS` that were free, where `damping` is the sum of sigma1 and
+            sigma2; and what follows from them: `bristle_damping` sigma1 (N m s/rad),
+            `damping_ratio` of the sum, and `natural_frequency` (Hz).
         fit, spread, misfit: what they rest on.
         reason: why none of them has an interval; none: it is each one's own.
     """
@@ -90,16 +90,15 @@ class PreslidingDynamics:
 
 
 def identify_presliding_dynamics(
-    records: Sequence[Record], assumed: Assumptions | None = None, first: Plant | None = None
+    records: Sequence[Record], assumed: Assumptions | None = None
 ) -> PreslidingDynamics:
     """Stiffness and damping of the bristles and inertia from all records at once.
 
-    `first`: where the search begins; absent: a linear fit of the spectra. An estimate is *not
-    determined* where its interval is wide, or the parameter is at its bound; none has an interval
-    where one inertia on one bristle does not describe the records. Raises ValueError with the
-    reason where there is no fit at all.
+    An estimate is *not determined* where its interval is wide, or the parameter is at its bound;
+    none has an interval where one inertia on one bristle does not describe the records. Raises
+    ValueError with the reason where there is no fit at all.
     """
-    plain = fit_presliding_dynamics(records, assumed, first)
+    plain = fit_presliding_dynamics(records, assumed)
     fit = whitened(plain)
     misfit = misfit_of(plain, fit)
     spread = spread_of(fit)
@@ -192,24 +191,20 @@ def _missed(estimate: Estimate, misfit: Misfit) -> Estimate:
 
 
 def _derived(fit: JointFit, spread: Spread, misfit: Misfit) -> dict[str, Estimate]:
-    """Whole damping, its ratio, and natural frequency of the load, by the delta method."""
+    """Bristle damping, damping ratio and natural frequency of the load, by the delta method."""
     plant, names = fit.plant, fit.parameters.names
     scale, ratio = fit.parameters.damping_scale, 0.5 / math.sqrt(plant.stiffness * plant.inertia)
-    own = plant.bristles[0].damping
+    own, natural = plant.bristles[0].damping, plant.natural_frequency
     whole = own + plant.viscous
-    told: list[tuple[str, float, str, dict[str, float]]] = []
-    if "damping" in names:
-        row = {"damping": scale, "viscous_friction": -scale}
-        told.append(("bristle_damping", own, "N m s/rad", row))
-    else:
-        told.append(("damping", whole, "N m s/rad", {"bristle_damping": scale}))
     # Of stiffness and inertia the vector has logarithms.
     half = -0.5 * whole * ratio
-    row = {"bristle_stiffness": half, "inertia": half, names[1]: ratio * scale}
-    told.append(("damping_ratio", whole * ratio, "", row))
-    natural = plant.natural_frequency
-    row = {"bristle_stiffness": 0.5 * natural, "inertia": -0.5 * natural}
-    told.append(("natural_frequency", natural, "Hz", row))
+    by_ratio = {"bristle_stiffness": half, "inertia": half, "damping": ratio * scale}
+    by_natural = {"bristle_stiffness": 0.5 * natural, "inertia": -0.5 * natural}
+    told = (
+        ("bristle_damping", own, "N m s/rad", {"damping": scale, "viscous_friction": -scale}),
+        ("damping_ratio", whole * ratio, "", by_ratio),
+        ("natural_frequency", natural, "Hz", by_natural),
+    )
     found = {}
     for name, value, unit, slopes in told:
         of = np.array([slopes.get(each, 0.0) for each in names])

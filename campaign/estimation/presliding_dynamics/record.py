@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.presliding_dynamics.plant import Appendage, Array
-from campaign.estimation.presliding_dynamics.simulation import Between
+from campaign.arrays import Array, Flags
+from campaign.estimation.presliding_dynamics.plant import Appendage
 
 FEWEST = 100
 """Samples of a record below which it says too little of its own noise."""
-
-
 FEWEST_PER_PERIOD = 20
 """Samples of a period below which its errors are too few to say how they scatter."""
 ALIKE = 0.9
 """Correlation with itself from which on a torque counts as one that repeats itself."""
+MOST = 0.999
+"""of the power of a torque: what lies beyond moves nothing."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +86,8 @@ class Record:
         """Largest torque (N m)."""
         return float(np.max(np.abs(self.torque)))
 
-    def highest_frequency(self, share: float = 0.999) -> float:
-        """Frequency (Hz) below which this share of the torque that the load answers to lies.
+    def highest_frequency(self) -> float:
+        """Frequency (Hz) below which `MOST` of the torque that the load answers to lies.
 
         Told by the product of both spectra: noise of one alone, however wide, does not count.
         """
@@ -97,7 +96,7 @@ class Record:
         product = np.abs(torque * np.fft.rfft(np.nan_to_num(answer))) ** 2
         product[0] = 0.0
         power = np.cumsum(product) / np.sum(product)
-        index = int(np.searchsorted(power, share))
+        index = int(np.searchsorted(power, MOST))
         return float(np.fft.rfftfreq(len(self.torque), self.step)[min(index, len(power) - 1)])
 
     def samples_per_period(self) -> int | None:
@@ -122,7 +121,7 @@ class Record:
         return found if found >= FEWEST_PER_PERIOD else None
 
 
-def measured(record: Record) -> list[tuple[str, Array, NDArray[np.bool_]]]:
+def measured(record: Record) -> list[tuple[str, Array, Flags]]:
     """The channels of a record: name, samples with 0 for lost ones, and which are there."""
     found = []
     for name, values in (("rate", record.rate), ("angle", record.angle)):
@@ -139,28 +138,15 @@ def _says_something(values: Array) -> bool:
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What a fit takes as known, and what it leaves free besides sigma0, sigma1 and J.
+    """What a fit begins with besides the records.
 
     Attributes:
-        viscous: sigma2 (N m s/rad), or a first guess of it.
-        viscous_free: below breakaway sigma1 and sigma2 nearly add up, so that a fit of both seldom
-            determines either.
-        inertia: J (kg m^2), where it is known; None: it is free.
+        viscous: first guess of sigma2 (N m s/rad). Below breakaway sigma1 and sigma2 nearly add up,
+            so that the sum is known well and either seldom.
         appendage: an elastic part, or a first guess of it.
         appendage_free: whether its frequency, inertia and damping are fitted, too.
-        coulomb_share, stribeck_velocity, stribeck_exponent: course of s(v) over the rate, where
-            rates come near the Stribeck velocity; see `plant`. Its size is always free.
-        delay: of the channels behind the torque (s); None: free, one for each channel.
-        between: what the torque does between its samples.
     """
 
     viscous: float = 0.0
-    viscous_free: bool = False
-    inertia: float | None = None
     appendage: Appendage | None = None
     appendage_free: bool = False
-    coulomb_share: float = 1.0
-    stribeck_velocity: float = np.inf
-    stribeck_exponent: float = 2.0
-    delay: float | None = None
-    between: Between = "smooth"

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
+from campaign.estimation.long_run import bandwidths, long_run
 from campaign.estimation.presliding_dynamics.fit_result import JointFit, products, with_torque
-from campaign.estimation.presliding_dynamics.long_run import at_bandwidths
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles
+from campaign.estimation.presliding_dynamics.plant import Bristles
 from campaign.reason import NONE, Cause, Reason
 
 BANDS = 10
@@ -252,8 +253,10 @@ def _score_test(fit: JointFit, columns: list[Array]) -> tuple[Array, Array, floa
     total = sum((np.einsum("cn,cnk->k", *pair) for pair in pairs), start=total)
     inverse = np.linalg.pinv(own[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
     # What the columns explain is no noise: it would hide itself behind its own size.
-    scores = [(left - more @ (inverse @ total))[:, :, None] * more for left, more in pairs]
-    meat = at_bandwidths([np.sum(each, axis=0) for each in scores])[1] + known.T @ known
+    scores = [
+        np.einsum("cn,cnk->nk", left - more @ (inverse @ total), more) for left, more in pairs
+    ]
+    meat = long_run(scores, bandwidths(scores)[1]) + known.T @ known
     scale = np.sqrt(np.diag(meat))
     statistic = float(
         (total / scale)

@@ -3,7 +3,7 @@
 Below breakaway the equations are linear but for the yielding of the bristles, n = sigma0 |v| z / s.
 The linear part is advanced exactly, whatever its poles; torque and yielding enter as parabolas over
 each step (exponential collocation at the ends and the middle of a step, Hochbruck and Ostermann,
-Acta Numerica 19, 2010, section 2). Between samples the torque is a spline, or held.
+Acta Numerica 19, 2010, section 2). Between samples the torque is a spline.
 
 Checked against Radau at a tolerance of 1e-9: with the step of `steps_per_sample` the rate is within
 1e-4 of its largest value (tests/identification).
@@ -13,15 +13,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from campaign.estimation.presliding_dynamics.plant import Array, Plant
+from campaign.arrays import Array
+from campaign.estimation.presliding_dynamics.plant import Plant
 from campaign.physics.compilation import called, compiled
-
-Between = Literal["smooth", "held"]
-"""What the torque does between its samples: a smooth curve, or each value held until the next."""
 
 FINEST = 0.25
 """Largest step times the fastest frequency that matters (rad)."""
@@ -77,14 +75,11 @@ def steps_per_sample(plant: Plant, sample_step: float, highest: float) -> int:
     return max(1, int(np.ceil(fastest * sample_step / FINEST)))
 
 
-def torque_on_grid(torque: Array, per_sample: int, between: Between) -> Array:
+def torque_on_grid(torque: Array, per_sample: int) -> Array:
     """Torque at every half grid step, shape (steps, 3): beginning, middle and end of each."""
-    steps = (len(torque) - 1) * per_sample
-    if between == "held":
-        held = np.repeat(torque[:-1], per_sample)
-        return np.column_stack([held, held, held])
     from scipy.interpolate import make_interp_spline
 
+    steps = (len(torque) - 1) * per_sample
     fine = np.arange(2 * steps + 1) / (2.0 * per_sample)
     values = make_interp_spline(np.arange(len(torque)), torque, k=ORDER)(fine)
     return np.ascontiguousarray(np.column_stack([values[:-2:2], values[1::2], values[2::2]]))

@@ -6,12 +6,11 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from campaign.estimation.presliding_dynamics.plant import Array, Bristles, Plant
+from campaign.arrays import ComplexArray
+from campaign.estimation.least_squares import straight_line
+from campaign.estimation.presliding_dynamics.plant import Bristles, Plant
 from campaign.estimation.presliding_dynamics.record import Assumptions, Record, measured
-
-ComplexArray = NDArray[np.complex128]
 
 GROUPS = 60
 """of neighbouring frequencies, evenly over their logarithm: within one, noise averages out."""
@@ -38,14 +37,10 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
     for _ in range(PASSES):
         weight = 1.0 / (plant * np.sqrt(power))
         design, aim = rows * weight[:, None], power * weight
-        if assumed.inertia is not None:
-            aim, design = aim - assumed.inertia * design[:, 0], design[:, 1:]
         scale = np.linalg.norm(design, axis=0)
         whole = np.concatenate([design.real, design.imag]) / scale
         sides = np.concatenate([np.real(aim), np.imag(aim)])
         found = np.linalg.lstsq(whole, sides, rcond=None)[0] / scale
-        if assumed.inertia is not None:
-            found = np.concatenate([[assumed.inertia], found])
         omega = np.array([each for _, _, each in parts])
         plant = np.abs(found[0] * 1j * omega + found[1] + found[2] / (1j * omega))
         plant = np.maximum(plant, 1e-6 * np.max(plant))
@@ -57,14 +52,8 @@ def first_plant(records: Sequence[Record], assumed: Assumptions) -> Plant:
         # Nothing at high frequencies: as large as it may be without showing.
         inertia = max(stiffness / (4.0 * highest) ** 2, 2.0 * part.inertia if part else 0.0)
     least = 0.02 * 2.0 * np.sqrt(stiffness * inertia)
-    bristles = Bristles(
-        stiffness,
-        max(damping - assumed.viscous, least),
-        0.3 / max(record.amplitude for record in records),
-        assumed.coulomb_share,
-        assumed.stribeck_velocity,
-        assumed.stribeck_exponent,
-    )
+    compliance = 0.3 / max(record.amplitude for record in records)
+    bristles = Bristles(stiffness, max(damping - assumed.viscous, least), compliance)
     return Plant(inertia, (bristles,), assumed.viscous, part)
 
 
@@ -74,9 +63,9 @@ def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
     channels = {name: values for name, values, _ in measured(record)}
     frequency = np.fft.rfftfreq(len(window), record.step)
     omega = 2.0 * np.pi * np.maximum(frequency, frequency[1])
-    torque = np.fft.rfft(window * _level(record.torque))
+    torque = np.fft.rfft(window * (record.torque - straight_line(record.torque)))
     answer = channels["rate" if "rate" in channels else "angle"]
-    rate = np.fft.rfft(window * _level(answer))
+    rate = np.fft.rfft(window * (answer - straight_line(answer)))
     if "rate" not in channels:
         rate = 1j * omega * rate
     power = np.abs(torque) ** 2
@@ -89,9 +78,3 @@ def _groups(record: Record) -> Iterator[tuple[ComplexArray, float, float]]:
         here, w = cross[begin:end], omega[begin:end]
         row = np.array([np.sum(1j * w * here), np.sum(here), np.sum(here / (1j * w))])
         yield row, float(np.sum(power[begin:end])), float(np.sqrt(w[0] * w[-1]))
-
-
-def _level(values: Array) -> Array:
-    """Without its straight line."""
-    x = np.linspace(-1.0, 1.0, len(values))
-    return np.asarray(values - np.polyval(np.polyfit(x, values, 1), x))

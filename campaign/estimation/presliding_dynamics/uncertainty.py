@@ -7,19 +7,24 @@ larger one counts where they differ by more than chance explains.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
+from campaign.estimation.least_squares import profile_limit
+from campaign.estimation.long_run import bandwidths, long_run, safe_deviations, scaled_to
 from campaign.estimation.presliding_dynamics.fit import search
 from campaign.estimation.presliding_dynamics.fit_result import JointFit
-from campaign.estimation.presliding_dynamics.long_run import DIFFERENT, at_bandwidths
-from campaign.estimation.presliding_dynamics.plant import Array
 
 CHANCE = 0.01
 """with which records that agree would be taken for ones that do not."""
 CURVED = 0.03
 """Relative standard error from which on a limit is looked for along the profile."""
+ACCURACY, DOUBLINGS = 0.01, 4
+"""of such a limit, as a share of it; and how often the distance to it is doubled: each step is a
+fit."""
 TELLABLE = 1e10
 """Condition number of the scaled information beyond which parameters cannot be told apart."""
 
@@ -63,7 +68,7 @@ def spread_of(fit: JointFit) -> Spread:
     shared = len(fit.parameters.names)
     information = fit.information
     scores = [
-        np.sum(left[:, :, None] * slopes, axis=0)
+        np.einsum("cn,cnk->nk", left, slopes)
         for left, slopes in zip(fit.residuals, fit.jacobians, strict=True)
     ]
     length = np.sqrt(np.diag(information))
@@ -79,23 +84,21 @@ def spread_of(fit: JointFit) -> Spread:
     ordinary = np.sqrt(variance * np.diag(inverse))[:shared]
     # What is known beforehand is known no better than it was said to be.
     known = np.diag(fit.priors**2)
-    meats = [meat + known for meat in at_bandwidths(scores)]
+
+    def covariance_at(terms: Sequence[Array], lags: float) -> Array:
+        whole = inverse @ (long_run(terms, lags) + known) @ inverse
+        return np.asarray(whole[:shared, :shared])
+
+    covariances = [covariance_at(scores, lags) for lags in bandwidths(scores)]
+    widths = np.sqrt([np.diag(each) for each in covariances])
+    # A quantised channel errs alike in each period of the torque: no period scatters then.
     folded = [
         _folded(each, r.samples_per_period()) for each, r in zip(scores, fit.records, strict=True)
     ]
-    covariances = [(inverse @ meat @ inverse)[:shared, :shared] for meat in meats]
-    widths = np.array([np.sqrt(np.diag(each)) for each in covariances])
-    chosen = np.where(
-        np.max(widths, axis=0) > DIFFERENT * np.min(widths, axis=0),
-        np.max(widths, axis=0),
-        widths[1],
-    )
-    # A quantised channel errs alike in each period of the torque: no period scatters then.
-    repeated = inverse @ (at_bandwidths(folded)[1] + known) @ inverse
-    chosen = np.maximum(chosen, np.sqrt(np.diag(repeated))[:shared])
+    repeated = np.sqrt(np.diag(covariance_at(folded, bandwidths(folded)[1])))
     # Residuals that avoid their neighbours promise more than they can be trusted to keep.
-    chosen = np.maximum(chosen, ordinary)
-    covariance = _scaled_to(covariances[1], chosen)
+    chosen = np.maximum.reduce([safe_deviations(widths), repeated, ordinary])
+    covariance = scaled_to(covariances[1], chosen)
     freedom, between = np.full(shared, np.inf), np.full(shared, np.nan)
     if len(fit.records) > 1:
         covariance, freedom, between = _with_records(fit, information, covariance)
@@ -109,11 +112,6 @@ def _folded(scores: Array, period: int | None) -> Array:
     count = -(-len(scores) // period) * period
     padded = np.concatenate([scores, np.zeros((count - len(scores), scores.shape[1]))])
     return np.asarray(padded.reshape(-1, period, scores.shape[1]).sum(axis=0))
-
-
-def _scaled_to(covariance: Array, deviation: Array) -> Array:
-    ratio = deviation / np.sqrt(np.diag(covariance))
-    return np.asarray(covariance * np.outer(ratio, ratio))
 
 
 def _with_records(
@@ -143,7 +141,7 @@ def _with_records(
     limit = float(np.sqrt(chdtri(groups - 1, CHANCE) / (groups - 1)))
     apart = ratio > limit
     freedom = np.where(apart, groups - 1.0, np.inf)
-    return _scaled_to(covariance, np.where(apart, between, within)), freedom, ratio
+    return scaled_to(covariance, np.where(apart, between, within)), freedom, ratio
 
 
 def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way: float) -> float:
@@ -153,38 +151,18 @@ def profile_end(fit: JointFit, spread: Spread, index: int, quantile: float, way:
     residuals are allowed for. Raises ValueError where the profile never rises so far.
     """
     sigma = float(spread.deviation[index])
-    curvature = _curvature(fit, index)
+    # Rise of the profiled sum of squares over the square of a small distance.
+    curvature = 1.0 / float(np.linalg.inv(fit.information)[index, index])
 
-    def rise(distance: float) -> float:
-        """Deviations by which the profile has risen at a distance, in `sigma`."""
+    def squared_rise(distance: float) -> float:
+        """By which the profile has risen at a distance, both in `sigma`."""
+        if distance == 0.0:
+            return 0.0
         held = _held(fit, index, way * distance * sigma)
-        return float(np.sqrt(max(held.cost - fit.cost, 0.0) / curvature)) / sigma
+        return max(held.cost - fit.cost, 0.0) / curvature / sigma**2
 
-    low, high, at_low = 0.0, quantile, 0.0
-    at_high = rise(high)
-    for _ in range(6):
-        if at_high >= quantile:
-            break
-        low, at_low = high, at_high
-        high *= 1.6
-        at_high = rise(high)
-    else:
-        raise ValueError("the records give no limit on that side")
-    for _ in range(4):
-        middle = low + (high - low) * (quantile - at_low) / (at_high - at_low)
-        at = rise(middle)
-        if abs(at - quantile) < 0.02 * quantile:
-            return float(fit.vector[index] + way * middle * sigma)
-        if at < quantile:
-            low, at_low = middle, at
-        else:
-            high, at_high = middle, at
-    return float(fit.vector[index] + way * high * sigma)
-
-
-def _curvature(fit: JointFit, index: int) -> float:
-    """Rise of the profiled sum of squares over the square of a small distance."""
-    return 1.0 / float(np.linalg.inv(fit.information)[index, index])
+    end = profile_limit(squared_rise, 0.0, quantile, quantile**2, ACCURACY, DOUBLINGS)
+    return float(fit.vector[index] + way * end * sigma)
 
 
 def _held(fit: JointFit, index: int, distance: float) -> JointFit:

@@ -14,11 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.trends.scatter import Fits, Mixture, fits
-
-Array = NDArray[np.float64]
 
 LEAST_FOR_A_JUMP = 5
 """With fewer, no place has a second point on both sides that shows how runs scatter."""
@@ -28,6 +26,8 @@ CLEARLY = math.log(3.0)
 """Ratio of integrated likelihoods from which on one of two shapes is said to fit better."""
 HELD = 0.95
 """Probability of the models that are kept."""
+POWER = 0.8
+"""How often a change of the detectable size would be declared."""
 PICKED = 1e-3
 """Least share of the weight with which a place counts in the size of a jump."""
 
@@ -202,3 +202,16 @@ def _shape(evidence: Array) -> str:
     anywhere = top + math.log(float(np.mean(np.exp(steps - top))))
     ahead = float(evidence[0]) - anywhere
     return "line" if ahead > CLEARLY else "jump" if ahead < -CLEARLY else ""
+
+
+def detectable(known: Mixture, level: float) -> float:
+    """Smallest size that would be declared at `level` with a probability of `POWER`.
+
+    known: what the points leave open of the number; its centre does not matter. The scatter that
+        was found is taken as what it would have been with such a change, too.
+    """
+    from scipy.special import ndtri
+
+    needed = 0.5 * float(np.diff(known.interval(1.0 - level))[0])
+    one_sigma = 0.5 * float(np.diff(known.interval(0.682689492137))[0])
+    return needed + float(ndtri(POWER)) * one_sigma

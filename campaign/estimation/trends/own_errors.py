@@ -11,11 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from campaign.arrays import Array
 from campaign.estimation.intervals import student
-
-Array = NDArray[np.float64]
 
 MANY = 1e4
 """Degrees of freedom that are as good as infinitely many."""

@@ -29,7 +29,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from campaign.arrays import Array
 
 MOST_RHO = 0.9
 """Largest correlation of neighbouring runs that is allowed for."""

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.estimation.inverse.motion import Array, kept_times
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import kept_times
 from campaign.estimation.inverse.rows import all_rows, moving
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together

@@ -16,12 +16,13 @@ from functools import partial
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.intervals import LEVEL, shifted_by
 from campaign.estimation.inverse.coefficients import TOO_FEW_ROWS, farthest
 from campaign.estimation.inverse.delay import LONGEST
 from campaign.estimation.inverse.instruments import WEAK, InstrumentFit, by_instruments
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.regression import Piece
 from campaign.estimation.inverse.rows import all_rows, moving
 from campaign.estimation.inverse.simulation import (

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.inverse.coefficients import estimates, shifts
 from campaign.estimation.inverse.delay import find_delay
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.position_period import find_period
 from campaign.estimation.inverse.regression import Regression
 from campaign.estimation.inverse.rows import all_rows, rows

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -19,7 +20,6 @@ from campaign.channels import (
 )
 from campaign.estimation.inverse.motion import (
     REGRESSION_RATE,
-    Array,
     FilterSettings,
     Motion,
     motion_of_position,
@@ -134,8 +134,11 @@ def moved(trials: Sequence[TrialData], filtering: FilterSettings) -> tuple[Motio
         raise ValueError("the axis stands still: what it moves is no more than its sensor's noise")
     rates = [each.motion.sample_rate for each in found]
     if max(rates) > RATES_ALIKE * min(rates):
-        told = ", ".join(dict.fromkeys(f"{rate:.3g} Hz" for rate in sorted(rates)))
-        raise ValueError(f"the trials have several sample rates ({told}): name one test")
+        told = ", ".join(dict.fromkeys(f"{rate:.4g} Hz" for rate in sorted(rates)))
+        raise ValueError(
+            f"the trials have several sample rates ({told}), and one fit takes one: name a test "
+            "whose trials share it, as in `campaign identify RUN:TEST`"
+        )
     return found
 
 

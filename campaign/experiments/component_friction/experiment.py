@@ -19,12 +19,12 @@ from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.breakaway_torque import breakaway_torque
 from campaign.estimation.intervals import shifted_by
-from campaign.estimation.readings import (
+from campaign.estimation.relative_rate import STOP_FACTOR
+from campaign.estimation.scatter import (
     RESOLUTION,
     deviation_of_readings,
     mean_of_readings,
 )
-from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
 from campaign.experiments.component_friction.sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, metrics

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from campaign.estimate import Estimate, Systematic
 from campaign.estimation.intervals import welch, with_error
-from campaign.estimation.readings import RESOLUTION
+from campaign.estimation.scatter import RESOLUTION
 from campaign.reason import NONE
 
 

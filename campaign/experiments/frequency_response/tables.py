@@ -77,10 +77,7 @@ def _changes(bare: Sweep, sweep: Sweep) -> dict[str, Estimate]:
     if bare.found is None or sweep.found is None:
         return {}
     before, after = _values(bare.found), _values(sweep.found)
-    told = {
-        name: change(f"{name}_change", unit, before[name], after[name])
-        for name, _, unit, _ in QUANTITIES
-    }
+    told = {name: change(f"{name}_change", before[name], after[name]) for name, *_ in QUANTITIES}
     return {name: found for name, found in told.items() if found is not None}
 
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from campaign.estimation.extrapolation import FAR, FEWEST_BELOW
 from campaign.estimation.ripple import FASTEST, LEAST_PERIODS
 from campaign.estimation.stribeck import PARAMETERS
+from campaign.estimation.velocity_map import FAR, FEWEST_BELOW
 from campaign.experiments.friction_map.runs import (
     Run,
     VelocityMapOptions,

@@ -111,11 +111,11 @@ def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumptions:
     """
     viscous = viscous_of(bench)
     if bench.appendage is None:
-        return Assumptions(viscous, viscous_free=True)
+        return Assumptions(viscous)
     part = bench.appendage
     free = span[0] < part.frequency < span[1]
     told = Appendage(part.inertia, part.frequency, part.damping_ratio)
-    return Assumptions(viscous, viscous_free=True, appendage=told, appendage_free=free)
+    return Assumptions(viscous, told, appendage_free=free)
 
 
 def viscous_of(bench: Bench) -> float:

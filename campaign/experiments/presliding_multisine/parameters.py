@@ -13,7 +13,7 @@ from dataclasses import replace
 from campaign.estimate import Estimate
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import shifted_by
-from campaign.estimation.presliding_dynamics.prediction import unexplained
+from campaign.estimation.presliding_dynamics.fit_result import unexplained
 from campaign.estimation.presliding_dynamics.presliding_fit import PreslidingDynamics
 from campaign.estimation.presliding_dynamics.record import Record
 from campaign.experiments.interface import TestData, TrialData

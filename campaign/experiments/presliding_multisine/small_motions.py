@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE, RELATIVE_RATE
 from campaign.estimation.inverse.motion import whole_pieces
-from campaign.estimation.presliding_dynamics.plant import Array
 from campaign.estimation.presliding_dynamics.record import FEWEST, Assumptions, Record
 from campaign.estimation.presliding_dynamics.start import first_plant
 from campaign.experiments.interface import TrialData

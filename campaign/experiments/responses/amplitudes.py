@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from campaign.estimation.least_squares import Array
+from campaign.arrays import Array
 from campaign.experiments.interface import TrialData
 from campaign.experiments.responses.signals import Signals
 from campaign.units import rate_text

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Distortion, Level
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.responses.sources import Source
 from campaign.result import Axis, Curve, Figure, Mark, Panel
 

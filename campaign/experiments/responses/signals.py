@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -18,7 +19,6 @@ from campaign.channels import (
     RELATIVE_RATE,
 )
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
@@ -15,7 +16,7 @@ from campaign.estimation.frequency.multisine import Lines
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency.welch import Estimator, Record, welch_response
 from campaign.estimation.frequency.welch import Excited as Excitation
-from campaign.estimation.frequency_response import Array, Response, make_response
+from campaign.estimation.frequency_response import Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData

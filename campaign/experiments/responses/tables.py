@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import (
@@ -17,7 +18,6 @@ from campaign.estimation.frequency.distortion import (
     Parity,
     total,
 )
-from campaign.estimation.frequency_response import Array
 from campaign.estimation.intervals import LEVEL
 from campaign.experiments.responses.sources import Source
 from campaign.reason import Cause

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from campaign.estimation.excitation_design.passage import first_passage
+from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.experiments.interface import ChosenValue
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.rounded_choices import Choices, nice

@@ -25,8 +25,8 @@ from campaign.channels import (
     missing,
 )
 from campaign.estimate import Estimate
-from campaign.estimation.prediction_interval import of_next
-from campaign.estimation.sampled_curve import LOST
+from campaign.estimation.intervals import of_next
+from campaign.estimation.sampled_curve import LOST, drop_interval_if_deterministic
 from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
@@ -256,7 +256,8 @@ def _row(group: Sequence[TrialData]) -> dict[str, Cell]:
     if len(errors) > 1:
         values = [error.value for error in errors]
         row["spread"] = float(np.std(values, ddof=1))
-        row["next"] = of_next("stabilization_error_of_one_trial", values, "rad")
+        following = of_next("stabilization_error_of_one_trial", values, "rad")
+        row["next"] = drop_interval_if_deterministic(following, following.value)
     return row
 
 

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import FilterSettings, Motion
 from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import DIRECTIONAL, TERMS, Term
 from campaign.experiments.any_motion.motions import MotionPiece

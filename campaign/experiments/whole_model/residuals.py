@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, FilterSettings, Motion, decimated, first_kept
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import FilterSettings, Motion, decimated, first_kept
 from campaign.estimation.inverse.rows import all_rows, late_force, moving
 from campaign.estimation.inverse.terms import TERMS, Term
 from campaign.estimation.whole_model import Values

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from campaign.estimation.inverse.motion import Array, Motion
+from campaign.arrays import Array
+from campaign.estimation.inverse.motion import Motion
 from campaign.estimation.inverse.rows import all_rows, moving, rows
 from campaign.estimation.inverse.terms import Term
 from campaign.estimation.inverse.terms import columns as columns_of

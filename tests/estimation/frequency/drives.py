@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-Array = np.ndarray
+from campaign.arrays import Array
 
 
 @dataclass(frozen=True)

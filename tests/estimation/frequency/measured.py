@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2, f
 
+from campaign.arrays import Array
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured_response import MeasuredResponse
-
-Array = np.ndarray
 
 
 def noisy(
@@ -35,3 +35,15 @@ def scatter_as_told(told: Sequence[Estimate]) -> float:
     return float(
         np.std(values, ddof=1) / np.sqrt(np.mean(np.square(np.array(errors, dtype=float))))
     )
+
+
+def radius(measured: MeasuredResponse) -> Array:
+    """Of the disc around each value that holds the true one in 95 %, shape (n,).
+
+    |error|² / variance follows F(2, freedom); Bendat and Piersol, "Random Data" (2010), 9.2. The
+    bias adds in squares.
+    """
+    known = np.isinf(measured.freedom)
+    few = f.ppf(0.95, 2, np.where(known, 2.0, measured.freedom))
+    ratio = np.where(known, 0.5 * chi2.ppf(0.95, 2), few)
+    return np.asarray(np.hypot(np.sqrt(ratio * measured.variance), 1.96 * measured.bias))

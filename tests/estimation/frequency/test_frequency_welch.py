@@ -9,6 +9,7 @@ from scipy.signal import butter, coherence, csd, sosfilt, welch
 from campaign.estimation.frequency.welch import Record, spectra, welch_response
 from tests.estimation.coverage import rejected
 from tests.estimation.frequency.drives import Drive, loop_of, random_drive, simulated
+from tests.estimation.frequency.measured import radius
 
 FINE, RATE, EVERY = 8192, 256, 32
 DRIVE = Drive(2.0, 1.0, 4000.0, 3.0, 9.0)
@@ -63,7 +64,7 @@ def test_discs_hold_the_truth_as_often_as_they_say() -> None:
         y = np.convolve(u, [1.0, 0.5])[: len(u)] + random.uniform(0.1, 3.0) * e
         found = welch_response([Record(1.0, u, y)], "input", segment=200)
         truth = 1.0 + 0.5 * np.exp(-2j * np.pi * found.frequency)
-        held.append(np.abs(found.values - truth)[::7] < found.radius()[::7])
+        held.append(np.abs(found.values - truth)[::7] < radius(found)[::7])
     assert not rejected({"disc": np.concatenate(held)})
 
 
@@ -75,7 +76,7 @@ def test_resonance_of_a_drive_from_noise() -> None:
     found = welch_response([Record(RATE, u[::EVERY], y)], "input", segment=RATE * 8)
     found = found.between(1.0, 60.0)
     truth = DRIVE.response(found.frequency, "motor")
-    held = np.abs(found.values - truth) < found.radius()
+    held = np.abs(found.values - truth) < radius(found)
     assert np.mean(held) > 0.9
     peak = found.frequency[np.argmax(np.abs(found.values) * found.frequency)]
     assert peak == pytest.approx(DRIVE.resonance, rel=0.02)
@@ -98,7 +99,7 @@ def test_a_loop_needs_its_reference() -> None:
         return float(np.median(np.abs(found.values / DRIVE.response(found.frequency, "motor") - 1)))
 
     truth = DRIVE.response(by_reference.frequency, "motor")
-    assert np.mean(np.abs(by_reference.values - truth) < by_reference.radius()) > 0.9
+    assert np.mean(np.abs(by_reference.values - truth) < radius(by_reference)) > 0.9
     assert off(direct) > 0.5
     assert off(by_reference) < 0.3 * off(direct)
     with pytest.raises(ValueError, match="mixture of the plant and its controller"):
@@ -148,4 +149,4 @@ def test_bias_of_short_segments_is_told() -> None:
     near = np.abs(found.frequency - sharp.resonance) < 2.5
     assert np.max((error / scatter)[near]) > 3.0
     assert np.all(found.bias[near] > scatter[near] * 0.3)
-    assert np.mean(error < found.radius()) > 0.85
+    assert np.mean(error < radius(found)) > 0.85

@@ -13,7 +13,7 @@ from campaign.estimation.frequency.drive import PARTS
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
 from campaign.estimation.frequency.one_inertia import HIDDEN, RIGID
 from campaign.estimation.frequency.rational import LARGE_RESIDUALS
-from campaign.estimation.frequency.two_mass import NO_SCALE, two_mass, two_mass_fit
+from campaign.estimation.frequency.two_mass import two_mass, two_mass_fit
 from campaign.estimation.frequency.two_mass_model import Side, mode_damping
 from campaign.estimation.intervals import MODEL_MISFIT
 from tests.estimation.coverage import holds, rejected
@@ -167,15 +167,6 @@ def test_both_sensors_tell_more_than_one() -> None:
     both = two_mass(responses)  # type: ignore[arg-type]
     for name, truth in truths(DRIVE).items():
         assert holds(getattr(both, name), truth), name
-
-
-def test_a_torque_of_unknown_scale_leaves_frequencies_and_ratios() -> None:
-    found = two_mass({"motor": measured(DRIVE, "motor", 2)}, torque_known=False)
-    for name in (*PARTS, "total_inertia"):
-        assert getattr(found, name).origin is Origin.NOT_DETERMINED
-        assert getattr(found, name).reason in NO_SCALE
-    for name in ("resonance", "antiresonance", "inertia_ratio"):
-        assert holds(getattr(found, name), truths(DRIVE)[name])
 
 
 def test_a_torque_constant_is_a_systematic_part_of_what_is_in_newton_metres() -> None:

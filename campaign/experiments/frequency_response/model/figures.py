@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.frequency_response.figures import closed_loop_figures
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.output_error import (
@@ -17,7 +18,6 @@ from campaign.estimation.frequency.output_error import (
 )
 from campaign.estimation.frequency.prediction import HeldAgainst, held_against
 from campaign.estimation.frequency.two_mass_model import Side
-from campaign.estimation.frequency_response import Array, ComplexArray
 from campaign.experiments.frequency_response.model.frequency_fit import Band, FrequencyFit, Masses
 from campaign.experiments.frequency_response.model.tables import drive_name
 from campaign.experiments.interface import TrialData
