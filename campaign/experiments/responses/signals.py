@@ -19,6 +19,7 @@ from campaign.channels import (
 )
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.estimation.frequency_response import Array
+from campaign.estimation.inverse.motion import whole_pieces
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
@@ -163,12 +164,9 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
     return answers, channels
 
 
-def whole_stretches(parts: Sequence[Array], shortest: int) -> list[slice]:
+def whole_stretches(parts: Sequence[Array], shortest: int) -> Sequence[slice]:
     """Where all signals have numbers, for `shortest` samples or more."""
-    good = np.all([np.isfinite(part) for part in parts], axis=0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
-    pairs = edges.reshape(-1, 2)
-    return [slice(int(a), int(b)) for a, b in pairs if b - a >= shortest]
+    return whole_pieces(np.all([np.isfinite(part) for part in parts], axis=0), shortest)
 
 
 def base_frequency(frequencies: Sequence[float]) -> float:

@@ -19,10 +19,12 @@ from campaign.estimation.frequency_response import Array, Response, make_respons
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
-from campaign.experiments.responses.amplitudes import Recorded, by_amplitude, size_of
 from campaign.experiments.responses.periodicity import (
+    Recorded,
+    by_amplitude,
     found_repeating,
     repeated,
+    size_of,
     unused,
 )
 from campaign.experiments.responses.signals import (

@@ -21,13 +21,7 @@ from campaign.estimation.step_response import (
 )
 from campaign.experiments.interface import Experiment, TestData, TrialData, key, metrics
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import (
-    conditions,
-    failures_note,
-    grouped,
-    method_label,
-    swept,
-)
+from campaign.experiments.shared.common import conditions, grouped, method_label, swept
 from campaign.experiments.shared.detected_trials import step_found
 from campaign.experiments.shared.swept_words import words as swept_words
 from campaign.experiments.step_response.results import Step, step_figure, step_table
@@ -221,33 +215,22 @@ QUANTITIES = (
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
     paths = list(swept(data))
-    steps: list[Step] = []
-    findings: list[Finding] = []
-    for group in grouped(data.completed()).values():
-        try:
-            repeats = [_evaluate(item, paths) for item in group]
-        except ValueError as error:
-            notes.append(f"{group[0].trial.label}: {error}.")
-            continue
-        steps += repeats
-        findings += (
-            Finding.of(_together(repeats, name, unit), repeats[0].place)
-            for name, unit in QUANTITIES
-        )
-    if not steps:
-        return Result(notes=tuple(notes))
-    notes += [note for step in steps for note in _notes(step)]
-    tables = (
-        step_table(steps, [path for path in paths if path not in ("linear", "compensation")]),
+    places = [
+        [_evaluate(item, paths) for item in group] for group in grouped(data.completed()).values()
+    ]
+    if not places:
+        return Result()
+    steps = [step for repeats in places for step in repeats]
+    findings = (
+        Finding.of(_together(repeats, name, unit), repeats[0].place)
+        for repeats in places
+        for name, unit in QUANTITIES
     )
-    return Result(
-        tables,
-        (step_figure(steps),),
-        tuple(findings),
-        tuple(dict.fromkeys(notes)),
-    )
+    extra = [path for path in paths if path not in ("linear", "compensation")]
+    notes = (note for step in steps for note in _notes(step))
+    table, figure = step_table(steps, extra), step_figure(steps)
+    return Result((table,), (figure,), tuple(findings), tuple(notes))
 
 
 def _notes(step: Step) -> Iterator[str]:

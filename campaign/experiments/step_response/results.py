@@ -60,7 +60,6 @@ def step_table(steps: Sequence[Step], extra: Sequence[str]) -> Table:
             Column("steady_state_error", "Steady-state error", "rad/s", "deg/s"),
         ),
         rows=tuple(rows),
-        thesis=(),
         note="Times count from the start of the step. Each row is one step: the interval of its "
         "rise time is what its own noise leaves open. What repeats of it say together, with "
         "intervals, is among the findings.",

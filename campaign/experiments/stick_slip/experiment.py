@@ -20,7 +20,7 @@ from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
-from campaign.experiments.shared.common import COUNTED, failures_note
+from campaign.experiments.shared.common import COUNTED
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
@@ -154,7 +154,7 @@ def _period(between: Array, step: float) -> Estimate:
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), own=())
     if not found:
-        return Result(notes=failures_note(data))
+        return Result()
     measured = [(place, _shown(place)) for place in found]
     rows: list[dict[str, Cell]] = [
         {
@@ -194,18 +194,12 @@ def _analyse(data: TestData) -> Result:
     ]
     whose = few if len(few) <= HISTORIES else [f"{len(few)} of {len(measured)} pulls"]
     notes = (
-        *failures_note(data),
-        *(
-            f"{who}: fewer than three slips, so there is no period; pull longer, slower, or "
-            "through a softer spring."
-            for who in whose
-        ),
+        f"{who}: fewer than three slips, so there is no period; pull longer, slower, or through a "
+        "softer spring."
+        for who in whose
     )
-    drawn = map_of(measured, StickSlipOptions)
-    if drawn is not None:
-        return Result((table,), (drawn,), findings, notes)
-    figures = tuple(filter(None, (_figure(measured),)))
-    return Result((table,), figures, findings, notes)
+    drawn = map_of(measured, StickSlipOptions) or _figure(measured)
+    return Result((table,), tuple(filter(None, (drawn,))), findings, tuple(notes))
 
 
 def _count(slips: float) -> int | float | None:
