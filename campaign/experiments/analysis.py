@@ -109,7 +109,7 @@ def _measured_trials(
 
     A model that says which trials suit it measures them itself.
     """
-    if experiment.measure is None or (data.model is not None and experiment.model.suits):
+    if experiment.measure is None or not _is_own(experiment, data):
         return data, ()
     doubts: list[RecordingDoubt] = []
     lost: list[TrialData] = []
@@ -130,10 +130,15 @@ def _measured_trials(
     return replace(good, trials=trials), tuple(doubts)
 
 
+def _is_own(experiment: Experiment, data: TestData) -> bool:
+    """Whether the trials are the experiment's own, and not those that suit its model."""
+    return data.model is None or experiment.model.suits is None
+
+
 def _failures(experiment: Experiment, data: TestData) -> Iterator[str]:
     """A sentence when trials are missing from the analysis."""
     failed = sum(item.ending.outcome != "completed" for item in data.trials)
-    if failed and not experiment.uses_failed:
+    if failed and _is_own(experiment, data) and not experiment.uses_failed:
         yield (
             f"{failed} of {len(data.trials)} trials did not complete and are not analysed; "
             "the table of failed trials says why."

@@ -316,27 +316,6 @@ def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
     )
 
 
-EXPERIMENT = Experiment(
-    name="component_friction",
-    summary="breakaway torque of each friction interface on its own (Table 4.1)",
-    options=ComponentFrictionOptions,
-    trials=_trials,
-    analyse=_analyse,
-    perturbs_bench=True,
-    measure=_measure,
-    needs_samples=False,
-    requires={
-        DRIVE_TORQUE: "the torque at which the component turns",
-        GYRO_RATE: "the moment at which it turns",
-    },
-    key_numbers=(
-        key("breakaway_torque", statistic="mean"),
-        key("breakaway_torque", statistic="standard deviation"),
-        key("load_share"),
-    ),
-)
-
-
 def _of_means(
     name: str, unit: str, parts: Sequence[tuple[float, Estimate]], value: float
 ) -> Estimate:
@@ -366,3 +345,24 @@ def load_share(means: Mapping[str, Estimate], sides: Mapping[str, str]) -> Estim
         (((sides[name] == "load") - load / total) / total, mean) for name, mean in means.items()
     ]
     return _of_means("load_share", "", parts, load / total)
+
+
+EXPERIMENT = Experiment(
+    name="component_friction",
+    summary="breakaway torque of each friction interface on its own (Table 4.1)",
+    options=ComponentFrictionOptions,
+    trials=_trials,
+    analyse=_analyse,
+    perturbs_bench=True,
+    measure=_measure,
+    needs_samples=False,
+    requires={
+        DRIVE_TORQUE: "the torque at which the component turns",
+        GYRO_RATE: "the moment at which it turns",
+    },
+    key_numbers=(
+        key("breakaway_torque", statistic="mean"),
+        key("breakaway_torque", statistic="standard deviation"),
+        key("load_share"),
+    ),
+)

@@ -337,41 +337,6 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     return Sweep(place, loop, ", ".join([label, *others]), response, found)
 
 
-EXPERIMENT = Experiment(
-    name="frequency_response",
-    summary="stepped-sine response, bandwidth and margins (Tables 5.3 and 5.9, Figure 4.5)",
-    options=FrequencyResponseOptions,
-    trials=_trials,
-    analyse=_analyse,
-    measure=_measure,
-    needs_samples=False,
-    fit=default_options.frequency_response,
-    recorded=_found,
-    windows=(STEADY,),
-    requires={
-        GYRO_RATE: "the response",
-        COMMAND: "what a closed loop responds to",
-        DRIVE_TORQUE: "what an open loop responds to",
-    },
-    stages=(
-        Stage(
-            name="refinement",
-            why="bandwidth and margins are read between frequencies: more of them around "
-            "each crossing",
-            most=_most_refined,
-            trials=_refined,
-        ),
-    ),
-    model=MODEL,
-    key_numbers=(
-        key("bandwidth"),
-        key("phase_margin"),
-        key("gain_margin"),
-        key("elastic_mode_frequency"),
-    ),
-)
-
-
 LIMIT_SHARE = 0.9
 """of the bench's limits that the amplitude of a rate command may use."""
 
@@ -420,3 +385,38 @@ def torque_sine(
             "limits; lower torque or raise lowest"
         )
     return Sine(amplitude=torque, frequency=frequency, phase=0.5 * math.pi), swing
+
+
+EXPERIMENT = Experiment(
+    name="frequency_response",
+    summary="stepped-sine response, bandwidth and margins (Tables 5.3 and 5.9, Figure 4.5)",
+    options=FrequencyResponseOptions,
+    trials=_trials,
+    analyse=_analyse,
+    measure=_measure,
+    needs_samples=False,
+    fit=default_options.frequency_response,
+    recorded=_found,
+    windows=(STEADY,),
+    requires={
+        GYRO_RATE: "the response",
+        COMMAND: "what a closed loop responds to",
+        DRIVE_TORQUE: "what an open loop responds to",
+    },
+    stages=(
+        Stage(
+            name="refinement",
+            why="bandwidth and margins are read between frequencies: more of them around "
+            "each crossing",
+            most=_most_refined,
+            trials=_refined,
+        ),
+    ),
+    model=MODEL,
+    key_numbers=(
+        key("bandwidth"),
+        key("phase_margin"),
+        key("gain_margin"),
+        key("elastic_mode_frequency"),
+    ),
+)

@@ -19,19 +19,17 @@ from campaign.estimation.frequency_response import Array, Response, make_respons
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
-from campaign.experiments.responses.periodicity import (
+from campaign.experiments.responses.signals import (
+    Excited,
     Recorded,
+    Signals,
+    base_frequency,
     by_amplitude,
     found_repeating,
     repeated,
+    signals,
     size_of,
     unused,
-)
-from campaign.experiments.responses.signals import (
-    Excited,
-    Signals,
-    base_frequency,
-    signals,
     whole_stretches,
 )
 from campaign.physics.bench import Bench
