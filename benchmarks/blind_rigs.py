@@ -42,7 +42,8 @@ from campaign.cli.rig_protocols import init_for_bench
 from campaign.errors import CampaignError
 from campaign.estimate import Origin
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, options_of, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData, options_of
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol import Plan, check_limits, check_loops, load_protocol, make_plan
 from campaign.protocol.bench_file import load_bench

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,19 +217,20 @@ class Curve:
     @classmethod
     def of(
         cls,
-        x: Array,
+        x: Array | Sequence[float],
         found: Sequence[Estimate],
         label: str = "",
         series: str = "",
         style: Style = "points",
+        **more: Any,
     ) -> Self:
         """Estimates over `x`, shape (n,), with their intervals (systematic parts included).
 
-        Those that are bounds have arrows.
+        Those that are bounds have arrows. more: further attributes.
         """
         low, high = np.array([ends_of(each) for each in found], dtype=float).reshape(-1, 2).T
         y = np.array([each.value for each in found], dtype=float)
-        return cls(x, y, label, series, style, low=low, high=high)
+        return cls(np.asarray(x, float), y, label, series, style, low=low, high=high, **more)
 
 
 def ends_of(estimate: Estimate) -> tuple[float, float]:

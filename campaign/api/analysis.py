@@ -14,7 +14,8 @@ from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of
 from campaign.archive.reading.sound_samples import Trials, damaged_records, without_damaged
 from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
 from campaign.errors import ArchiveError, UsageError, explain_in_debug
-from campaign.experiments.interface import Experiment, TestData, bench_of, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import Experiment, TestData, bench_of
 from campaign.experiments.post_processing.recording_checks import notes_on
 from campaign.physics.bench import Bench
 from campaign.published.calibration_covariance import NOTHING, CalibrationPart, calibration_part

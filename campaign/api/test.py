@@ -17,7 +17,8 @@ from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.sound_samples import Trials, without_damaged
 from campaign.errors import UsageError
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData
 from campaign.result import Result
 from campaign.trial import Tree
 

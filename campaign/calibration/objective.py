@@ -17,12 +17,8 @@ from campaign.calibration.problem import CalibrationProblem
 from campaign.calibration.targets import residuals, restricted
 from campaign.errors import CampaignError, ProtocolError, UsageError
 from campaign.estimate import Estimate
-from campaign.experiments.interface import (
-    Experiment,
-    TestData,
-    bench_of,
-    with_named_tables,
-)
+from campaign.experiments.analysis import analysed, with_named_tables
+from campaign.experiments.interface import Experiment, TestData, bench_of
 from campaign.experiments.post_processing.axis_units import in_axis_units
 from campaign.protocol.expand import expand, seed_of
 from campaign.protocol.points import PointError
@@ -214,7 +210,7 @@ class Simulation:
         data = TestData(name, test.entry.kind, first.options, finished)
         try:
             with axis_terms(sides_in(data.trials[0].trial.bench)):
-                findings = in_axis_units(experiment.analyse(with_named_tables(data))).findings
+                findings = in_axis_units(analysed(experiment, with_named_tables(data))).findings
         except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
             problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
             findings = ()

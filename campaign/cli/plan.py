@@ -18,7 +18,7 @@ from campaign.cli.prepare import PreparedRun, Request, lacking, prepare
 from campaign.errors import ExitCode
 from campaign.execution.display import clock
 from campaign.experiments import experiments
-from campaign.experiments.interface import lost_without
+from campaign.experiments.analysis import lost_without
 from campaign.options import describe
 from campaign.policy import Policy, Response
 from campaign.protocol import (

@@ -22,7 +22,8 @@ from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
 from campaign.estimate import Estimate
 from campaign.execution.safety import describe
-from campaign.experiments.interface import Experiment, measured
+from campaign.experiments.analysis import measured
+from campaign.experiments.interface import Experiment
 from campaign.plugins import Kinds
 from campaign.recording import Outcome
 from campaign.source_hash import digest, sources_of

@@ -19,9 +19,8 @@ from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.estimation.sampled_curve import at_sample, bracketed, peak
-from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
+from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
-from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
@@ -36,7 +35,6 @@ from campaign.physics.bench import Bench
 from campaign.result import (
     Array,
     Axis,
-    Cell,
     Column,
     Curve,
     Figure,
@@ -132,35 +130,18 @@ class _Breakaway:
     applied: Estimate
 
 
-def _breakaways(place: ConditionGroup, notes: list[str]) -> Iterator[_Breakaway]:
+def _breakaways(place: ConditionGroup) -> Iterator[_Breakaway]:
     for rate, trials in place.by("torque_rate").items():
-        slid = []
-        for item in trials:
-            try:
-                metrics(item, _measure)
-            except ValueError as error:
-                notes.append(f"{item.trial.label}: {error}.")
-                continue
-            slid.append(item)
-        if slid:
-            found = combined(slid, _measure)
-            yield _Breakaway(rate, found["breakaway_torque"], found["applied_torque"])
+        found = combined(trials, _measure)
+        yield _Breakaway(rate, found["breakaway_torque"], found["applied_torque"])
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
     found = places(data.completed(), OWN)
-    rows = {place.label: (place, list(_breakaways(place, notes))) for place in found}
-    findings = tuple(
-        Finding.of(row.breakaway, {**place.point, "torque_rate": row.torque_rate})
-        for place, own in rows.values()
-        for row in own
-    )
-    if not findings:
-        return Result(notes=tuple(notes))
-    listed: list[dict[str, Cell]] = [
-        {**place.point, **vars(row)} for place, own in rows.values() for row in own
-    ]
+    if not found:
+        return Result()
+    rows = {place.label: (place, list(_breakaways(place))) for place in found}
+    every = [(place, row) for place, own in rows.values() for row in own]
     table = Table(
         key="force-rate",
         title="Breakaway torque by rate of the applied torque",
@@ -170,11 +151,15 @@ def _analyse(data: TestData) -> Result:
             Column("breakaway", "Breakaway torque", "N m", "N m"),
             Column("applied", "Applied torque at that moment", "N m", "N m"),
         ),
-        rows=tuple(listed),
+        rows=tuple({**place.point, **vars(row)} for place, row in every),
         note="The breakaway torque is the largest friction torque before the load slides. "
         + OF_ONE,
     )
-    return Result((table,), (_figure(rows),), findings, tuple(notes))
+    findings = tuple(
+        Finding.of(row.breakaway, {**place.point, "torque_rate": row.torque_rate})
+        for place, row in every
+    )
+    return Result((table,), (_figure(rows),), findings)
 
 
 def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
@@ -184,21 +169,24 @@ def _figure(rows: dict[str, tuple[ConditionGroup, list[_Breakaway]]]) -> Figure:
     items: list[TrialData] = []
     for label, (place, own) in rows.items():
         series = model_series(str(place.point.get("model", label or "measured")))
-        if own:
-            peaks.append(_peaks(own, label, series))
-            for title, curve in _histories(place, own, label, series):
-                histories.setdefault(title, []).append(curve)
-            told.append(_what_shows(own, label))
-            items += place.trials
+        rates = np.array([row.torque_rate for row in own])
+        found = [row.breakaway for row in own]
+        peaks.append(Curve.of(rates, found, label, series, "line+points"))
+        for title, curve in _histories(place, own, label, series):
+            histories.setdefault(title, []).append(curve)
+        told.append(_what_shows(own, label))
+        items += place.trials
     top = max(float(curve.y.max()) for curve in peaks)
     applied = Axis("Applied torque", "N m", "N m", limits=(0.0, 1.6 * top))
     friction = Axis("Friction torque", "N m", "N m", limits=(0.0, 1.15 * top))
     line = np.array([0.0, 1.6 * top])
+    several = len(histories) > 1
+    ramps = "the slowest and during the fastest ramp" if several else "the only ramp"
     held = Curve(line, line, "friction holds the load", "reference", "thin")
     return Figure(
         key="force-rate",
         title="Breakaway torque over the rate of the applied torque",
-        caption=f"{' '.join(told)} Behind: friction during {_ramps(histories)}. On the dotted line "
+        caption=f"{' '.join(told)} Behind: friction during {ramps}. On the dotted line "
         "friction holds the load; below it the load gains speed.",
         alt="Breakaway torque over torque rate on a logarithmic axis, and friction torque over "
         "applied torque for the slowest and the fastest ramp.",
@@ -242,16 +230,6 @@ def _apart(one: Estimate, other: Estimate) -> bool:
     halves = [each.half_width for each in (one, other) if each.has_interval]
     scatter = math.hypot(*(half for half in halves if math.isfinite(half)))
     return abs(one.value - other.value) > max(scatter, STEP * abs(one.value))
-
-
-def _peaks(rows: list[_Breakaway], label: str, series: str) -> Curve:
-    rates = np.array([row.torque_rate for row in rows])
-    return Curve.of(rates, [row.breakaway for row in rows], label, series, "line+points")
-
-
-def _ramps(histories: dict[str, list[Curve]]) -> str:
-    """The panels behind the first, as a sentence names them."""
-    return "the only ramp" if len(histories) == 1 else "the slowest and during the fastest ramp"
 
 
 def _histories(

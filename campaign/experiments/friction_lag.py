@@ -21,13 +21,13 @@ from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, drop_interval_if_deterministic
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
-from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
     combined,
     in_models,
     places,
+    resolved,
     simulated,
 )
 from campaign.options import Options
@@ -36,7 +36,6 @@ from campaign.physics.steady_friction import steady_friction
 from campaign.result import (
     Array,
     Axis,
-    Cell,
     Column,
     Curve,
     Figure,
@@ -56,12 +55,10 @@ METRICS = {
     "friction_lag_area": "N m rad/s",
 }
 """What one recording tells, and in which units."""
+COLUMNS = ("frequency", "width", "widest", "area")
 PER_CYCLE = 400
 """Samples, and straight pieces of the prescribed rate, in a cycle."""
 
-TORQUES = Axis("Friction torque", "N m", "N m")
-FLAT = 1e-4
-"""of the largest friction, up to which a loop is none that anybody sees."""
 SLOW = 0.01
 """rad/s; rates up to here are shown in mrad/s."""
 
@@ -138,6 +135,11 @@ class Loop:
     widest: Estimate
     area: Estimate
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether friction is the same up and down: a line, which runs no way round."""
+        return self.widest.value == 0.0
+
 
 def _measure(data: TrialData) -> tuple[Estimate, ...]:
     """Width, largest width and area of the loops, each the mean of the cycles.
@@ -201,27 +203,19 @@ def _loop(frequency: float, trials: Sequence[TrialData]) -> Loop:
     found = combined(trials, _measure)
     cut = trials[0].recording().window(*trials[0].trial.task.window)
     rate, friction = _closed(cut[LOAD_RATE], cut[FRICTION_TORQUE])
-    return Loop(
-        frequency, rate, friction, *(admitted(found.get(name) or _lost(name)) for name in METRICS)
-    )
+    largest = float(np.nanmax(np.abs(friction), initial=0.0))
+    swing = 0.5 * float(np.ptp(trials[0].trial.task.command.sample(cut.time)))
+    scales = largest, largest, largest * swing
+    told = (admitted(found.get(name) or _lost(name)) for name in METRICS)
+    return Loop(frequency, rate, friction, *map(resolved, told, scales))
 
 
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), OWN)
     if not found:
-        return Result(notes=failures_note(data))
+        return Result()
     loops = [(place, [_loop(*each) for each in place.by("frequency").items()]) for place in found]
-    rows: list[dict[str, Cell]] = [
-        {
-            **place.point,
-            "frequency": loop.frequency,
-            "width": loop.width,
-            "widest": loop.widest,
-            "area": loop.area,
-        }
-        for place, own in loops
-        for loop in own
-    ]
+    every = [(place.point, loop) for place, own in loops for loop in own]
     table = Table(
         key="friction-lag",
         title="Width of the loops of friction lag",
@@ -232,14 +226,14 @@ def _analyse(data: TestData) -> Result:
             Column("widest", "Largest width", "N m", "N m"),
             Column("area", "Area of the loop", "N m rad/s", "N m rad/s"),
         ),
-        rows=tuple(rows),
+        rows=tuple(
+            {**point, **{name: getattr(loop, name) for name in COLUMNS}} for point, loop in every
+        ),
         note="Width: friction while the rate rises less friction while it falls, at the same rate. "
         "Each number is the mean of all cycles but the first. " + OF_ONE,
     )
     findings = tuple(
-        Finding.of(loop.width, {**place.point, "frequency": loop.frequency})
-        for place, own in loops
-        for loop in own
+        Finding.of(loop.width, {**point, "frequency": loop.frequency}) for point, loop in every
     )
     figure = Figure(
         key="friction-lag",
@@ -252,7 +246,7 @@ def _analyse(data: TestData) -> Result:
         across=min(2, len(loops)),
         trials=trials_of(items[0] for place in found for items in place.by("frequency").values()),
     )
-    return Result((table,), (figure,), findings, failures_note(data))
+    return Result((table,), (figure,), findings)
 
 
 def _what_shows(place: ConditionGroup, loops: list[Loop]) -> str:
@@ -261,55 +255,31 @@ def _what_shows(place: ConditionGroup, loops: list[Loop]) -> str:
     told = [loop for loop in loops if math.isfinite(loop.width.value)]
     if not told:
         return ""
-    level = _level(told)
-    if all(_flat(loop, level) for loop in told):
+    if all(loop.is_flat for loop in told):
         return sentence(f"{start}no loop shows, friction is the same up and down")
     widths = [
         f"{amount(loop.width.value, 'N m', digits=2)} at {loop.frequency:.4g} Hz" for loop in told
     ]
-    higher = all(surely_above(loop.width, 0.0, FLAT * level) for loop in told)
+    higher = all(surely_above(loop.width, 0.0) for loop in told)
     up, by = ("is higher than", " by") if higher else ("less that", ":")
     return sentence(f"{start}friction on the way up {up} on the way down{by} {listed(widths)}")
 
 
-def _level(loops: Sequence[Loop]) -> float:
-    """Largest friction of all loops (N m)."""
-    return max(float(np.nanmax(np.abs(loop.friction), initial=0.0)) for loop in loops)
-
-
-def _flat(loop: Loop, level: float) -> bool:
-    """Whether friction is the same up and down: a line, which runs no way round."""
-    return abs(loop.widest.value) <= FLAT * level
-
-
 def _panel(place: ConditionGroup, loops: list[Loop]) -> Panel:
-    level = _level(loops)
     curves = [
-        Curve(
-            loop.rate,
-            loop.friction,
-            f"{loop.frequency:.4g} Hz",
-            _series(loop),
-            "line" if _flat(loop, level) else "loop",
-        )
+        Curve(loop.rate, loop.friction, name, name, "line" if loop.is_flat else "loop")
         for loop in loops
+        for name in [f"{loop.frequency:.4g} Hz"]
     ]
     known = [rate for loop in loops if len(rate := loop.rate[np.isfinite(loop.rate)])]
-    if not known:
-        return Panel(_rates("deg/s"), TORQUES, curves, place.label)
-    fine = np.linspace(min(rate.min() for rate in known), known[0].max(), 300)
-    steady = np.add(*steady_friction(bench_of(place.trials[0].trial), fine))
-    curves.append(Curve(fine, steady, "steady sliding", "reference", "thin"))
-    display = "mrad/s" if fine[-1] < SLOW else "deg/s"
-    return Panel(_rates(display), TORQUES, curves, place.label)
-
-
-def _series(loop: Loop) -> str:
-    return f"{loop.frequency:.4g} Hz"
-
-
-def _rates(display: str) -> Axis:
-    return Axis("Rate", "rad/s", display)
+    display = "deg/s"
+    if known:
+        fine = np.linspace(min(rate.min() for rate in known), known[0].max(), 300)
+        steady = np.add(*steady_friction(bench_of(place.trials[0].trial), fine))
+        curves.append(Curve(fine, steady, "steady sliding", "reference", "thin"))
+        display = "mrad/s" if fine[-1] < SLOW else "deg/s"
+    axis = Axis("Rate", "rad/s", display)
+    return Panel(axis, Axis("Friction torque", "N m", "N m"), curves, place.label)
 
 
 EXPERIMENT = Experiment(

@@ -4,40 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol, TypeVar, cast
 
 from pydantic_core import to_json
 
-from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, sides_in
-from campaign.channels import missing
-from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
-from campaign.experiments.post_processing.axis_units import (
-    estimate_in_axis_terms,
-    in_axis_units,
-)
-from campaign.experiments.post_processing.draws import draws_of, merged
-from campaign.experiments.post_processing.key_numbers import KeyQuantity, key_numbers
-from campaign.experiments.post_processing.key_numbers import key as key
-from campaign.experiments.post_processing.recording_checks import (
-    doubt,
-    doubted,
-    not_measured,
-    notes_on,
-)
-from campaign.experiments.post_processing.swept_tables import table_names
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.complete import IncompleteBenchError
 from campaign.protocol.schema import ChosenValue as ChosenValue
 from campaign.protocol.schema import ExperimentKind, StageKind
-from campaign.published.draws import SEED
 from campaign.reason import Cause
 from campaign.recording import Ending, Recording
-from campaign.result import RecordingDoubt, Result
-from campaign.trial import Tree, Trial, TrialRequest, canonical_json
+from campaign.result import Result, Value
+from campaign.trial import Tree, Trial, TrialRequest
 
 NOT_TOLD = Cause("not in the recording", "the recording does not tell it")
 
@@ -89,6 +70,7 @@ class TestData:
         validation: trials that no model is fitted to, for comparison with its predictions; read
             once, when everything is chosen.
         say: reports progress.
+        left_out: trials that are not among those, as nothing can be told from their recordings.
     """
 
     name: str
@@ -98,6 +80,7 @@ class TestData:
     model: Any = None
     validation: tuple[TrialData, ...] = ()
     say: Callable[[str], None] = no_progress
+    left_out: tuple[Trial, ...] = ()
 
     @property
     def bench(self) -> Bench:
@@ -166,6 +149,19 @@ NO_MODEL = Model("", "")
 
 
 @dataclass(frozen=True)
+class KeyQuantity:
+    """A quantity of which findings are key numbers: those with all of these conditions."""
+
+    quantity: str
+    where: Mapping[str, Value]
+
+
+def key(quantity: str, **where: Value) -> KeyQuantity:
+    """`key("breakaway_torque", statistic="mean")`."""
+    return KeyQuantity(quantity, where)
+
+
+@dataclass(frozen=True)
 class Experiment(ExperimentKind):
     """A kind of test.
 
@@ -192,6 +188,8 @@ class Experiment(ExperimentKind):
             go on after "no": `figure of the command`.
         seeks_instability: it goes to where a loop is unstable, to find out where that is; the plan
             of any other test with an unstable loop is refused.
+        uses_failed: its analysis uses trials that did not complete, and says which are left out; of
+            any other a note counts them.
         perturbs_bench: its trials are on benches that it makes from the test's own, on purpose
             (`TrialRequest.bench`); what it finds is still said of the test's bench.
         stages: further trials of a point, which follow from those of `trials` and of the stages
@@ -214,6 +212,7 @@ class Experiment(ExperimentKind):
     analyse: Callable[[TestData], Result]
     measure: Callable[[TrialData], Sequence[Estimate]] | None = None
     needs_samples: bool = True
+    uses_failed: bool = False
     perturbs_bench: bool = False
     stages: tuple[Stage, ...] = field(default=(), kw_only=True)
     most_samples: int | None = None
@@ -221,120 +220,14 @@ class Experiment(ExperimentKind):
     key_numbers: tuple[KeyQuantity, ...] = ()
 
 
-EMPTY = Result()
-TOO_LONG = Cause(
-    "too long",
-    "it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: cut it by "
-    "start and stop, or by each",
-)
-
-
-def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[TrialData], str]:
-    """Of recorded trials, those that the experiment's model can use; where none, why."""
-    if experiment.model.suits is not None:
-        found, why = experiment.model.suits(trials)
-        return list(found), why
-    needed = experiment.requires.keys()
-    own = [t for t in trials if t.trial.kind == experiment.name and needed <= t.channel_names()]
-    channels = f" with {' and '.join(needed)}" if needed else ""
-    return own, "" if own else f"there is no trial of {experiment.name}{channels}"
-
-
-def result_of(experiment: Experiment, data: TestData) -> Result:
-    """What the analysis finds, with a note on every channel that it had to do without.
-
-    Recordings that cannot hold anything are kept from it, and a note says which and why. Of a test
-    that sweeps the seed of its bench's scatter each draw is analysed by itself. Metrics of trials
-    of other kinds, which a model may suit, are those of other analyses, and not used.
-    """
-    with axis_terms(_sides(data)):
-        result = in_axis_units(_result_of(experiment, data))
-        draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
-        chosen = key_numbers(result.findings, experiment.key_numbers, draws)
-        return replace(result, key_numbers=chosen)
-
-
-def _sides(data: TestData) -> Sides:
-    """How the bench of a test moves: all of its trials are of one protocol's one bench."""
-    return sides_in(data.trials[0].trial.bench) if data.trials else BOTH_ROTARY
-
-
-def _result_of(experiment: Experiment, data: TestData) -> Result:
-    if data.model is not None:
-        data = replace(data, trials=tuple(_own(experiment, item) for item in data.trials))
-    before = [_doubt(experiment, item) for item in data.trials]
-    kept = zip(data.trials, before, strict=True)
-    trials = tuple(item for item, wrong in kept if not (wrong and wrong.fatal))
-    result = EMPTY
-    if trials or not data.trials:
-        usable = with_named_tables(replace(data, trials=trials))
-        draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
-        if len(draws) > 1:
-            parts = {seed: _draw(usable, seed) for seed in draws}
-            result = merged(
-                {seed: _of_draw(experiment, part, seed) for seed, part in parts.items()}
-            )
-        else:
-            result = _analysed(experiment, usable)
-    doubts = (*result.doubts, *filter(None, before))
-    lacking: dict[str, None] = {}
-    for item in data.trials:
-        own = data.model is None or item.trial.kind == experiment.name
-        if own and item.trial.can_use and item.ending.outcome == "completed":
-            lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
-    without = [f"Without {name}: no {lost_without(experiment, name)}." for name in lacking]
-    if gone := sum(bool(item.not_kept) for item in data.trials):
-        without.append(f"Samples of {gone} of {len(data.trials)} trials were not kept.")
-    notes = (*result.notes, *notes_on(doubts, len(data.trials)), *without)
-    return replace(result, notes=notes, doubts=doubts)
-
-
-def _analysed(experiment: Experiment, data: TestData) -> Result:
-    """What an analysis finds; a trial that cannot be measured costs no more than itself."""
-    try:
-        return experiment.analyse(data)
-    except (ArchiveError, UsageError, IncompleteBenchError):
-        raise
-    except (Exception, SystemExit):  # of the whole test, or of a trial that it has measured
-        good, doubts = _measurable(experiment, data)
-        # Who asks for parameters is told why there are none; a report has notes on each trial.
-        if not doubts or (data.model is not None and not any(good.completed())):
-            raise
-    result = experiment.analyse(good) if any(good.completed()) else EMPTY
-    return replace(result, doubts=doubts)
-
-
-def _measurable(
-    experiment: Experiment, data: TestData
-) -> tuple[TestData, tuple[RecordingDoubt, ...]]:
-    """The trials that can be measured, each with what that found; and why the others cannot."""
-    good: list[TrialData] = []
-    doubts: list[RecordingDoubt] = []
-    completed = {item.trial.number for item in data.completed()}
-    for item in data.trials:
-        estimates = item.estimates
-        try:
-            own = data.model is None or item.trial.kind == experiment.name
-            if experiment.measure and own and not estimates and item.trial.number in completed:
-                estimates = tuple(experiment.measure(item))
-        except ArchiveError:
-            raise
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, of one trial
-            doubts.append(not_measured(item.trial, error))
-        else:
-            good.append(_Instead(item, item.trial.point, estimates))
-    return replace(data, trials=tuple(good)), tuple(doubts)
-
-
 def metrics(
     data: TrialData, measure: Callable[[TrialData], Sequence[Estimate]]
 ) -> dict[str, Estimate]:
-    """What one recording says, by name: as it was archived when the trial ended, or else by now.
+    """What one recording says, by name: as it was measured before (`analysis`), or else by now.
 
     What was not determined is not archived, and comes back as such. Raises what `measure` raises.
     """
-    found = data.estimates or measure(data)
-    return Metrics({each.name: estimate_in_axis_terms(each) for each in found})
+    return Metrics({each.name: each for each in data.estimates or measure(data)})
 
 
 class Metrics(dict[str, Estimate]):
@@ -342,106 +235,6 @@ class Metrics(dict[str, Estimate]):
 
     def __missing__(self, name: str) -> Estimate:
         return Estimate.without_interval(name, math.nan, "", NOT_TOLD())
-
-
-def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
-    """What a recording says by itself, of an experiment that measures.
-
-    Raises ValueError with a message for the user where it says nothing, or cannot.
-    """
-    wrong = _doubt(experiment, data)
-    if wrong and wrong.fatal:
-        raise ValueError(wrong.reason.text)
-    if experiment.measure is None:
-        return ()
-    with axis_terms(sides_in(data.trial.bench)):
-        return tuple(map(estimate_in_axis_terms, experiment.measure(data)))
-
-
-def _own(experiment: Experiment, data: TrialData) -> TrialData:
-    """The trial without the metrics of another experiment."""
-    if data.trial.kind == experiment.name or not data.estimates:
-        return data
-    return _Instead(data, data.trial.point, ())
-
-
-def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
-    """Why a recording is not analysed; of one that is too long no sample is read to find out.
-
-    A model that suits trials of other kinds looks at them itself.
-    """
-    if data.trial.kind != experiment.name:
-        return None
-    most, task = experiment.most_samples, data.trial.task
-    samples = task.duration * task.sample_rate
-    if most is not None and samples > most:
-        return doubted(data.trial, TOO_LONG(samples=samples, most=most))
-    return doubt(data)
-
-
-def with_named_tables(data: TestData) -> TestData:
-    """The same, with a name in place of each swept value that is a table (`table_names`)."""
-    swept = [value for item in data.trials for value in item.trial.point.values()]
-    names = table_names(swept)
-    if not names:
-        return data
-
-    def named(point: Mapping[str, Any]) -> dict[str, Any]:
-        return {
-            path: names[canonical_json(value)] if isinstance(value, dict) else value
-            for path, value in point.items()
-        }
-
-    return replace(
-        data, trials=tuple(_Instead(item, named(item.trial.point)) for item in data.trials)
-    )
-
-
-def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
-    """What one draw found; one whose analysis fails costs no more than itself."""
-    if not part.trials:
-        return EMPTY
-    try:
-        return _analysed(experiment, part)
-    except (ArchiveError, UsageError):
-        raise
-    except Exception as error:  # noqa: BLE001 - a fit may wander with one draw of many
-        told = f"{type(error).__name__}: {error}"
-        return Result(notes=(f"The draw of seed {seed} could not be analysed: {told}.",))
-
-
-def _draw(data: TestData, seed: Any) -> TestData:
-    """The trials of one draw of a random bench, as if nothing but that draw had been executed."""
-    return replace(
-        data,
-        trials=tuple(
-            _Instead(item, {path: v for path, v in item.trial.point.items() if path != SEED})
-            for item in data.trials
-            if item.trial.point.get(SEED) == seed
-        ),
-    )
-
-
-class _Instead:
-    """A trial told to be at another point of the sweep, or measured; all else is as it was."""
-
-    def __init__(
-        self,
-        data: TrialData,
-        point: Mapping[str, Any],
-        estimates: Sequence[Estimate] | None = None,
-    ) -> None:
-        self.trial = data.trial.model_copy(update={"point": dict(point)})
-        self.ending = data.ending
-        self.recording = data.recording
-        self.channel_names = data.channel_names
-        self.not_kept = data.not_kept
-        self.estimates = data.estimates if estimates is None else estimates
-
-
-def lost_without(experiment: Experiment, name: str) -> str:
-    """What there is none of without a channel that the experiment can use."""
-    return experiment.can_use.get(name, "result that needs it")
 
 
 def bench_of(trial: Trial) -> Bench:

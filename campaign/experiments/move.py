@@ -13,7 +13,6 @@ from campaign.channels import RELATIVE_ANGLE
 from campaign.estimation.intervals import of_series, shifted_by
 from campaign.estimation.sampled_curve import shifted
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
-from campaign.experiments.shared.common import failures_note
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Cell, Column, Result, Table
@@ -88,9 +87,8 @@ def _trials(options: MoveOptions, bench: Bench) -> Iterator[TrialRequest]:
 
 def _analyse(data: TestData) -> Result:
     rows = [_row(item) for item in data.trials if item.ending.outcome == "completed"]
-    notes = failures_note(data)
     if not rows:
-        return Result(notes=notes)
+        return Result()
     table = Table(
         key="moves",
         title="Where the axis was moved to",
@@ -102,10 +100,9 @@ def _analyse(data: TestData) -> Result:
             Column("deviation", "Deviation", "rad", "deg"),
         ),
         rows=tuple(rows),
-        thesis=(),
         note="The rate loop follows a rate; what friction holds back on the way, it does not undo.",
     )
-    return Result((table,), notes=notes)
+    return Result((table,))
 
 
 def _row(data: TrialData) -> dict[str, Cell]:

@@ -18,9 +18,8 @@ from campaign.channels import FRICTION_TORQUE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import shifted_by
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.shared import default_ramps
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import amount, listed, sentence, trials_of
-from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import ConditionGroup, in_models, places
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -28,7 +27,6 @@ from campaign.reason import Cause
 from campaign.result import (
     Array,
     Axis,
-    Cell,
     Column,
     Curve,
     Figure,
@@ -171,16 +169,10 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), OWN)
     if not found:
-        return Result(notes=failures_note(data))
+        return Result()
     loops = [(place, [(item, metrics(item, _measure)) for item in place.trials]) for place in found]
-    rows: list[dict[str, Cell]] = [
-        {
-            **place.point,
-            "amplitude": _amplitude_of(item),
-            "peak": own["peak"],
-            "energy": own["hysteresis_energy"],
-            "loss_factor": own["loss_factor"],
-        }
+    every = [
+        ({**place.point, "amplitude": _amplitude_of(item)}, own)
         for place, items in loops
         for item, own in items
     ]
@@ -196,16 +188,12 @@ def _analyse(data: TestData) -> Result:
             Column("energy", "Energy per cycle", "J", energy),
             Column("loss_factor", "Loss factor"),
         ),
-        rows=tuple(rows),
+        rows=tuple({**at, **own, "energy": own["hysteresis_energy"]} for at, own in every),
         note="The energy is the area of the loop of friction torque over displacement. The loss "
         "factor is that energy over π times torque times amplitude: 0 for a spring, 4/π = 1.27 for "
         "dry sliding.",
     )
-    findings = tuple(
-        Finding.of(own["hysteresis_energy"], {**place.point, "amplitude": _amplitude_of(item)})
-        for place, items in loops
-        for item, own in items
-    )
+    findings = tuple(Finding.of(own["hysteresis_energy"], at) for at, own in every)
     small = [amplitude for place in found for amplitude in _small(place)]
     again = f" Beside them those up to {_amplitude(max(small), display)} again." if small else ""
     figure = Figure(
@@ -219,7 +207,7 @@ def _analyse(data: TestData) -> Result:
         across=2,
         trials=trials_of(item for place in found for item in place.trials),
     )
-    return Result((table,), (figure,), findings, failures_note(data))
+    return Result((table,), (figure,), findings)
 
 
 def _what_shows(
@@ -288,7 +276,7 @@ EXPERIMENT = Experiment(
     trials=_trials,
     analyse=_analyse,
     measure=_measure,
-    fit=default_ramps.presliding,
+    fit=default_options.presliding,
     perturbs_bench=True,
     requires={FRICTION_TORQUE: "the loops", RELATIVE_ANGLE: "the displacement"},
 )

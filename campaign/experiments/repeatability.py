@@ -38,7 +38,6 @@ from campaign.experiments.friction_map.runs import (
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, TrialData, key
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.systematic import shared_parts
 from campaign.reason import Cause
 from campaign.result import (
@@ -80,7 +79,7 @@ def _sets(data: TestData, notes: list[str]) -> Iterator[MapSet]:
 
 
 def _analyse(data: TestData) -> Result:
-    notes = [*failures_note(data), *settling_notes(item.trial for item in data.completed())]
+    notes = list(settling_notes(item.trial for item in data.completed()))
     sets = list(_sets(data, notes))
     if not sets:
         return Result(notes=tuple(notes))

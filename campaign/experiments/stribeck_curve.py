@@ -8,7 +8,7 @@ sliding (Figure 2.9, Equation 4.6); what the measurement adds is that it does ge
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,17 +16,18 @@ from pydantic import Field
 
 from campaign.channels import FRICTION_TORQUE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import of_series
+from campaign.estimation.intervals import multiplied, of_series
 from campaign.estimation.sampled_curve import drop_interval_if_deterministic, largest
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of
 from campaign.experiments.shared.captions import amount, listed, sentence, surely_above, trials_of
-from campaign.experiments.shared.common import failures_note
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
+    RESOLVED,
     ConditionGroup,
     combined,
     in_models,
     places,
+    resolved,
     simulated,
 )
 from campaign.options import Options
@@ -53,6 +54,7 @@ from campaign.units import Angle, AngularRate, Frequency, Time
 
 OF_THE_MODEL = Cause("from the model", "worked out from the model of the bench, and not measured")
 OWN = ("speed",)
+TORQUE = "friction_torque"
 RAMP = 0.1
 """s, from rest to the speed."""
 LEVEL = 1e-3
@@ -114,7 +116,7 @@ def _measure(data: TrialData) -> tuple[Estimate, ...]:
     cut = data.recording().window(*data.trial.task.window)
     found = (
         of_series("rate", cut[LOAD_RATE], "rad/s"),
-        of_series("friction_torque", cut[FRICTION_TORQUE], "N m"),
+        of_series(TORQUE, cut[FRICTION_TORQUE], "N m"),
     )
     return simulated(drop_interval_if_deterministic(each, abs(each.value)) for each in found)
 
@@ -142,9 +144,10 @@ class _Points:
 def _points(place: ConditionGroup) -> _Points:
     """Those that moved and told a torque: without a rate the model promises no friction."""
     read = (combined(trials, _measure) for trials in place.by("speed").values())
-    found = [each for each in read if each["rate"].value and _told(each)]
+    moved = [each for each in read if each["rate"].value]
+    found = [each for each in moved if math.isfinite(each["rate"].value + each[TORQUE].value)]
     rates = tuple(each["rate"] for each in found)
-    torques = tuple(each["friction_torque"] for each in found)
+    torques = tuple(each[TORQUE] for each in found)
     rate = np.array([each.value for each in rates])
     promised = np.add(*steady_friction(bench_of(place.trials[0].trial), rate))
     return _Points(rates, torques, promised, tuple(map(_deviation, torques, promised)))
@@ -158,22 +161,18 @@ def _deviation(torque: Estimate, promised: float) -> Estimate:
 
 def _largest_deviation(points: _Points) -> Estimate:
     found = largest("stribeck_deviation", points.deviations, "")
-    low = None if found.low is None else max(found.low, 0.0)
-    return replace(found, low=low, systematic=points.deviations[0].systematic)
+    found = resolved(replace(found, systematic=points.deviations[0].systematic), 1.0)
+    return replace(found, low=None if found.low is None else max(found.low, 0.0))
 
 
 NOTHING_MOVED = "No reading has both a rate and a torque: friction in motion is not determined."
-
-
-def _told(each: Mapping[str, Estimate]) -> bool:
-    return math.isfinite(each["rate"].value + each["friction_torque"].value)
 
 
 def _analyse(data: TestData) -> Result:
     told = [(place, _points(place)) for place in places(data.completed(), OWN)]
     found = [(place, points) for place, points in told if points.rates]
     if not found:
-        return Result(notes=(*failures_note(data), *([NOTHING_MOVED] if told else [])))
+        return Result(notes=(NOTHING_MOVED,) if told else ())
     rows: list[dict[str, Cell]] = []
     findings: list[Finding] = []
     panels: list[Panel] = []
@@ -184,7 +183,7 @@ def _analyse(data: TestData) -> Result:
         ]
         findings.append(Finding.of(_largest_deviation(points), place.point))
         panels += _panels(place, points)
-    worst = max(finding.value for finding in findings)
+    worst = max(finding.value for finding in findings) or RESOLVED
     table = Table(
         key="stribeck-curve",
         title="Friction of steady sliding",
@@ -196,7 +195,7 @@ def _analyse(data: TestData) -> Result:
         ),
         rows=tuple(rows),
         note="Measured torque and curve agree within "
-        f"{number(max(worst, 1e-12), 1)} of the torque. "
+        f"{number(worst, 1)} of the torque. "
         "A reading is the friction over the travel of its window; a ripple over position that is "
         f"longer than that stays in it. {OF_ONE}",
     )
@@ -216,7 +215,7 @@ def _analyse(data: TestData) -> Result:
         one_scale=True,
         trials=trials_of(item for place, _ in found for item in place.trials),
     )
-    return Result((table,), (figure,), tuple(findings), failures_note(data))
+    return Result((table,), (figure,), tuple(findings))
 
 
 def _least(fine: Array, torque: Array) -> int | None:
@@ -230,7 +229,7 @@ def _what_shows(place: ConditionGroup, points: _Points) -> str:
     """How friction goes from the slowest to the fastest speed, as the points have it."""
     speed = np.abs(points.rate)
     torques = [
-        _signed(torque, np.sign(rate))
+        multiplied(torque, float(np.sign(rate)))
         for rate, torque in zip(points.rate, points.torques, strict=True)
     ]
     order = np.argsort(speed, kind="stable")
@@ -291,21 +290,12 @@ def _least_mark(fine: Array, torque: Array) -> Iterator[Mark]:
 def _direction(points: _Points, sign: float, name: str) -> Curve:
     """The readings of one direction over their speeds, with their intervals."""
     chosen = [
-        _signed(torque, sign)
+        multiplied(torque, sign)
         for rate, torque in zip(points.rate, points.torques, strict=True)
         if rate * sign > 0
     ]
     speeds = np.abs(points.rate[points.rate * sign > 0])
     return Curve.of(speeds, chosen, f"{name} direction", name)
-
-
-def _signed(torque: Estimate, sign: float) -> Estimate:
-    """The torque as it is, or of the other sign."""
-    if sign > 0:
-        return torque
-    low = None if torque.high is None else -torque.high
-    high = None if torque.low is None else -torque.low
-    return replace(torque, value=-torque.value, low=low, high=high)
 
 
 EXPERIMENT = Experiment(

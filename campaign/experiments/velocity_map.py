@@ -7,14 +7,13 @@ torque over a settled window, less J times the residual acceleration, is one poi
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from campaign.channels import COMMAND
 from campaign.experiments.friction_map import default_options
 from campaign.experiments.friction_map.figures import example_figure
-from campaign.experiments.friction_map.map_fit import stretches_found
-from campaign.experiments.friction_map.map_result import one_map
-from campaign.experiments.friction_map.model import MODEL, identified
-from campaign.experiments.friction_map.pilot import PilotedMapOptions, trials
-from campaign.experiments.friction_map.pilot_choice import STAGE
+from campaign.experiments.friction_map.map_result import MODEL, identified, one_map
+from campaign.experiments.friction_map.pilot import STAGE, PilotedMapOptions, trials
 from campaign.experiments.friction_map.points import measure
 from campaign.experiments.friction_map.runs import (
     CAN_USE,
@@ -22,28 +21,21 @@ from campaign.experiments.friction_map.runs import (
     OWN,
     REQUIRED,
     settling_notes,
+    stretches_found,
 )
 from campaign.experiments.friction_map.warnings import map_warnings
 from campaign.experiments.interface import Experiment, TestData, key
-from campaign.experiments.shared.common import failures_note, grouped
+from campaign.experiments.shared.common import of_each_place
 from campaign.result import Result
 
 
 def _analyse(data: TestData) -> Result:
     if data.model is not None:
         return identified(data)
-    notes = [*failures_note(data), *settling_notes(item.trial for item in data.completed())]
-    groups = list(grouped(data.completed(), own=OWN).values())
-    parts = []
-    for number, group in enumerate(groups, start=1):
-        parts.append(one_map(group, f"-{number}" if len(groups) > 1 else "")[0])
-    findings = [finding for part in parts for finding in part.findings]
-    return Result(
-        tuple(table for part in parts for table in part.tables),
-        (*(figure for part in parts for figure in part.figures), *example_figure(data)),
-        tuple(findings),
-        (*notes, *(note for part in parts for note in part.notes)),
-    )
+    maps = of_each_place(data.completed(), OWN, lambda *place: one_map(*place)[0])
+    notes = settling_notes(item.trial for item in data.completed())
+    figures = (*maps.figures, *example_figure(data))
+    return replace(maps, figures=figures, notes=(*notes, *maps.notes))
 
 
 EXPERIMENT = Experiment(

@@ -11,15 +11,14 @@ from campaign.axis_kind import axis_terms
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
+from campaign.experiments.analysis import result_of, suitable
 from campaign.experiments.interface import (
     Experiment,
     Model,
     TestData,
     bench_of,
     no_progress,
-    result_of,
     say_at,
-    suitable,
 )
 from campaign.identify.material import ChosenRun, same_recordings
 from campaign.parameter import NOTHING_IDENTIFIED, IdentifiedRig, Parameter

@@ -14,7 +14,8 @@ from campaign.comparison.finding_pairs import Pair, pairs_of
 from campaign.comparison.same_quantity import pair_tests
 from campaign.comparison.shared_systematics import shared_sources
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, bench_of, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData, bench_of
 from campaign.protocol import load_protocol, make_plan
 from campaign.recording import MemoryRecorder
 from campaign.references.verdict import with_verdicts

@@ -10,7 +10,8 @@ from typing import Any
 
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData
 from campaign.physics.truth import digest, plant_of
 from campaign.protocol.expand import fields_of
 from campaign.recording import MemoryRecorder

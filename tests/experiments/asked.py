@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, cast
 
-from campaign.experiments.interface import TestData, TrialData, result_of
-from campaign.experiments.interface import suitable as _suitable
+from campaign.experiments.analysis import result_of
+from campaign.experiments.analysis import suitable as _suitable
+from campaign.experiments.interface import TestData, TrialData
 from campaign.identify import experiments_by_model
 from campaign.options import Options
 from campaign.result import Result

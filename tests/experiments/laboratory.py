@@ -9,7 +9,8 @@ from typing import Any
 from campaign.backends.sim import SimBackend, SimOptions
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData
 from campaign.physics.bench import Bench
 from campaign.protocol.expand import fields_of
 from campaign.reason import Cause

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from campaign.experiments import experiments
+from campaign.experiments.analysis import result_of
 from campaign.experiments.interface import (
     Experiment,
     TestData,
@@ -70,7 +71,7 @@ def test_the_example_runs_and_finds_the_friction(experiment: Experiment, tmp_pat
     means = [float(str(row["friction"])) for row in rows]
     assert parameter.estimate.value == pytest.approx(np.mean(means))
     assert parameter.estimate.has_interval
-    nothing = experiment.analyse(TestData("", "", {}, tuple(map(failed, done))))
+    nothing = result_of(experiment, TestData("", "", {}, tuple(map(failed, done))))
     assert not nothing.figures
     assert "did not complete" in nothing.notes[0]
 

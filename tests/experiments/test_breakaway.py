@@ -128,7 +128,7 @@ def test_ten_positions() -> None:
 def test_a_ramp_that_ends_below_breakaway_is_told() -> None:
     result = result_of(load_only, {**TWO, "peak_torque": "20 N m"})
     assert result.tables == ()
-    assert len([note for note in result.notes if "below breakaway" in note]) == 2
+    assert ["below breakaway" in each.reason.text for each in result.left_out] == [True, True]
 
 
 def test_failed_trials_and_empty_tests() -> None:

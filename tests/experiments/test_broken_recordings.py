@@ -15,7 +15,8 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
-from campaign.experiments.interface import Experiment, measured
+from campaign.experiments.analysis import measured
+from campaign.experiments.interface import Experiment
 from campaign.recording import Recording
 from campaign.result import Result
 from tests.experiments.laboratory import Done, analyse

@@ -12,11 +12,11 @@ from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import TOO_WIDE, UNPHYSICAL
 from campaign.experiments.any_motion.inverse_result import BENCH, NO_BASE, _settings, _with_base
 from campaign.experiments.frequency_response.model import analysis as frequency_response
-from campaign.experiments.friction_map import model as friction_map
+from campaign.experiments.friction_map import map_result as friction_map
 from campaign.experiments.presliding_multisine import parameters as presliding
 from campaign.experiments.shared.directions import OFFSET_OR_ASYMMETRY, with_offset
 from campaign.experiments.whole_model import experiment as whole_model
-from campaign.experiments.whole_model.models import models
+from campaign.experiments.whole_model.residuals import models
 from campaign.parameter import Parameter
 from campaign.physics.bench import Bench
 from campaign.physics.friction.unknowns import Sizes

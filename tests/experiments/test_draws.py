@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from campaign.estimate import Estimate
-from campaign.experiments.interface import Experiment, TestData, TrialData, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.options import Options
 from campaign.published.draws import SEED
 from campaign.recording import Ending, Outcome, Recording, SafeState

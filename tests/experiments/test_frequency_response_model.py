@@ -16,9 +16,7 @@ from campaign.estimation.frequency.extrema import NEEDS_A_FIT, NO_SCATTER
 from campaign.estimation.frequency.multisine import odd_grid, random_phases
 from campaign.experiments.frequency_response.model.axis_numbers import UNKNOWN
 from campaign.experiments.frequency_response.model.frequency_fit import TOO_FEW
-from campaign.experiments.responses.amplitudes import by_amplitude
-from campaign.experiments.responses.periodicity import unused
-from campaign.experiments.responses.signals import base_frequency
+from campaign.experiments.responses.signals import base_frequency, by_amplitude, unused
 from campaign.experiments.responses.sources import _lines
 from campaign.identify.material import choose
 from campaign.result import Result

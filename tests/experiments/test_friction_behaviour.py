@@ -20,7 +20,7 @@ from campaign.execution.trial_metrics import checked
 from campaign.experiments import experiments
 from campaign.experiments.model_output.experiment import NO_REVERSAL
 from campaign.experiments.shared.friction_models import with_model
-from campaign.experiments.stick_slip.experiment import TOO_FEW_SLIPS
+from campaign.experiments.stick_slip import TOO_FEW_SLIPS
 from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.result import Result

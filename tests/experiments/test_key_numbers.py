@@ -7,7 +7,8 @@ import math
 import pytest
 
 from campaign.estimate import Estimate, Origin
-from campaign.experiments.post_processing.key_numbers import MOST, key, key_numbers
+from campaign.experiments.interface import key
+from campaign.experiments.post_processing.key_numbers import MOST, key_numbers
 from campaign.published.draws import SEED
 from campaign.result import Finding, Value
 from tests.experiments.laboratory import MADE_UP

@@ -9,8 +9,13 @@ from campaign.estimate import Estimate
 from campaign.estimation.threshold import Threshold
 from campaign.experiments.observer_gain.figures import error_figure
 from campaign.experiments.observer_gain.metrics import Gain
-from campaign.experiments.sensitivity.figures import sensitivity_figure, thresholds_figure
-from campaign.experiments.sensitivity.results import Response, ResponseVerdict, judge
+from campaign.experiments.sensitivity.results import (
+    Response,
+    ResponseVerdict,
+    judge,
+    sensitivity_figure,
+    thresholds_figure,
+)
 from campaign.result import Figure, Mark, Panel
 from tests.experiments.laboratory import analyse, execute, trials
 from tests.physics.benches import bench

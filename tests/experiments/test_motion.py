@@ -16,7 +16,8 @@ import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.estimation.gate import TOO_WIDE
-from campaign.experiments.interface import TestData, measured, result_of
+from campaign.experiments.analysis import measured, result_of
+from campaign.experiments.interface import TestData
 from campaign.experiments.motion.experiment import EXPERIMENT
 from campaign.result import Result
 from tests.experiments.asked import asked

@@ -13,13 +13,14 @@ import pytest
 from scipy.stats import binomtest
 
 from campaign.estimate import Estimate
+from campaign.experiments.analysis import measured
 from campaign.experiments.friction_map.pilot import (
     FEWEST,
     SPEEDS,
     PilotedMapOptions,
+    choose,
     pilot_speeds,
 )
-from campaign.experiments.friction_map.pilot_choice import choose
 from campaign.experiments.friction_map.runs import (
     MEMORIES,
     map_speeds,
@@ -27,7 +28,7 @@ from campaign.experiments.friction_map.runs import (
     run_requests,
     settled_angle,
 )
-from campaign.experiments.interface import TestData, measured
+from campaign.experiments.interface import TestData
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.velocity_map import EXPERIMENT
 from campaign.physics.bench import Bench

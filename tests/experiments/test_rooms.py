@@ -10,8 +10,9 @@ import pytest
 
 from campaign.experiments import experiments
 
+HELPERS = ("__init__", "analysis", "interface")
 ROOM = Path(__file__).parents[2] / "campaign" / "experiments"
-FILES = sorted(path for path in ROOM.glob("*.py") if path.stem not in ("__init__", "interface"))
+FILES = sorted(path for path in ROOM.glob("*.py") if path.stem not in HELPERS)
 KINDS = {path.stem: path for path in FILES} | {
     path.parent.name: path for path in sorted(ROOM.glob("*/experiment.py"))
 }

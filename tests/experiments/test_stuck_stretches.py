@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from campaign.estimation.steadiness import STICK_SLIP
-from campaign.experiments.friction_map import model, steady_recordings
+from campaign.experiments.friction_map import map_result, steady_recordings
 from campaign.experiments.friction_map.points import Point
 from campaign.experiments.friction_map.stretches import Stretch, StretchOptions
 from tests.experiments.asked import data_of
@@ -55,7 +55,7 @@ def stretch(speed: float, *, slips: bool) -> Point:
 def identified(monkeypatch: pytest.MonkeyPatch, points: list[Point]) -> Any:
     monkeypatch.setattr(steady_recordings, "points_of", lambda *_: (points, None))
     options = StretchOptions.model_validate({"slowest": "1 mrad/s"})
-    return model.identified(data_of([OneTrial()], model=options))
+    return map_result.identified(data_of([OneTrial()], model=options))
 
 
 def test_they_are_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from campaign.estimation.inverse.motion import FilterSettings, Motion, motion_of
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
 from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
-from campaign.experiments.whole_model.models import models
+from campaign.experiments.whole_model.residuals import models
 from campaign.experiments.whole_model.whole_model_fit import (
     BASE_UNKNOWN,
     derived,

@@ -14,9 +14,9 @@ from campaign.experiments.any_motion.figures import figures, friction_figure
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics, predicted
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
 from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
-from campaign.experiments.frequency_response.model.figures import figures as response_figures
 from campaign.experiments.frequency_response.model.frequency_fit import Masses
-from campaign.experiments.whole_model.models import models
+from campaign.experiments.frequency_response.model.tables import figures as response_figures
+from campaign.experiments.whole_model.residuals import models
 from campaign.experiments.whole_model.tables_and_figures import figures as whole_figures
 from campaign.experiments.whole_model.whole_model_fit import find as find_whole
 from campaign.result import Curve, Figure

@@ -16,7 +16,8 @@ from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
 from campaign.estimate import Estimate, Systematic
-from campaign.experiments.interface import Model, suitable
+from campaign.experiments.analysis import suitable
+from campaign.experiments.interface import Model
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, _compared, _section, identify, widest
 from campaign.identify.material import choose

@@ -15,8 +15,9 @@ from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError
 from campaign.estimate import Estimate
 from campaign.experiments import experiments
+from campaign.experiments.analysis import result_of
 from campaign.experiments.breakaway.experiment import BreakawayOptions
-from campaign.experiments.interface import Experiment, Model, TestData, metrics, result_of
+from campaign.experiments.interface import Experiment, Model, TestData, metrics
 from campaign.experiments.shared.recorded_motion import nothing_to_plan, of_any_motion
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify

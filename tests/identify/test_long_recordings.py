@@ -22,9 +22,8 @@ from campaign.estimation.inverse.rows import rows
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.whole_model import parts
-from campaign.experiments.whole_model.models import models
 from campaign.experiments.whole_model.parts import telling_parts
-from campaign.experiments.whole_model.residuals import Residuals, steps_between
+from campaign.experiments.whole_model.residuals import Residuals, models, steps_between
 from campaign.experiments.whole_model.whole_model_fit import find
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import identify

@@ -14,7 +14,8 @@ from campaign.estimation.presliding_dynamics.presliding_fit import (
     identify_presliding_dynamics,
 )
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, measured, result_of
+from campaign.experiments.analysis import measured, result_of
+from campaign.experiments.interface import TestData
 from campaign.experiments.presliding_multisine import experiment as presliding_multisine
 from campaign.protocol import load_protocol, make_plan
 from campaign.published.draws import SEED

@@ -12,7 +12,7 @@ import pytest
 
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment, TestData
-from campaign.experiments.stabilization.identified_compensations import beside_table
+from campaign.experiments.stabilization.comparisons import beside_table
 from campaign.published.values import read_published, thesis
 from campaign.report.build import render
 from campaign.report.content.published_columns import as_compared, with_published

@@ -16,7 +16,8 @@ from campaign.cli.rerun import rerun_trial
 from campaign.cli.show import show_archive
 from campaign.errors import ExitCode, UsageError
 from campaign.experiments import experiments
-from campaign.experiments.interface import TestData, result_of
+from campaign.experiments.analysis import result_of
+from campaign.experiments.interface import TestData
 from campaign.report.build import render
 from campaign.report.content import document
 from campaign.resources import templates_folder

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from campaign.arrays import Array
 from campaign.estimation.inverse.motion import kept_times
 from campaign.estimation.inverse.rows import all_rows, moving
-from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together
+from campaign.experiments.any_motion.motions import place_and_rate
 from campaign.result import Axis, Curve, Figure, Panel
 
 TIME = Axis("Time", "s", "s")
@@ -41,7 +41,7 @@ def friction_figure(found: InverseDynamics) -> Figure:
     """Force less what accelerates, over the rate; the model's line. Both of rows that move."""
     best = found.best
     moves = _moving(found)
-    own = _motion_columns(found)[moves]
+    rate = place_and_rate(found.pieces, found.filtering)[moves, 1]
     pieces = [
         all_rows(each.motion, best.structure.terms, found.filtering, best.delay)
         for each in found.pieces
@@ -52,7 +52,6 @@ def friction_figure(found: InverseDynamics) -> Figure:
     inertia = [i for i, term in enumerate(terms) if term.name == "inertia"]
     rest = force - design[:, inertia] @ values[inertia]
     model = design @ values - design[:, inertia] @ values[inertia]
-    rate = own[:, 1]
     centre, measured, modelled = _binned(rate, rest, model)
     return Figure(
         key="friction-over-rate",
@@ -78,7 +77,7 @@ def friction_figure(found: InverseDynamics) -> Figure:
 def residual_figure(found: InverseDynamics) -> Figure:
     """What the chosen model leaves over: over time, rate and angle, and its autocorrelation."""
     fit = found.fit
-    own = _motion_columns(found)
+    own = place_and_rate(found.pieces, found.filtering)
     time = np.concatenate([kept_times(piece.motion, found.filtering) for piece in found.pieces])
     left = np.where(_moving(found), np.concatenate(fit.residuals), np.nan)
     lag, correlation, bound = autocorrelation(fit.residuals)
@@ -191,16 +190,6 @@ def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
     """With a gap wherever time begins anew: no line leads from one recording to the next."""
     anew = np.flatnonzero(np.diff(time) < 0.0) + 1
     return np.insert(time, anew, np.nan), np.insert(values, anew, np.nan)
-
-
-def _motion_columns(found: InverseDynamics) -> Array:
-    """Angle and rate of each row, shape (n, 2)."""
-    own = (
-        Term("q", "", "", "", lambda m: m.position),
-        Term("v", "", "", "", lambda m: m.rate),
-    )
-    parts = [all_rows(each.motion, own, found.filtering).columns for each in found.pieces]
-    return np.concatenate(parts)
 
 
 def _moving(found: InverseDynamics) -> NDArray[np.bool_]:

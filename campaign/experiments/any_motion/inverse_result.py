@@ -19,7 +19,7 @@ from campaign.estimation.gate import admitted_together, refused
 from campaign.estimation.inverse.terms import TERMS
 from campaign.experiments.any_motion.figures import figures
 from campaign.experiments.any_motion.inverse_fit import BENDS, InverseDynamics, find, repeats
-from campaign.experiments.any_motion.motions import force_of, read, with_slowest
+from campaign.experiments.any_motion.motions import force_of, read, with_constants, with_slowest
 from campaign.experiments.any_motion.tables import (
     correlated,
     deviations_table,
@@ -29,8 +29,6 @@ from campaign.experiments.any_motion.tables import (
 )
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.directions import with_offset
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen, is_value
 from campaign.reason import Cause
@@ -132,7 +130,7 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
         for one, two, share in correlated(fit, found.best.structure.terms)
         for name, other in ((one, two), (two, one))
     }
-    scaled = {name: _scaled(one, data) for name, one in found.estimates.items()}
+    scaled = {name: with_constants(one, data) for name, one in found.estimates.items()}
     told = with_offset(_with_base(admitted_together(scaled, found.matters)), "coulomb")
     dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
     slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
@@ -184,25 +182,6 @@ def one_way(found: InverseDynamics) -> str:
 def _is_plain(found: InverseDynamics) -> bool:
     """Whether the chosen terms are those that a bench's friction model has."""
     return {term.name for term in found.best.structure.terms} <= PLAIN
-
-
-def _scaled(one: Estimate, data: TestData) -> Estimate:
-    """With what a wrong constant of the force would do to it."""
-    if one.origin is Origin.NOT_DETERMINED:
-        return one
-    first = data.trials[0]
-    return with_scale(_with_constant(one, data), first, force_of(first))
-
-
-def _with_constant(one: Estimate, data: TestData) -> Estimate:
-    if data.bench.motor is None or _from_elsewhere(data):
-        return one
-    return with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
-
-
-def _from_elsewhere(data: TestData) -> bool:
-    """Whether a mapping says what the columns are worth, and so how sure that is."""
-    return bool(data.trials[0].trial.recording)
 
 
 def _tables(found: InverseDynamics) -> Iterator[Table]:

@@ -18,6 +18,7 @@ from campaign.channels import (
     RELATIVE_RATE,
     TEMPERATURE,
 )
+from campaign.estimate import Estimate, Origin
 from campaign.estimation.inverse.motion import (
     REGRESSION_RATE,
     FilterSettings,
@@ -27,7 +28,10 @@ from campaign.estimation.inverse.motion import (
     whole_pieces,
     zero_phase,
 )
+from campaign.estimation.inverse.rows import all_rows
+from campaign.estimation.inverse.terms import Term
 from campaign.experiments.interface import TestData, TrialData
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_scale, with_systematic
 from campaign.signals import MultiSine
 from campaign.trial import Recording
 
@@ -142,10 +146,26 @@ def moved(trials: Sequence[TrialData], filtering: FilterSettings) -> tuple[Motio
     return found
 
 
+def place_and_rate(pieces: Sequence[MotionPiece], filtering: FilterSettings) -> Array:
+    """Angle and rate of each row, shape (n, 2)."""
+    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
+    return np.concatenate([all_rows(each.motion, own, filtering).columns for each in pieces])
+
+
 def force_of(trial: TrialData) -> str:
     """The channel that is taken for what moves the axis."""
     names = trial.channel_names()
     return next((name for name in FORCES if name in names), DRIVE_TORQUE)
+
+
+def with_constants(one: Estimate, data: TestData) -> Estimate:
+    """With what a wrong constant of the force would do to it; of a time that is nothing."""
+    if not one.unit.startswith(("N", "kg")) or one.origin is Origin.NOT_DETERMINED:
+        return one
+    first = data.trials[0]
+    if data.bench.motor is not None and not first.trial.recording:
+        one = with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
+    return with_scale(one, first, force_of(first))
 
 
 def _moves(piece: MotionPiece, low_pass: float) -> bool:

@@ -21,22 +21,32 @@ AS_THEY_ARE = Cause(
 DEVIATION = Cause("deviation", "a deviation, not a quantity of the rig")
 
 
+COMPARED = (
+    Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
+    Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
+    Column("criterion", "BIC", exact=True),
+)
+"""Columns by which fits are compared."""
+
+
+def validation_columns(first: str) -> tuple[Column, Column]:
+    """Of the validation, and of the gain over the `first` fit."""
+    return (
+        Column("validation", "Validation", "", "percent"),
+        Column("gain", f"Lower than {first} by", "", "percent"),
+    )
+
+
 def structures_table(found: InverseDynamics) -> Table:
     """Every structure that was tried: how well it does on its rows, on blocks, on other motions."""
     columns = [
         Column("terms", "Terms"),
         Column("delay", "Delay", "s", "ms", exact=True),
-        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
-        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
-        Column("criterion", "BIC", exact=True),
+        *COMPARED,
         Column("simulated", "Rate after 1 s", "", "percent", reason=AS_THEY_ARE()),
     ]
     validated = found.tried[0].validation is not None
-    if validated:
-        columns += [
-            Column("validation", "Validation", "", "percent"),
-            Column("gain", "Lower than plain by", "", "percent"),
-        ]
+    columns += validation_columns("plain") if validated else ()
     columns.append(Column("condition", "Condition", exact=True))
     rows = []
     for index, each in enumerate(found.tried):

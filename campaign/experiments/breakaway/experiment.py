@@ -28,8 +28,7 @@ from campaign.estimation.relative_rate import (
     stop_rate,
 )
 from campaign.experiments.breakaway.figures import position_figure, ramp_figure
-from campaign.experiments.breakaway.means import Ramps, means_of, with_comparisons
-from campaign.experiments.breakaway.parameters import parameters_of
+from campaign.experiments.breakaway.means import Ramps, means_of, parameters_of, with_comparisons
 from campaign.experiments.breakaway.remarks import remarks
 from campaign.experiments.breakaway.tables import CHORD, findings_of, table_of, window_table
 from campaign.experiments.interface import (
@@ -41,20 +40,20 @@ from campaign.experiments.interface import (
     key,
     metrics,
 )
-from campaign.experiments.shared import default_ramps
+from campaign.experiments.shared import default_options
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.experiments.shared.common import conditions, grouped, joined
 from campaign.experiments.shared.detected_trials import named_or_found
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig
 from campaign.physics.bench import Bench
-from campaign.physics.complete import IncompleteBenchError, inertia_of
+from campaign.physics.complete import inertia_of
 from campaign.physics.friction import friction_models
 from campaign.reason import Cause
 from campaign.recording import Array, Recording
-from campaign.result import Figure, Finding, Result, Table
+from campaign.result import Figure, Result
 from campaign.signals import Polyline
 from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
 from campaign.units import (
@@ -265,7 +264,12 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     options, bench = _options(data.trial), bench_of(data.trial)
     inertia = inertia_of(bench, "friction of a load that gathers speed")
     seen = _seen(data, options.sliding_rate)
-    found = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
+    try:
+        found = breakaway_torque(*_samples(data), inertia, options.sliding_rate, seen)
+    except ValueError as error:
+        if slides_from(seen, options.sliding_rate) is None:
+            raise
+        raise ValueError(f"{error}; a higher sample_rate holds more of it") from error
     torque = with_systematic(found.torque, bench, INERTIA, inertia * found.acceleration)
     torque = _by_torque_constant(torque, bench)
     acceleration = Estimate.without_interval(
@@ -347,57 +351,35 @@ def _by_torque_constant(estimate: Estimate, bench: Bench) -> Estimate:
 
 
 def _analyse(data: TestData) -> Result:
-    notes: list[str] = list(failures_note(data))
-    groups = [_ramps(group, notes) for group in grouped(data.completed(), own=OWN).values()]
-    groups = with_comparisons([ramps for ramps in groups if ramps.found])
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    findings: list[Finding] = []
-    for number, ramps in enumerate(groups, start=1):
-        suffix = f"-{number}" if len(groups) > 1 else ""
-        means = means_of(ramps)
-        tables += [table_of(ramps, means, suffix), *window_table(ramps, suffix)]
-        figures += _figures(ramps, means, suffix)
-        findings += findings_of(ramps, means)
-        notes += remarks(ramps)
-    asked = data.model is not None
-    parameters = tuple(parameters_of(groups, curve_of, notes)) if asked else ()
-    return Result(
-        tuple(tables),
-        tuple(figures),
-        tuple(findings),
-        tuple(dict.fromkeys(notes)),
-        identified=IdentifiedRig(parameters),
+    groups = with_comparisons(
+        [_ramps(group) for group in grouped(data.completed(), own=OWN).values()]
+    )
+    suffixes = [f"-{number}" if len(groups) > 1 else "" for number in range(1, len(groups) + 1)]
+    whole = joined(map(_of_ramps, groups, suffixes))
+    if data.model is None:
+        return whole
+    notes = list(whole.notes)
+    parameters = tuple(parameters_of(groups, curve_of, notes))
+    return replace(whole, notes=tuple(notes), identified=IdentifiedRig(parameters))
+
+
+def _ramps(group: tuple[TrialData, ...]) -> Ramps:
+    return Ramps(
+        group,
+        tuple({**conditions(item), "direction": direction_of(item.trial)} for item in group),
+        tuple(metrics(item, _measure) for item in group),
     )
 
 
-def _slid(item: TrialData) -> bool:
-    """Whether the load came to the rate that counts as sliding."""
-    bound = _options(item.trial).sliding_rate
-    return slides_from(_seen(item, bound), bound) is not None
-
-
-def _ramps(group: Sequence[TrialData], notes: list[str]) -> Ramps:
-    trials, places, found = [], [], []
-    for item in group:
-        try:
-            own = metrics(item, _measure)
-        except IncompleteBenchError as error:  # said once for all ramps
-            notes.append(f"No breakaway torque: {error}.")
-            continue
-        except ValueError as error:
-            faster = "; a higher sample_rate holds more of it" if _slid(item) else ""
-            notes.append(f"{item.trial.label}: {error}{faster}.")
-            continue
-        trials.append(item)
-        places.append({**conditions(item), "direction": direction_of(item.trial)})
-        found.append(own)
-        if "bristle_stiffness" not in own:
-            notes.append(
-                f"{item.trial.label}: its presliding is too short for a stiffness (a slower ramp "
-                "has more samples of it), or too noisy (a faster one moves more above the noise)."
-            )
-    return Ramps(tuple(trials), tuple(places), tuple(found))
+def _of_ramps(ramps: Ramps, suffix: str) -> Result:
+    """What the ramps of one place of the sweep show."""
+    means = means_of(ramps)
+    return Result(
+        (table_of(ramps, means, suffix), *window_table(ramps, suffix)),
+        tuple(_figures(ramps, means, suffix)),
+        tuple(findings_of(ramps, means)),
+        tuple(remarks(ramps)),
+    )
 
 
 def _figures(
@@ -419,7 +401,7 @@ EXPERIMENT = Experiment(
     options=BreakawayOptions,
     trials=_trials,
     analyse=_analyse,
-    fit=default_ramps.breakaway,
+    fit=default_options.breakaway,
     warnings=_warnings,
     measure=_measure,
     needs_samples=False,

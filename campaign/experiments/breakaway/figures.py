@@ -254,11 +254,11 @@ def _place(position: float) -> str:
 
 def _mean(ramps: Ramps, means: Mapping[str, Estimate], quantity: str) -> Iterator[Curve]:
     if quantity in means:
-        at = np.array([_behind(_angles(ramps))])
-        dot = Curve.of(at, [means[quantity]], "mean of all", "measured")
         shared = {k: v for k, v in ramps.places[0].items() if k not in OF_A_RAMP}
-        conditions = {**shared, "statistic": "mean"}
-        yield replace(dot, quantity=quantity, conditions=conditions)
+        yield Curve.of(
+            [_behind(_angles(ramps))], [means[quantity]], "mean of all", "measured",
+            quantity=quantity, conditions={**shared, "statistic": "mean"},
+        )  # fmt: skip
 
 
 def _dots(ramps: Ramps, quantity: str) -> list[Curve]:
@@ -266,29 +266,16 @@ def _dots(ramps: Ramps, quantity: str) -> list[Curve]:
     several = len(ramps.directions) > 1
     aside = ASIDE * _pitch(_angles(ramps)) if several else 0.0
     for direction in ramps.directions:
-        shown = [
-            (float(str(place["position"])), own[quantity])
+        # Their own intervals: what all ramps share is in the bar of the mean.
+        shown = {
+            float(str(place["position"])): replace(own[quantity], systematic=(), kind="number")
             for place, own in zip(ramps.places, ramps.found, strict=True)
             if quantity in own and place["direction"] == direction
-        ]
-        if not shown:
-            continue
-        ends = np.array([_ends(estimate) for _, estimate in shown])
-        curves.append(
-            Curve(
-                np.array([position for position, _ in shown]),
-                np.array([estimate.value for _, estimate in shown]),
-                f"{direction} direction",
-                direction,
-                "points",
-                low=ends[:, 0],
-                high=ends[:, 1],
-                aside=aside if direction == "positive" else -aside,
+        }
+        if shown:
+            way = aside if direction == "positive" else -aside
+            found = list(shown.values())
+            curves.append(
+                Curve.of(list(shown), found, f"{direction} direction", direction, aside=way)
             )
-        )
     return curves
-
-
-def _ends(estimate: Estimate) -> tuple[float, float]:
-    low, high = estimate.low, estimate.high
-    return np.nan if low is None else low, np.nan if high is None else high

@@ -9,7 +9,7 @@ import numpy as np
 from campaign.estimate import Estimate
 from campaign.estimation.breakaway_torque import STILL_RISING
 from campaign.estimation.presliding import NOT_RESOLVED, WINDOW
-from campaign.experiments.breakaway.means import MEASURED, Ramps
+from campaign.experiments.breakaway.means import MEASURED, Ramps, option_of
 from campaign.experiments.interface import bench_of
 from campaign.units import angle_text, rate_text
 
@@ -26,6 +26,12 @@ WIDE = 0.05
 
 def remarks(ramps: Ramps) -> Iterator[str]:
     """Sentences; those that ask for something name the option."""
+    for item, own in zip(ramps.trials, ramps.found, strict=True):
+        if "bristle_stiffness" not in own:
+            yield (
+                f"{item.trial.label}: its presliding is too short for a stiffness (a slower ramp "
+                "has more samples of it), or too noisy (a faster one moves more above the noise)."
+            )
     yield "σ1 is assumed from a damping ratio; a torque ramp carries no information on it."
     if any(each.value > 1 for each in ramps.values("interfaces")):
         yield (
@@ -62,8 +68,7 @@ def _encoder(ramps: Ramps) -> Iterator[str]:
 
 def _rest(ramps: Ramps) -> Iterator[str]:
     found = ramps.values("bristle_stiffness")
-    trial = ramps.trials[0].trial
-    rest, rate = (float(str(trial.options[name])) for name in ("rest", "torque_rate"))
+    rest, rate = option_of(ramps, "rest"), option_of(ramps, "torque_rate")
     torques = [each.value for each in ramps.values("breakaway_torque")]
     wide = [each for each in found if _relative(each) > WIDE]
     if not torques or not wide:
@@ -83,15 +88,15 @@ def _rate(ramps: Ramps) -> Iterator[str]:
         if any(each.reason and each.standard_error is not None for each in ramps.values(name))
         and not any(each.kind in ("at least", "at most") for each in ramps.values(name))
     ]
-    trial = ramps.trials[0].trial
     stiffness = ramps.values("bristle_stiffness")
     shifted = sum(_by_window(each) > 0.5 * _scatter(each) > 0 for each in stiffness)
-    noisy = any(value > 0 for value in _noise(ramps))
+    gyro = bench_of(ramps.trials[0].trial).sensors.gyro
+    noisy = gyro.noise > 0 or gyro.resolution > 0
     if noisy and (refused or 2 * shifted > len(stiffness)):
-        rate = float(str(trial.options["torque_rate"]))
+        rate = 0.25 * option_of(ramps, "torque_rate")
         yield (
             "The ramp is too fast for the curve of bristles, or its sensors too coarse: choose a "
-            f"torque_rate of {0.25 * rate:.2g} N·m/s, or sweep it to see what it does."
+            f"torque_rate of {rate:.2g} N·m/s, or sweep it to see what it does."
         )
 
 
@@ -101,7 +106,7 @@ def _hidden(ramps: Ramps) -> Iterator[str]:
     above = sum(own["bristle_stiffness"].reason in NOT_RESOLVED for own in found)
     if not (bounds or above):
         return
-    rate = float(str(ramps.trials[0].trial.options["torque_rate"]))
+    rate = option_of(ramps, "torque_rate")
     yield (
         f"The gyro's noise may hide a stiffer interface that slips first: of {len(found)} ramps, "
         f"stiffness at rest is a lower bound in {bounds} and σ0 an upper bound in {above}. A "
@@ -112,18 +117,13 @@ def _hidden(ramps: Ramps) -> Iterator[str]:
 def _unfinished(ramps: Ramps) -> Iterator[str]:
     bounds = [each for each in ramps.values("breakaway_torque") if each.kind == "at least"]
     if bounds:
-        rate = float(str(ramps.trials[0].trial.options["sliding_rate"]))
+        rate = option_of(ramps, "sliding_rate")
         risen = all(each.reason in STILL_RISING for each in bounds)
         why = "was still rising" if risen else "did not fall significantly before"
         yield (
             f"Friction {why} {'when ' if risen else ''}ramps ended: their breakaway torque is a "
             f"bound. Choose a sliding_rate of {rate_text(4.0 * rate, '.2g')} or more."
         )
-
-
-def _noise(ramps: Ramps) -> tuple[float, float]:
-    gyro = bench_of(ramps.trials[0].trial).sensors.gyro
-    return gyro.noise, gyro.resolution
 
 
 def _relative(estimate: Estimate) -> float:

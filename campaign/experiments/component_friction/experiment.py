@@ -9,16 +9,16 @@ load as the gear reduces.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from pydantic import Field
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
-from campaign.estimate import Estimate, Window
+from campaign.estimate import Estimate, Systematic, Window
 from campaign.estimation.breakaway_torque import breakaway_torque
-from campaign.estimation.intervals import shifted_by
+from campaign.estimation.intervals import shifted_by, welch, with_error
 from campaign.estimation.relative_rate import STOP_FACTOR
 from campaign.estimation.scatter import (
     RESOLUTION,
@@ -26,17 +26,16 @@ from campaign.estimation.scatter import (
     mean_of_readings,
 )
 from campaign.experiments.component_friction.figures import ComponentCurves, component_figure
-from campaign.experiments.component_friction.sums import load_share, total_of
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key, metrics
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, failures_note, grouped
+from campaign.experiments.shared.common import conditions, of_each_place
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.physics.complete import inertia_of
 from campaign.physics.friction_paths import torques
 from campaign.physics.limits import worst_friction
 from campaign.physics.scatter import TORQUES, Scatter, VariationOptions
-from campaign.reason import Cause
+from campaign.reason import NONE, Cause
 from campaign.result import (
     Cell,
     Column,
@@ -192,32 +191,19 @@ def _read(data: TrialData) -> Reading:
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    findings: list[Finding] = []
-    groups = grouped(data.completed(), own=OWN)
-    for number, group in enumerate(groups.values(), start=1):
-        readings: list[Reading] = []
-        for item in group:
-            try:
-                readings.append(_read(item))
-            except ValueError as error:
-                notes.append(f"{item.trial.label}: {error}.")
-        if not readings:
-            continue
-        planned = {str(d.trial.point["component"]) for d in data.trials}
-        suffix = f"-{number}" if len(groups) > 1 else ""
-        tables.append(_table(readings, suffix))
-        figures.append(_figure(readings, suffix))
-        findings += _findings(readings, planned)
-        notes += _remarks(readings, group[0])
-    return Result(
-        tuple(tables),
-        tuple(figures),
-        tuple(findings),
-        tuple(dict.fromkeys(notes)),
-    )
+    trials = (*data.left_out, *(item.trial for item in data.trials))
+    planned = {str(trial.point["component"]) for trial in trials}
+
+    def of_place(group: Sequence[TrialData], suffix: str) -> Result:
+        readings = [_read(item) for item in group]
+        return Result(
+            (_table(readings, suffix),),
+            (_figure(readings, suffix),),
+            tuple(_findings(readings, planned)),
+            tuple(_remarks(readings, group[0])),
+        )
+
+    return of_each_place(data.completed(), OWN, of_place)
 
 
 def _by_component(readings: list[Reading]) -> dict[str, list[Reading]]:
@@ -279,9 +265,7 @@ def _figure(readings: list[Reading], suffix: str) -> Figure:
         )
         for name, own in _by_component(readings).items()
     ]
-    options = ComponentFrictionOptions.model_validate(
-        readings[0].data.trial.options, context={"si": True}
-    )
+    options = _options(readings[0].data)
     shared = {k: v for k, v in readings[0].place.items() if k not in OWN}
     trials = trials_of(reading.data for reading in readings)
     return component_figure(shown, shared, options.sliding_rate, trials, suffix)
@@ -330,6 +314,37 @@ def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
         "A single reading is one sample of a friction that scatters from trial to trial; only mean "
         "and deviation can be compared. Its own interval is that of this one reading."
     )
+
+
+def _of_means(
+    name: str, unit: str, parts: Sequence[tuple[float, Estimate]], value: float
+) -> Estimate:
+    """A value that depends on independent means, each with its derivative (GUM 5.1.2)."""
+    reason = next((each.reason for _, each in parts if not each.has_interval), NONE)
+    shift = math.hypot(*(slope * each.systematic_uncertainty for slope, each in parts))
+    systematic = (Systematic(RESOLUTION, shift),)
+    if reason:
+        return Estimate.without_interval(name, value, unit, reason, systematic=systematic)
+    errors = [(abs(slope) * (each.standard_error or 0.0), each.freedom) for slope, each in parts]
+    error = math.hypot(*(size for size, _ in errors))
+    method = "of the means, Welch and Satterthwaite"
+    return with_error(name, value, unit, error, welch(*errors), method, systematic=systematic)
+
+
+def total_of(means: Mapping[str, Estimate]) -> Estimate:
+    """Sum of the components' means (N m)."""
+    value = sum(mean.value for mean in means.values())
+    return _of_means("breakaway_torque", "N m", [(1.0, mean) for mean in means.values()], value)
+
+
+def load_share(means: Mapping[str, Estimate], sides: Mapping[str, str]) -> Estimate:
+    """Share of the load in that sum; `sides` says on which side of the gear each component is."""
+    total = sum(mean.value for mean in means.values())
+    load = sum(mean.value for name, mean in means.items() if sides[name] == "load")
+    parts = [
+        (((sides[name] == "load") - load / total) / total, mean) for name, mean in means.items()
+    ]
+    return _of_means("load_share", "", parts, load / total)
 
 
 EXPERIMENT = Experiment(

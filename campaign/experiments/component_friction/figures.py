@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -98,12 +99,10 @@ def _ramp(each: ComponentCurves) -> Curve:
 def _dots(each: ComponentCurves, place: Mapping[str, Value], behind: float) -> tuple[Curve, Curve]:
     """The readings by their numbers, and their mean behind them."""
     own = {**place, "component": each.name}
-    numbers = np.array(each.numbers, dtype=float)
-    readings = Curve.of(numbers, each.torques, each.name, each.name)
-    mean = Curve.of(np.array([behind]), [each.mean], each.name, each.name)
+    curve = partial(Curve.of, label=each.name, series=each.name, quantity=TORQUE)
     return (
-        replace(readings, quantity=TORQUE, along="measurement", conditions=own),
-        replace(mean, quantity=TORQUE, conditions={**own, "statistic": "mean"}),
+        curve(each.numbers, each.torques, along="measurement", conditions=own),
+        curve([behind], [each.mean], conditions={**own, "statistic": "mean"}),
     )
 
 

@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.frequency.best_linear import FEWEST_REALISATIONS
 from campaign.experiments.any_motion.inverse_result import InverseDynamicsOptions, identify
-from campaign.experiments.excitation.account import metrics_of, options_of
+from campaign.experiments.excitation.account import metrics_of, options_of, reached_tables
 from campaign.experiments.excitation.commands import courses, start_of
 from campaign.experiments.excitation.figures import command_figure, plane_figure
 from campaign.experiments.excitation.options import ExcitationOptions
-from campaign.experiments.excitation.tables import reached_tables
 from campaign.experiments.interface import (
     ChosenValue,
     Experiment,
@@ -33,9 +33,9 @@ from campaign.experiments.responses.figures import coherence_figure, response_fi
 from campaign.experiments.responses.signals import usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_of, distortion_tables, sources_table
-from campaign.experiments.shared.common import conditions, failures_note, grouped
-from campaign.experiments.shared.default_options import NO_ROOM, PEAK, usual
-from campaign.experiments.shared.rig import MOST, Rig
+from campaign.experiments.shared.common import conditions, joined, of_each_place
+from campaign.experiments.shared.default_options import NO_ROOM, torque_above_friction, usual
+from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.rounded_choices import Choices, share
 from campaign.physics.bench import Bench
 from campaign.result import Finding, Result, Value
@@ -84,11 +84,7 @@ def _fit(options: ExcitationOptions, bench: Bench) -> Mapping[str, ChosenValue]:
         return choices.told
     omega = 2.0 * math.pi * options.highest
     if options.command == "torque":
-        static = rig.static_torque
-        friction = {} if static is None else {f"{PEAK:g} times the static torque": PEAK * static}
-        drive = {share("torque", MOST): MOST * rig.torque}
-        torque = choices.least("torque", "N m", {**friction, **drive})
-        _low_enough(choices, rig, torque)
+        _low_enough(choices, rig, torque_above_friction(choices, rig, "torque"))
         return choices.told
     room = SWING * (rig.limits.angle - abs(options.position))
     if room <= 0:
@@ -141,33 +137,15 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
-    accounts = []
-    for item in data.completed():
-        try:
-            accounts.append((item, metrics(item, _measure)))
-        except ValueError as error:
-            notes.append(f"{item.trial.label}: {error}.")
-    known = [item for item, _ in accounts]
-    if not known:
-        return Result(notes=tuple(notes))
-    groups = list(grouped(known, OWN).values())
-    suffixes = [f"-{number}" for number in range(1, len(groups) + 1)] if len(groups) > 1 else [""]
-    results = [
-        Result(figures=tuple(map(command_figure, groups, suffixes))),
-        _responses([each for each in known if options_of(each.trial).signal != "fourier"]),
-    ]
-    for group, suffix in zip(groups, suffixes, strict=True):
-        if options_of(group[0].trial).signal == "fourier":
-            results.append(_of_series(data, group, suffix))
-    tables = [*reached_tables(accounts), *(t for each in results for t in each.tables)]
-    return Result(
-        tuple(tables),
-        tuple(figure for each in results for figure in each.figures),
-        tuple(finding for each in results for finding in each.findings),
-        tuple(dict.fromkeys([*notes, *(note for each in results for note in each.notes)])),
-        telling=next((f.key for each in results[1:] for f in each.figures), ""),
+    known = list(data.completed())
+    accounts = [(item, metrics(item, _measure)) for item in known]
+    commands = of_each_place(
+        known, OWN, lambda group, suffix: Result(figures=(command_figure(group, suffix),))
     )
+    shaken = [each for each in known if options_of(each.trial).signal != "fourier"]
+    found = joined((_responses(shaken), of_each_place(known, OWN, partial(_of_series, data))))
+    whole = joined((Result(tuple(reached_tables(accounts))), commands, found))
+    return replace(whole, telling=next((figure.key for figure in found.figures), ""))
 
 
 def _responses(trials: Sequence[TrialData]) -> Result:
@@ -203,6 +181,8 @@ def _responses(trials: Sequence[TrialData]) -> Result:
 def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:
     """Inverse dynamics of one place of the sweep, with the terms that the series is made for."""
     options = options_of(group[0].trial)
+    if options.signal != "fourier":
+        return Result()
     place = {k: v for k, v in conditions(group[0]).items() if k not in OWN}
     asked = InverseDynamicsOptions(terms=options.terms)
     try:

@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
 from campaign.estimation.excitation_design.sweep import Law
-from campaign.experiments.shared.motion_series import read_table
-from campaign.options import Options, TextFile
-from campaign.signals import Array, Polyline
+from campaign.experiments.shared.motion_series import SeriesFile, name_of
+from campaign.options import Options
+from campaign.signals import Polyline
 from campaign.units import (
     ANGLE,
     ANGULAR_RATE,
-    TIME,
     TORQUE,
     Angle,
     AngularAcceleration,
@@ -29,55 +28,25 @@ from campaign.units import (
 Kind = Literal["multisine", "chirp", "noise", "fourier", "file"]
 
 
-class SignalTable(Options):
+COMMANDS = {"torque": TORQUE, "rate": ANGULAR_RATE, "angle": ANGLE}
+
+
+class SignalTable(SeriesFile):
     """A command over time, from a CSV file with a header line."""
 
-    file: TextFile
-    """Path of the CSV file, relative to the protocol."""
     value: str
     """Unit of the value column: of a torque, a rate or an angle, whose rate is then commanded."""
-    time: str = "s"
-    """Unit of the time column."""
-    time_column: str = "time"
-    """Header of the time column."""
-    value_column: str = "value"
-    """Header of the value column."""
 
-    @model_validator(mode="after")
-    def _readable(self, info: ValidationInfo) -> SignalTable:
-        if isinstance(info.context, Mapping) and info.context.get("si"):
-            return self  # it was read once
-        TIME.parse(f"1 {self.time}")
-        if self.file.text is not None:
-            self._samples()
-        else:
-            self.quantity()
-        return self
-
+    @property
     def quantity(self) -> Quantity:
-        """Of the values. Raises ValueError naming the units there are."""
-        for quantity in (TORQUE, ANGULAR_RATE, ANGLE):
-            try:
-                quantity.parse(f"1 {self.value}")
-            except ValueError:
-                continue
-            return quantity
-        known = (", ".join(each.here.accepts) for each in (TORQUE, ANGULAR_RATE, ANGLE))
-        raise ValueError(f"{self.value!r} is no unit of a command; allowed are {'; '.join(known)}")
-
-    def _samples(self) -> tuple[Array, Array]:
-        if self.file.text is None:
-            raise ValueError(f"the text of {self.file.name} is not at hand")
-        wanted = (self.time_column, self.value_column)
-        text, name = self.file.text, self.file.name
-        return read_table(text, name, wanted, self.time, self.value, self.quantity())
+        return COMMANDS[name_of(self.value, COMMANDS, "a command")]
 
     def signal(self, command: str) -> Polyline:
         """The command. Raises ValueError where it is one of another mode."""
-        quantity = self.quantity()
+        quantity = self.quantity
         if (quantity is TORQUE) != (command == "torque"):
             raise ValueError(f"{self.value!r} is no unit of a {command}; write `command`, too")
-        time, value = self._samples()
+        time, value = self.samples()
         if quantity is ANGLE:
             from scipy.interpolate import CubicSpline
 

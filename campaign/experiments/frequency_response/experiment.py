@@ -29,11 +29,6 @@ from campaign.experiments.frequency_response.figures import (
 )
 from campaign.experiments.frequency_response.marks import place_names, servo_figure
 from campaign.experiments.frequency_response.model.analysis import MODEL, identified
-from campaign.experiments.frequency_response.sine_commands import (
-    amplitude_text,
-    rate_sine,
-    torque_sine,
-)
 from campaign.experiments.frequency_response.tables import (
     Sweep,
     changes,
@@ -55,19 +50,14 @@ from campaign.experiments.interface import (
     metrics,
 )
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import (
-    conditions,
-    failures_note,
-    grouped,
-    method_label,
-    swept,
-)
+from campaign.experiments.shared.common import conditions, grouped, method_label, swept
 from campaign.experiments.shared.detected_trials import sine_response
 from campaign.experiments.shared.rig import Rig
 from campaign.experiments.shared.swept_words import words
 from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.complete import control_rate
+from campaign.physics.complete import control_rate, inertia_of, limits_of
+from campaign.physics.limits import worst_friction
 from campaign.reason import Cause
 from campaign.result import Figure, Finding, Result, Table
 from campaign.signals import Sine
@@ -79,6 +69,8 @@ from campaign.units import (
     Frequency,
     Time,
     Torque,
+    angle_text,
+    rate_text,
 )
 
 AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
@@ -298,7 +290,7 @@ def _point(data: TrialData) -> SinePoint:
 def _analyse(data: TestData) -> Result:
     if data.model is not None:
         return identified(data)
-    notes = list(failures_note(data))
+    notes: list[str] = []
     paths = [path for path in swept(data, own=("frequency",)) if path != "loop"]
     sweeps: list[Sweep] = []
     for group in grouped(data.completed(), own=("frequency",)).values():
@@ -331,12 +323,7 @@ def _analyse(data: TestData) -> Result:
         notes += doubts
         figures.append(torque_figure([(s.label, method(s), s.response) for s in opened], found))
     notes += quality_note(sweeps)
-    return Result(
-        tuple(tables),
-        tuple(figures),
-        tuple(findings),
-        tuple(dict.fromkeys(notes)),
-    )
+    return Result(tuple(tables), tuple(figures), tuple(findings), tuple(notes))
 
 
 def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
@@ -348,6 +335,56 @@ def _sweep(first: TrialData, response: Response, paths: list[str]) -> Sweep:
     others = words(swept, first.trial, FrequencyResponseOptions)
     found = characteristics(response) if loop == "closed" else None
     return Sweep(place, loop, ", ".join([label, *others]), response, found)
+
+
+LIMIT_SHARE = 0.9
+"""of the bench's limits that the amplitude of a rate command may use."""
+
+
+def amplitude_text(command: Sine, closed: bool) -> str:
+    """Of a rate command in a closed loop, or a torque in an open one; for people."""
+    if closed:
+        return f"amplitude {rate_text(command.amplitude)}"
+    return f"amplitude {command.amplitude:.3g} N·m"
+
+
+def rate_sine(
+    bench: Bench, frequency: float, largest: float, acceleration: float | None
+) -> tuple[Sine, float]:
+    """The rate command and half the angle it swings (rad); it starts at rest.
+
+    Of amplitude `largest` (rad/s), or less where `acceleration` (rad/s^2) asks for it; None: as the
+    bench's limits do. Raises ValueError where these do not overcome its friction.
+    """
+    rig, omega = Rig(bench), 2.0 * math.pi * frequency
+    if acceleration is None:
+        torque = rig.torque - worst_friction(bench, largest)
+        if torque <= 0:
+            raise ValueError("the bench's torque and current limits do not overcome its friction")
+        acceleration = LIMIT_SHARE * min(rig.limits.acceleration, rig.accelerated_by(torque))
+    amplitude = min(largest, acceleration / omega)
+    return Sine(amplitude=amplitude, frequency=frequency), amplitude / omega
+
+
+def torque_sine(
+    bench: Bench, frequency: float, torque: float, position: float
+) -> tuple[Sine, float]:
+    """The torque and half the angle (rad) that it would swing a load without friction.
+
+    Around `position` (rad), of amplitude `torque` (N m). It starts at its peak: the rate of a free
+    load then has no offset, and the angle no drift. Raises ValueError beyond the bench's limits.
+    """
+    omega = 2.0 * math.pi * frequency
+    limits = limits_of(bench)
+    rate = torque / (inertia_of(bench, "the swing of a free load") * omega)
+    swing = rate / omega
+    if abs(position) + swing > limits.angle or rate > limits.rate:
+        raise ValueError(
+            f"{torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
+            f"{angle_text(swing)} at {rate_text(rate)}, beyond the bench's "
+            "limits; lower torque or raise lowest"
+        )
+    return Sine(amplitude=torque, frequency=frequency, phase=0.5 * math.pi), swing
 
 
 EXPERIMENT = Experiment(

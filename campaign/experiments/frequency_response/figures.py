@@ -10,8 +10,8 @@ import numpy as np
 from campaign.estimation.continuation import DECIBEL, Continuation
 from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.servo import ServoCharacteristics
-from campaign.experiments.frequency_response.marks import bandwidths, margins
-from campaign.experiments.responses.figures import FREQUENCY, PHASE
+from campaign.experiments.frequency_response.marks import Named, bandwidths, margins
+from campaign.experiments.responses.figures import FREQUENCY, PHASE, turned
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
 SHOWN_BEYOND = 1.2
@@ -23,9 +23,6 @@ TWO_SIDED = 1.96
 """Half of a two-sided 95 % interval over its standard deviation."""
 BARE = "none"
 """The series of a response without compensation."""
-
-Named = tuple[str, str, Response]
-"""Label, series and response of one curve."""
 
 
 def closed_loop_figures(
@@ -52,13 +49,13 @@ def closed_loop_figures(
         "uncompensated one.",
         "Gain and phase of the closed loop over frequency, one curve per compensation.",
         Axis("Gain", "dB"),
-        [(label, series, r, r.level, _turned(r)) for label, series, r in named],
+        named,
         thesis=_chosen(("5.5", modelled), ("5.19", observed)),
         level_marks=(Mark("-3 dB", y=-3.0), *widths.gain_marks),
         more_gain=widths.gain,
     )
     loops = [(label, series, open_loop(r)) for label, series, r in named]
-    kept = margins(loops, [_turned(r) for _, _, r in loops], found, names)
+    kept = margins(loops, [turned(r.phase) for _, _, r in loops], found, names)
     beyond = list(_continued(loops, found))
     yield _bode(
         "open-loop",
@@ -76,7 +73,7 @@ def closed_loop_figures(
         "Gain and phase of the open loop over frequency, one curve per compensation, with the "
         "0 dB and -180° lines and the margins.",
         Axis("Gain", "dB"),
-        [(label, series, r, r.level, _turned(r)) for label, series, r in loops],
+        loops,
         thesis=_chosen(("5.6", modelled), ("5.20", observed)),
         level_marks=(Mark("0 dB", y=0.0), *kept.gain_marks),
         phase_marks=(Mark("-180°", y=-np.pi), *kept.phase_marks),
@@ -99,7 +96,7 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         "of the axis' own.",
         "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
         Axis("Gain, dB of 1 rad/s per N·m"),
-        [(label, series, r, r.level, _turned(r)) for label, series, r in named],
+        named,
         thesis=("4.5",),
         level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
         phase_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),
@@ -124,13 +121,6 @@ def _chosen(*numbers: tuple[str, bool]) -> tuple[str, ...]:
     return tuple(number for number, holds in numbers if holds) or tuple(n for n, _ in numbers)
 
 
-def _turned(response: Response) -> Array:
-    """Phase (rad) with its median within half a turn of -90°."""
-    phase = response.phase
-    turns = np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
-    return np.asarray(phase - 2.0 * np.pi * turns)
-
-
 def _continued(
     loops: Sequence[Named], found: Sequence[ServoCharacteristics | None]
 ) -> Iterator[tuple[Curve, Curve]]:
@@ -146,7 +136,7 @@ def _continued(
         if beyond is None:
             continue
         at = np.geomspace(beyond.start, SHOWN_BEYOND * gain.frequency.value, 60)
-        shift = _turned(loop)[0] - loop.phase[0]
+        shift = turned(loop.phase)[0] - loop.phase[0]
         yield (
             Curve(at, beyond.level(at), label, series, "thin"),
             Curve(at, beyond.phase(at) + shift, label, series, "thin"),
@@ -172,13 +162,14 @@ def _bode(
     caption: str,
     alt: str,
     gain: Axis,
-    curves: Sequence[tuple[str, str, Response, Array, Array]],
+    named: Sequence[Named],
     thesis: tuple[str, ...],
     level_marks: tuple[Mark, ...] = (),
     phase_marks: tuple[Mark, ...] = (),
     more_gain: Sequence[Curve] = (),
     more_phase: Sequence[Curve] = (),
 ) -> Figure:
+    curves = [(label, series, r, r.level, turned(r.phase)) for label, series, r in named]
     less = list(_differences(curves))
     every = [curve.x for curve in more_gain] + [r.frequency for _, _, r, _, _ in curves]
     across = _range(np.concatenate(every)) if less else FREQUENCY

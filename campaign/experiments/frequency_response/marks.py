@@ -13,8 +13,7 @@ from campaign.estimation.frequency_response import Response
 from campaign.estimation.servo import Crossing, ServoCharacteristics
 from campaign.experiments.frequency_response.tables import QUANTITIES, Sweep, method
 from campaign.experiments.shared.common import short_label
-from campaign.experiments.shared.pointing_error import ends
-from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
+from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, ends_of
 
 LABELLED = 4
 """Most curves whose dots have a label; of more only the table has the numbers."""
@@ -37,6 +36,7 @@ class BodeContent:
 
 
 Named = tuple[str, str, Response]
+"""Label, series and response of one curve."""
 Found = Sequence[ServoCharacteristics | None]
 
 
@@ -115,8 +115,7 @@ def _distance(frequency: float, start: float, stop: float, series: str) -> Curve
 
 def _dot(frequency: float, base: float, margin: Estimate, sign: float, series: str) -> Curve:
     """Where a margin ends, with its interval; `sign` is the way it goes from `base`."""
-    (low,), (high,) = ends([margin])
-    reach = sorted((base + sign * low, base + sign * high))
+    reach = sorted(base + sign * end for end in ends_of(margin))
     y = np.array([base + sign * margin.value])
     low, high = (np.array([end]) for end in reach)
     return Curve(np.array([frequency]), y, "", series, "points", low=low, high=high)
@@ -156,7 +155,7 @@ def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
     for name, label, unit, display in QUANTITIES:
         found = [getattr(sweep.found, name) for sweep in read]
         known = [(k, sweep, each) for k, (sweep, each) in enumerate(zip(read, found, strict=True))]
-        known = [(k, sweep, each) for k, sweep, each in known if _shown(each)]
+        known = [(k, sweep, each) for k, sweep, each in known if math.isfinite(each.value)]
         if known:
             panels.append(
                 Panel(
@@ -188,29 +187,16 @@ def place_names(sweeps: Sequence[Sweep]) -> list[str]:
     return [f"{name} {k}" for k, name in enumerate(short, start=1)]
 
 
-def _shown(estimate: Estimate) -> bool:
-    return math.isfinite(estimate.value)
-
-
 def _beside(place: int, sweep: Sweep, found: Estimate) -> Curve:
-    low, high = ends([found])
-    return Curve(
-        np.array([float(place)]),
-        np.array([found.value]),
-        "",
-        method(sweep),
-        "points",
-        low=low,
-        high=high,
-        quantity=found.name,
-        conditions=sweep.place,
+    return Curve.of(
+        [place], [found], "", method(sweep), quantity=found.name, conditions=sweep.place
     )
 
 
 def _bound(place: int, sweep: Sweep, found: Estimate) -> Iterator[Mark]:
     """A word beside a dot that is no number but a bound of it, or hardly determined."""
     if found.kind != "number":
-        word = {"at least": "at least", "at most": "at most"}.get(found.kind, found.kind)
+        word: str = found.kind
     elif not _known(found):
         word = "not determined"
     else:

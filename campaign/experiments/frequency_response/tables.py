@@ -44,11 +44,7 @@ QUANTITIES = (
 
 
 def _values(found: ServoCharacteristics) -> dict[str, Estimate]:
-    return {
-        "bandwidth": found.bandwidth,
-        "gain_margin": found.gain_margin,
-        "phase_margin": found.phase_margin,
-    }
+    return {name: getattr(found, name) for name, *_ in QUANTITIES}
 
 
 def closed_findings(sweep: Sweep) -> Iterator[Finding]:
@@ -152,23 +148,7 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         title="Bandwidth and stability margins from the measured response",
         columns=(
             *named,
-            Column("bandwidth", "Bandwidth", "Hz", "Hz"),
-            Column(
-                "bandwidth_standard_error", "± (1σ)", "Hz", "Hz", reason=ONE_SIGMA(), file_only=True
-            ),
-            Column("gain_margin", "Gain margin", "dB"),
-            Column(
-                "gain_margin_standard_error", "± (1σ)", "dB", reason=ONE_SIGMA(), file_only=True
-            ),
-            Column("phase_margin", "Phase margin", "rad", "deg"),
-            Column(
-                "phase_margin_standard_error",
-                "± (1σ)",
-                "rad",
-                "deg",
-                reason=ONE_SIGMA(),
-                file_only=True,
-            ),
+            *(column for quantity in QUANTITIES for column in _with_error(*quantity)),
             Column("gain_margin_bound", "Gain margin at least", "dB"),
         ),
         rows=tuple(rows),
@@ -179,6 +159,13 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         "from day to day. A gain margin beyond the sweep is the hull of several fits of an "
         "integrator with a delay; what it is at least assumes only that the gain rises no more.",
     )
+
+
+def _with_error(name: str, label: str, unit: str, display: str) -> Iterator[Column]:
+    """The column of a quantity, and that of its standard error."""
+    yield Column(name, label, unit, display)
+    name, label = f"{name}_standard_error", "± (1σ)"
+    yield Column(name, label, unit, display, reason=ONE_SIGMA(), file_only=True)
 
 
 def _servo_row(sweep: Sweep, found: ServoCharacteristics) -> dict[str, Cell]:

@@ -22,9 +22,13 @@ from campaign.estimation.ripple import (
 from campaign.estimation.steadiness import TOO_FEW_COUNTS, drifting
 from campaign.estimation.steady_sliding import SteadySliding, steady_sliding
 from campaign.experiments.friction_map.runs import DIRECTIONS, WHOLE, rule_of, speed_of, windows_of
-from campaign.experiments.interface import TrialData, bench_of, metrics
-from campaign.experiments.shared.imported_scale import with_scale
-from campaign.experiments.shared.systematic import INERTIA, TORQUE_CONSTANT, with_systematic
+from campaign.experiments.interface import Metrics, TrialData, bench_of, metrics
+from campaign.experiments.shared.systematic import (
+    INERTIA,
+    TORQUE_CONSTANT,
+    with_scale,
+    with_systematic,
+)
 from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
@@ -294,32 +298,26 @@ def map_points(data: TrialData) -> Iterator[Point]:
     for name, window in windows_of(trial).items():
         if name not in DIRECTIONS:
             continue
-
-        def plain(word: str, of: str = name) -> float:
-            key = f"{word}_{of}"
-            return found[key].value if key in found else math.nan
-
-        def reason(word: str, of: str = name) -> Reason:
-            key = f"{word}_{of}"
-            return found[key].reason if key in found else NONE
-
-        rate, moved = found[f"rate_{name}"], plain("acceleration")
+        end = f"_{name}"
+        own = Metrics({w.removesuffix(end): one for w, one in found.items() if w.endswith(end)})
+        why = {w: own[w].reason if w in own else NONE for w in ("unsteady", "torque_drift")}
+        rate, moved = own["rate"], own["acceleration"].value
         # An archive of a program that asked no more has no reason.
         drifts = drifting(moved * (window.stop - window.start), rate.half_width, rate.value)
-        own = SteadySliding(
+        sliding = SteadySliding(
             rate,
-            with_constants(found[f"friction_torque_{name}"], data, DRIVE_TORQUE, inertia * moved),
-            plain("spread"),
+            with_constants(own["friction_torque"], data, DRIVE_TORQUE, inertia * moved),
+            own["spread"].value,
             moved,
-            plain("effective_samples"),
-            plain("first_angle"),
-            plain("last_angle"),
-            reason("unsteady") or drifts,
-            reason("torque_drift"),
+            own["effective_samples"].value,
+            own["first_angle"].value,
+            own["last_angle"].value,
+            why["unsteady"] or drifts,
+            why["torque_drift"],
         )
-        harmonic = Harmonic(*(plain(f"ripple_{word}") for word in RIPPLE))
+        harmonic = Harmonic(*(own[f"ripple_{word}"].value for word in RIPPLE))
         yield Point.of(
-            own,
+            sliding,
             trial.number,
             window.start,
             window.stop,

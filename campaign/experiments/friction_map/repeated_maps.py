@@ -138,8 +138,8 @@ def _scatter_panel(
     last = len(sets) + 1.0
     names = ((k + 1.0, each.name) for k, each in enumerate(sets))
     sets_axis = Axis("Sets", limits=(0.5, last + 0.5), places=(*names, (last, "mean")))
-    whole = Curve.of(np.array([last]), [mean], "mean of all", "measured")
-    curves = [*_dots(sets, parameter), _named(whole, parameter, {"statistic": "mean"})]
+    whole = Curve.of([last], [mean], "mean of all", "measured", quantity=parameter)
+    curves = [*_dots(sets, parameter), replace(whole, conditions={"statistic": "mean"})]
     told = f"{100 * deviation.value:.1f} %" if np.isfinite(deviation.value) else "its mean is zero"
     return Panel(sets_axis, Axis(symbol, unit, unit), curves, f"{symbol}: {told}")
 
@@ -148,15 +148,10 @@ def _dots(sets: Sequence[MapSet], parameter: str) -> Iterator[Curve]:
     """One curve for each dot, which is beside another published number than the next."""
     for direction in DIRECTIONS:
         for place, each in enumerate(sets, start=1):
-            found = [each.found[direction][parameter]]
-            at = np.array([float(place)])
-            dot = Curve.of(at, found, f"{direction} direction", direction)
-            dot = replace(dot, aside=ASIDE * DIRECTIONS[direction])
-            yield _named(dot, parameter, {"set": each.name, "direction": direction})
-
-
-def _named(curve: Curve, quantity: str, conditions: Mapping[str, str]) -> Curve:
-    return replace(curve, quantity=quantity, conditions=conditions)
+            found, aside = each.found[direction][parameter], ASIDE * DIRECTIONS[direction]
+            told = {"set": each.name, "direction": direction}
+            dot = Curve.of([place], [found], f"{direction} direction", direction, aside=aside)
+            yield replace(dot, quantity=parameter, conditions=told)
 
 
 def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:

@@ -172,22 +172,20 @@ def _rms(fit: DirectionFit, model: Model) -> Estimate:
 
 def model_table(fits: Curves, suffix: str, where: str) -> Table:
     """How well each model of the Stribeck effect describes the points of each direction."""
-    rows: list[dict[str, Cell]] = []
-    for direction, fit in fits.fits.items():
-        for model in MODELS:
-            found = fit.fits[model]
-            rows.append(
-                {
-                    "direction": direction,
-                    "model": MODEL_LABELS[model],
-                    "parameters": found.fitted,
-                    "points": len(fit.speed),
-                    "rms": found.rms,
-                    "chi_square": found.chi_square,
-                    "bic": found.bic,
-                    "preferred": "yes" if model == fit.preferred else "",
-                }
-            )
+    rows: list[dict[str, Cell]] = [
+        {
+            "direction": direction,
+            "model": MODEL_LABELS[model],
+            "parameters": fit.fits[model].fitted,
+            "points": len(fit.speed),
+            "rms": fit.fits[model].rms,
+            "chi_square": fit.fits[model].chi_square,
+            "bic": fit.fits[model].bic,
+            "preferred": "yes" if model == fit.preferred else "",
+        }
+        for direction, fit in fits.fits.items()
+        for model in MODELS
+    ]
     return Table(
         key=f"models{suffix}",
         title=f"Models of the Stribeck effect{f' ({where})' if where else ''}",

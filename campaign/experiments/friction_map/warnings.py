@@ -33,8 +33,7 @@ def map_warnings(options: VelocityMapOptions, bench: Bench) -> Iterator[str]:
     yield from _too_few(runs)
     if getattr(options, "pilot", False):  # it decides where others run, and how long they settle
         return
-    yield from _none_below(runs, bench)
-    yield from _none_far_above(runs, bench)
+    yield from _extrapolated(runs, bench)
     yield from _settling(runs, bench)
     yield from _ripple(runs, options, bench)
 
@@ -48,10 +47,10 @@ def _too_few(runs: Sequence[Run]) -> Iterator[str]:
         )
 
 
-def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
-    """Of the larger Stribeck velocity, where the directions have two; none without an effect."""
+def _extrapolated(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
+    """Below the larger Stribeck velocity, where the directions have two, and far above it."""
     known = [stribeck_parameters(bench, sign) for sign in (1.0, -1.0)]
-    velocity = max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
+    velocity = max(each.get("stribeck_velocity", 0.0) for each in known)
     below = sum(run.speed < velocity for run in runs)
     if velocity > 0 and below < FEWEST_BELOW:
         yield (
@@ -59,12 +58,7 @@ def _none_below(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
             f"{rate_text(velocity)}: static_torque is extrapolated; run {FEWEST_BELOW} or "
             f"more below it, from {rate_text(0.1 * velocity)} on"
         )
-
-
-def _none_far_above(runs: Sequence[Run], bench: Bench) -> Iterator[str]:
-    """Of the larger Stribeck velocity, as for Ts."""
-    known = [stribeck_parameters(bench, sign) for sign in (1.0, -1.0)]
-    far = FAR * max((each.get("stribeck_velocity", 0.0) for each in known), default=0.0)
+    far = FAR * velocity
     if far > 0 and not any(run.speed > far for run in runs):
         yield (
             f"no speed is above {FAR:g} times the Stribeck velocity, {rate_text(far)}: "

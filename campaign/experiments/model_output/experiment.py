@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from pydantic import Field, JsonValue
@@ -28,9 +27,10 @@ from campaign.experiments.model_output.figures import (
     variation_figures,
 )
 from campaign.experiments.shared.common import (
+    compensation_of,
     conditions,
-    failures_note,
     grouped,
+    parameter_paths,
     with_changes,
 )
 from campaign.experiments.shared.friction_models import (
@@ -96,22 +96,19 @@ def _trials(options: ModelOutputOptions, bench: Bench) -> Iterator[TrialRequest]
             yield _request(options, point, tree)
             continue
         own = bench if tree is None else Bench.model_validate(tree, context={"si": True})
+        interfaces = own.model_dump(mode="json")["friction"]
         yield _request(options, {**point, "parameter": UNCHANGED, "factor": 1.0}, tree)
         for parameter in options.vary:
             for factor in options.factors:
-                if changes := _scaled(own, parameter, factor):
+                if paths := parameter_paths(interfaces, "friction", parameter):
+                    changes = {path: value * factor for path, value in paths.items()}
                     known.add(parameter)
                     varied = {**point, "parameter": parameter, "factor": factor}
                     yield _request(options, varied, with_changes(own, changes))
     if missing := [name for name in options.vary if name not in known]:
         raise ValueError(f"no friction of the bench '{bench.name}' has a '{missing[0]}' to vary")
     for name in options.compensation:
-        if name not in bench.compensation:
-            raise ValueError(
-                f"the bench '{bench.name}' has no compensation '{name}'; it has "
-                f"{', '.join(bench.compensation) or 'none'}"
-            )
-        if not getattr(bench.compensation[name], "friction", None):
+        if not getattr(compensation_of(bench, name), "friction", None):
             raise ValueError(f"the compensation '{name}' has no friction model to show")
         yield _request(options, {"compensation": name}, None, name)
 
@@ -139,17 +136,6 @@ def _request(
     )
 
 
-def _scaled(bench: Bench, parameter: str, factor: float) -> dict[str, Any]:
-    """Values (SI) by dotted path: the parameter in every interface and direction that has it."""
-    changes = {}
-    for name, friction in bench.friction.items():
-        for path, holder in (("", friction), ("negative.", getattr(friction, "negative", None))):
-            value = getattr(holder, parameter, None)
-            if isinstance(value, float):
-                changes[f"friction.{name}.{path}{parameter}"] = value * factor
-    return changes
-
-
 def _analyse(data: TestData) -> Result:
     measured = list(data.completed())
     rows: list[dict[str, Cell]] = []
@@ -165,7 +151,7 @@ def _analyse(data: TestData) -> Result:
                 Finding.of(row[name], conditions(repeats[0])) for name in ("peak", "at_reversal")
             ]
     if not rows:
-        return Result(notes=failures_note(data))
+        return Result()
     options = ModelOutputOptions.model_validate(measured[0].trial.options, context={"si": True})
     figures: list[Figure] = []
     for number, place in enumerate(plain, start=1):
@@ -194,7 +180,6 @@ def _analyse(data: TestData) -> Result:
         (table,),
         tuple(figures),
         tuple(findings),
-        failures_note(data),
         telling=next((figure.key for figure in figures if figure.key.startswith("sine")), ""),
     )
 

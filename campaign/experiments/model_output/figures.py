@@ -9,7 +9,7 @@ import numpy as np
 from campaign.channels import COMPENSATION_TORQUE, FRICTION_TORQUE, LOAD_RATE
 from campaign.experiments.interface import TrialData, bench_of
 from campaign.experiments.shared.common import method_label
-from campaign.experiments.shared.friction_models import model_label, model_series
+from campaign.experiments.shared.friction_models import PARAMETER_LABELS, model_label, model_series
 from campaign.physics.steady_friction import steady_friction
 from campaign.recording import Recording
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel, Style
@@ -21,15 +21,6 @@ LEFT = Axis("Friction less compensation", "N m", "N m")
 WHAT_IS_LEFT = "What compensation leaves is the friction of the bench less the output of its model."
 NEAR_ZERO = 0.08
 """Share of the amplitude that is shown around zero rate."""
-SYMBOLS = {
-    "bristle_stiffness": "bristle stiffness σ0",
-    "bristle_damping": "bristle damping σ1",
-    "viscous_friction": "viscous friction σ2",
-    "static_torque": "static torque Ts",
-    "coulomb_torque": "Coulomb torque Tc",
-    "stribeck_velocity": "Stribeck velocity vs",
-    "stribeck_exponent": "Stribeck exponent δ",
-}
 
 
 def shown_torque(compensation: str) -> str:
@@ -56,7 +47,7 @@ def source(data: TrialData) -> str:
 
 
 def _symbol(parameter: str) -> str:
-    return SYMBOLS.get(parameter, parameter.replace("_", " "))
+    return PARAMETER_LABELS.get(parameter, parameter.replace("_", " "))
 
 
 def static_figure(data: TrialData, suffix: str, amplitude: float) -> Figure:

@@ -26,7 +26,7 @@ from campaign.experiments.model_properties.virtual_experiments import (
     numbers_of,
     requests,
 )
-from campaign.experiments.shared.common import COUNTED, failures_note
+from campaign.experiments.shared.common import COUNTED
 from campaign.experiments.shared.friction_models import places
 from campaign.options import Options
 from campaign.physics.bench import Bench
@@ -143,7 +143,7 @@ def _findings(judged: ModelVerdict) -> Iterator[Finding]:
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
+    notes: list[str] = []
     found = list(_judged(data, notes))
     if not found:
         return Result(notes=tuple(notes))

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import JsonValue, ValidationError
 from scipy.optimize import brentq
 
+from campaign.experiments.shared.friction_models import model_called
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.interface import FrictionOptions
-from campaign.text import nearest
 from campaign.trial import Tree
 
 FAR = 1e6
@@ -29,13 +29,11 @@ def options_of(model: str, given: Mapping[str, JsonValue], *, own: bool) -> Fric
 
     Raises ValueError, with a message for the user.
     """
-    known = friction_models()
-    if model not in known:
-        raise ValueError(f"there is no friction model '{model}'{nearest(model, known)}")
-    fields = known[model].options.model_fields.keys() - (known[model].added if own else ())
+    known = model_called(model)
+    fields = known.options.model_fields.keys() - (known.added if own else ())
     tree = {name: value for name, value in given.items() if name in fields} | {"model": model}
     try:
-        return known[model].options.model_validate(tree)
+        return known.options.model_validate(tree)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

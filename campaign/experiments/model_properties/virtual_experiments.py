@@ -20,7 +20,7 @@ from campaign.experiments.interface import Experiment, TrialData
 from campaign.experiments.model_properties.parameter_set import Scale
 from campaign.experiments.model_properties.rules import CLOSES, LOSS, REVERSIBLE
 from campaign.experiments.presliding_hysteresis import Loop
-from campaign.experiments.stick_slip.experiment import EXPERIMENT as STICK_SLIP
+from campaign.experiments.stick_slip import EXPERIMENT as STICK_SLIP
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
 from campaign.result import Array

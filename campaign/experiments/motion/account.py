@@ -1,8 +1,8 @@
-"""Steady stretches of a recorded motion, and friction of each direction."""
+"""What recorded motions show: steady stretches, friction of each direction, tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +11,16 @@ from campaign.estimate import Estimate
 from campaign.estimation.friction_line import mean_of_stretches
 from campaign.estimation.gate import admitted
 from campaign.estimation.intervals import difference, multiplied, shifted_by
-from campaign.experiments.friction_map.curves import ANGLE, COEFFICIENT, FRICTION
+from campaign.experiments.friction_map.curves import ANGLE, COEFFICIENT, FEWEST_SPEEDS, FRICTION
 from campaign.experiments.friction_map.points import coefficient_of
 from campaign.experiments.friction_map.runs import DIRECTIONS
 from campaign.experiments.friction_map.steady_recordings import SteadyResult, sliding_of
 from campaign.experiments.friction_map.stretches import StretchOptions
+from campaign.experiments.friction_map.tables import curve_findings
 from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.common import conditions
-from campaign.result import Value
+from campaign.reason import Cause
+from campaign.result import Cell, Column, Finding, Table, Value
 
 OFFSET = 0.3
 """of Coulomb friction, from which on what both directions do not share is told as a load."""
@@ -119,3 +121,90 @@ def _doubts(label: str, found: Mapping[str, Estimate], sliding: SteadyResult) ->
             f"{label}: friction over normal load needs the `radius` at which the load rubs, as the "
             "axis turns."
         )
+
+
+OF_ONE_RECORDING = Cause("describes one recording", "it describes one recording")
+
+_SUMMARY = (
+    Column("duration", "Duration", "s", "s", reason=OF_ONE_RECORDING()),
+    Column("travel", "Travel", "rad", "deg", reason=OF_ONE_RECORDING()),
+    Column("top_rate", "Largest rate", "rad/s", "deg/s", reason=OF_ONE_RECORDING()),
+    Column("rms_torque", "Torque (RMS)", "N m", "N m", reason=OF_ONE_RECORDING()),
+    Column("peak_torque", "Largest torque", "N m", "N m", reason=OF_ONE_RECORDING()),
+    Column("rms_error", "Tracking error (RMS)", "rad", "mrad", reason=OF_ONE_RECORDING()),
+    Column("peak_error", "Largest tracking error", "rad", "mrad", reason=OF_ONE_RECORDING()),
+)
+
+
+def summary_table(motions: Sequence[Motion]) -> Table:
+    """What each recording is."""
+    columns = [c for c in _SUMMARY if any(c.name in motion.found for motion in motions)]
+    rows: list[dict[str, Cell]] = []
+    for motion in motions:
+        row: dict[str, Cell] = {"recording": motion.data.trial.number, **motion.place}
+        row |= {column.name: motion.found.get(column.name) for column in columns}
+        row["stretches"] = len(motion.sliding.points)
+        row["coefficient"] = motion.coefficient
+        rows.append(row)
+    loaded = any(motion.coefficient is not None for motion in motions)
+    return Table(
+        "recordings",
+        "Recorded motions",
+        (
+            Column("recording", "Trial", exact=True),
+            *_places(motions),
+            *columns,
+            Column("stretches", "Steady stretches", exact=True),
+            *((Column("coefficient", "Friction coefficient"),) if loaded else ()),
+        ),
+        tuple(rows),
+    )
+
+
+def line_table(motions: Sequence[Motion]) -> Table:
+    """Coulomb and viscous friction of each direction."""
+    rows = [
+        {
+            "recording": motion.data.trial.number,
+            **motion.place,
+            "direction": direction,
+            "coulomb": coulomb,
+            "viscous": motion.sliding.found[direction]["viscous_friction"],
+            "stretches": sum(
+                point.sign == DIRECTIONS[direction] for point in motion.sliding.points
+            ),
+        }
+        for motion in motions
+        for direction, coulomb in motion.coulomb.items()
+    ]
+    return Table(
+        "friction-lines",
+        "Coulomb and viscous friction by direction",
+        (
+            Column("recording", "Trial", exact=True),
+            *_places(motions),
+            Column("direction", "Direction"),
+            Column("coulomb", "Coulomb friction", "N m", "N m"),
+            Column("viscous", "Viscous friction", "N m s/rad", "N m s/rad"),
+            Column("stretches", "Stretches", exact=True),
+        ),
+        tuple(rows),
+        note="Of a straight line through the steady stretches of a direction, or of a Stribeck "
+        f"curve where there are {FEWEST_SPEEDS} speeds or more; intervals are of their scatter. "
+        "Between and beyond the speeds there are, friction may be another.",
+    )
+
+
+def motion_findings(motion: Motion) -> Iterator[Finding]:
+    """Friction of each direction, under the recording's conditions."""
+    place = {**motion.place, "recording": motion.data.trial.number}
+    yield from curve_findings(motion.sliding.found, place)
+    for estimate in (motion.constant, motion.coefficient):
+        if estimate is not None:
+            yield Finding.of(estimate, place)
+
+
+def _places(motions: Sequence[Motion]) -> Iterator[Column]:
+    """What was set differently for the recordings, or is known of them."""
+    for name in dict.fromkeys(name for motion in motions for name in motion.place):
+        yield Column(name, name.replace("_", " ").capitalize(), exact=True)

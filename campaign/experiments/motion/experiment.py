@@ -24,10 +24,14 @@ from campaign.estimate import Estimate
 from campaign.experiments.friction_map.stretches import StretchOptions, force_of
 from campaign.experiments.friction_map.tables import point_table
 from campaign.experiments.interface import Experiment, TestData, TrialData, metrics
-from campaign.experiments.motion.account import account_of
+from campaign.experiments.motion.account import (
+    account_of,
+    line_table,
+    motion_findings,
+    summary_table,
+)
 from campaign.experiments.motion.figures import friction_figure, motion_figure
-from campaign.experiments.motion.tables import line_table, motion_findings, summary_table
-from campaign.experiments.shared.common import COUNTED, OF_RECORDING, failures_note
+from campaign.experiments.shared.common import COUNTED, of_recording
 from campaign.experiments.shared.recorded_motion import nothing_to_plan
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
@@ -84,25 +88,21 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
 
 def _extremes(recording: Recording, torque: Array) -> Iterator[Estimate]:
     rate = recording[RELATIVE_RATE]
-    yield _plain("duration", float(recording.time[-1]), "s")
-    yield _plain("top_rate", float(np.nanmax(np.abs(rate))), "rad/s")
-    yield _plain("peak_torque", float(np.nanmax(np.abs(torque))), "N m")
-    yield _plain("rms_torque", float(np.sqrt(np.nanmean(torque**2))), "N m")
+    yield of_recording("duration", float(recording.time[-1]), "s")
+    yield of_recording("top_rate", float(np.nanmax(np.abs(rate))), "rad/s")
+    yield of_recording("peak_torque", float(np.nanmax(np.abs(torque))), "N m")
+    yield of_recording("rms_torque", float(np.sqrt(np.nanmean(torque**2))), "N m")
     if RELATIVE_ANGLE in recording.channels:
         angle = recording[RELATIVE_ANGLE]
-        yield _plain("travel", float(np.nanmax(angle) - np.nanmin(angle)), "rad")
+        yield of_recording("travel", float(np.nanmax(angle) - np.nanmin(angle)), "rad")
         if REFERENCE in recording.channels:
             error = recording[REFERENCE] - angle
-            yield _plain("rms_error", float(np.sqrt(np.nanmean(error**2))), "rad")
-            yield _plain("peak_error", float(np.nanmax(np.abs(error))), "rad")
-
-
-def _plain(name: str, value: float, unit: str) -> Estimate:
-    return Estimate.without_interval(name, value, unit, OF_RECORDING())
+            yield of_recording("rms_error", float(np.sqrt(np.nanmean(error**2))), "rad")
+            yield of_recording("peak_error", float(np.nanmax(np.abs(error))), "rad")
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
+    notes: list[str] = []
     motions = [
         account_of(
             item,
@@ -113,7 +113,7 @@ def _analyse(data: TestData) -> Result:
         for item in data.completed()
     ]
     if not motions:
-        return Result(notes=tuple(notes))
+        return Result()
     several = len(motions) > 1
     tables = [summary_table(motions)]
     figures = []
@@ -131,7 +131,7 @@ def _analyse(data: TestData) -> Result:
         tuple(tables),
         tuple(figures),
         tuple(finding for motion in motions for finding in motion_findings(motion)),
-        tuple(dict.fromkeys(notes)),
+        tuple(notes),
         telling=next((each.key for each in figures if each.key.startswith("friction")), ""),
     )
 

@@ -19,12 +19,11 @@ from pydantic import Field, JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE, POINTING_ERROR
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import LEVEL, shifted_by
+from campaign.estimation.intervals import LEVEL, multiplied, shifted_by
 from campaign.experiments.interface import (
     ChosenValue,
     Experiment,
     TestData,
-    TrialData,
     bench_of,
     key,
 )
@@ -40,16 +39,19 @@ from campaign.experiments.observer_gain.metrics import (
     is_noisy,
     measure,
     measured_corner,
-    multiple,
     own_observer,
     worst_ratio,
 )
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import with_changes
-from campaign.experiments.shared.pointing_error import windows_of
+from campaign.experiments.shared.common import by_value, with_changes
+from campaign.experiments.shared.pointing_error import (
+    SineMotionOptions,
+    rest_task,
+    seen_through,
+    windows_of,
+)
 from campaign.experiments.shared.rig import MOST
 from campaign.experiments.shared.rounded_choices import Choices, nice, share
-from campaign.options import Options
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
 from campaign.physics.complete import CompleteBench, complete, limits_of
@@ -59,7 +61,7 @@ from campaign.recording import Outcome
 from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
 from campaign.trial import Task, Tree, TrialRequest
-from campaign.units import AngularAcceleration, Frequency, Time, Torque
+from campaign.units import Frequency, Time, Torque
 
 ALL_STABLE = Cause("stable at every gain", "stable at every gain that was tried")
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
@@ -67,21 +69,13 @@ SETTLE = 2.0
 """s; at least, before a disturbance or noise is measured."""
 
 
-class ObserverGainOptions(Options):
+class ObserverGainOptions(SineMotionOptions):
     """Options of a study of the observer's gain."""
 
     observer: str = "observer"
     """The disturbance observer, by its name on the bench."""
     corners: tuple[Frequency, ...] = Field(default=CORNERS, min_length=1, max_length=1000)
     """Corner frequencies N K0 / (2 pi J') to try; the bench's own is always among them."""
-    frequency: Frequency = Field(default=0.24, gt=0)
-    """Frequency of the base motion."""
-    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
-    """Amplitude of the base's angular acceleration."""
-    cycles: int = Field(default=3, ge=1, le=10_000)
-    """Whole cycles of the base motion that are measured."""
-    settle_cycles: int = Field(default=1, ge=0, le=1_000)
-    """Cycles before them, for the transient to pass."""
     noise_time: Time = Field(default=20.0, ge=0)
     """Time over which the noise is measured; 0 for not at all."""
     disturbance: Torque = Field(default=5.0, gt=0)
@@ -93,8 +87,6 @@ class ObserverGainOptions(Options):
     without_friction: bool = True
     """Measure noise and rejection on the bench without its friction, as the equations are: in
     simulation only. Else as it is: a stuck load neither follows nor shakes as they say."""
-    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
-    """Rate of the recording."""
 
     def without_effect(self) -> frozenset[str]:
         rejection = {"disturbance", "disturbance_cycles"}
@@ -155,11 +147,12 @@ def _trials(options: ObserverGainOptions, bench: Bench) -> Iterator[TrialRequest
         name = options.observer if corner else "none"
         plain = tuned.model_dump(mode="json")
         linear = with_changes(tuned, {"friction": {}}) if options.without_friction else plain
-        yield _request(_error_task(options, name), plain, corner, "error")
+        yield _request(options.task(name), plain, corner, "error")
         if corner and growth_rate(tuned, name) >= 0:
             continue  # it will end early; once is enough to know
         if options.noise_time and is_noisy(bench):
-            yield _request(_noise_task(options, name), linear, corner, "noise")
+            task = rest_task(name, SETTLE, SETTLE + options.noise_time, options.sample_rate)
+            yield _request(task, linear, corner, "noise")
         for frequency in options.disturbance_frequencies:
             task = _rejection_task(options, name, frequency)
             yield _request(task, linear, corner, "rejection", disturbance_frequency=frequency)
@@ -183,35 +176,11 @@ def _request(task: Task, bench: Tree, corner: float, measured: str, **more: floa
     )
 
 
-def _error_task(options: ObserverGainOptions, name: str) -> Task:
-    start = options.settle_cycles / options.frequency
-    stop = start + options.cycles / options.frequency
-    motion = Sine(amplitude=options.acceleration, frequency=options.frequency)
-    return _task(options, name, start, stop, base_acceleration=motion)
-
-
-def _noise_task(options: ObserverGainOptions, name: str) -> Task:
-    return _task(options, name, SETTLE, SETTLE + options.noise_time)
-
-
 def _rejection_task(options: ObserverGainOptions, name: str, frequency: float) -> Task:
     start = max(SETTLE, 2.0 / frequency)
     stop = start + options.disturbance_cycles / frequency
     disturbance = Sine(amplitude=options.disturbance, frequency=frequency)
-    return _task(options, name, start, stop, disturbance=disturbance)
-
-
-def _task(
-    options: ObserverGainOptions, name: str, start: float, stop: float, **signals: Sine
-) -> Task:
-    return Task(
-        mode="rate",
-        compensation=name,
-        duration=stop,
-        window=(start, stop),
-        sample_rate=options.sample_rate,
-        **signals,
-    )
+    return rest_task(name, start, stop, options.sample_rate, disturbance=disturbance)
 
 
 def _analyse(data: TestData) -> Result:
@@ -220,10 +189,7 @@ def _analyse(data: TestData) -> Result:
     options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
     bench = complete(bench_of(data.trials[0].trial), "the theory of an observer")
     own, inertia = own_observer(bench, options.observer)
-    groups: dict[float, list[TrialData]] = {}
-    for item in data.trials:
-        groups.setdefault(float(str(item.trial.point["corner"])), []).append(item)
-    gains = [gain_of(corner, group) for corner, group in sorted(groups.items())]
+    gains = [gain_of(*each) for each in by_value(data.trials, "corner").items()]
     limit = predicted_limit(bench, options.observer, max(gain.corner for gain in gains) or own)
     figures: list[Figure] = [
         *error_figure(gains, own, limit),
@@ -232,7 +198,8 @@ def _analyse(data: TestData) -> Result:
     ]
     findings = tuple(_findings(gains, own, inertia or bench.axis.inertia, options))
     notes = tuple(_notes(gains, data, limit, options))
-    return Result((_table(gains),), tuple(figures), findings, notes)
+    table = _table(gains, seen_through(data.trials[0].trial))
+    return Result((table,), tuple(figures), findings, notes)
 
 
 def _findings(
@@ -254,12 +221,14 @@ def _findings(
             yield Finding.of(point.measured, there)
     yield from _limit_found(gains)
     chosen = [g for g in gains if np.isclose(g.corner, own)]
+    if chosen and chosen[0].error is not None:
+        yield Finding.of(chosen[0].error, {**motion, "compensation": options.observer})
     corner = measured_corner(chosen[0], gains[0]) if chosen and gains[0].corner == 0 else None
     if corner is not None:
         told: dict[str, Value] = {"compensation": options.observer}
         yield Finding.of(corner, told)
-        load_gain = multiple(corner, 2 * np.pi * inertia, "observer_gain", "N m s/rad")
-        yield Finding.of(shifted_by(load_gain, "inertia", None), told)
+        load_gain = shifted_by(multiplied(corner, 2 * np.pi * inertia), "inertia", None)
+        yield Finding.of(replace(load_gain, name="observer_gain", unit="N m s/rad"), told)
 
 
 def _limit_found(gains: list[Gain]) -> Iterator[Finding]:
@@ -323,7 +292,7 @@ def _row(gain: Gain) -> dict[str, Cell]:
     }
 
 
-def _table(gains: list[Gain]) -> Table:
+def _table(gains: list[Gain], remark: str) -> Table:
     return Table(
         key="observer-gain",
         title="What the observer's gain gives and costs",
@@ -339,7 +308,8 @@ def _table(gains: list[Gain]) -> Table:
         ),
         rows=tuple(_row(gain) for gain in gains),
         note="The error by Eq. 5.4 is what it makes of the friction that acted in the same trial. "
-        "Equations 5.4 and 5.5 are taken with the bench's PI controller in place of a constant.",
+        "Equations 5.4 and 5.5 are taken with the bench's PI controller in place of a constant. "
+        f"The error is that of the position, 1σ.{remark}",
     )
 
 
@@ -361,7 +331,9 @@ EXPERIMENT = Experiment(
     can_use={FRICTION_TORQUE: "error by Eq. 5.4 beside the measured one"},
     # Where the gain makes the loop unstable is one of its results.
     seeks_instability=True,
+    uses_failed=True,
     key_numbers=(
+        key("stabilization_error"),
         key("observer_corner_frequency"),
         key("observer_gain"),
         key("unstable_corner_frequency"),

@@ -8,7 +8,6 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.experiments.observer_gain.metrics import Gain
-from campaign.experiments.shared.pointing_error import ends, values
 from campaign.result import Array, Axis, Curve, Figure, Mark, Panel
 
 CORNER = Axis("Corner frequency N K0 / (2π J')", "Hz", "Hz", scale="log")
@@ -25,14 +24,9 @@ def _pairs(gains: Sequence[Gain], name: str) -> tuple[Array, list[Estimate]]:
     return np.array([corner for corner, _ in known]), [value for _, value in known]
 
 
-def _points(x: Array, estimates: Sequence[Estimate], label: str, series: str) -> Curve:
-    """Dots with their intervals."""
-    low, high = ends(estimates)
-    return Curve(x, values(estimates), label, series, "points", low=low, high=high)
-
-
-def _marks(gains: Sequence[Gain], own: float, limit: float | None) -> list[Mark]:
-    """The bench's own gain, where the loop becomes unstable, and where its eigenvalues say so.
+def _marks(gains: Sequence[Gain], own: float, limit: float | None, name: str) -> list[Mark]:
+    """The bench's own gain, where the loop becomes unstable, and where its eigenvalues say so;
+    a quantity without observer, by its name.
 
     limit: by the eigenvalues (Hz); None where they say stable.
     """
@@ -47,7 +41,8 @@ def _marks(gains: Sequence[Gain], own: float, limit: float | None) -> list[Mark]
             marks.append(Mark("unstable", x=unstable))
     if limit is not None and limit <= BEYOND * highest:
         marks.append(Mark("unstable by eigenvalues", x=limit))
-    return marks
+    without = next((getattr(gain, name) for gain in gains if gain.corner == 0), None)
+    return marks if without is None else [*marks, Mark("without observer", y=without.value)]
 
 
 def _stability_words(gains: Sequence[Gain]) -> str:
@@ -58,40 +53,27 @@ def _stability_words(gains: Sequence[Gain]) -> str:
     return f" The loop is stable at every gain that was tried, up to {highest:.3g} Hz."
 
 
-def _without(gains: Sequence[Gain], name: str) -> list[Mark]:
-    found = next((getattr(gain, name) for gain in gains if gain.corner == 0), None)
-    return [] if found is None else [Mark("without observer", y=found.value)]
-
-
 def error_figure(gains: Sequence[Gain], own: float, limit: float | None = None) -> Iterator[Figure]:
     """Stabilization error over the gain."""
     x, y = _pairs(gains, "error")
     if not len(x):
         return
-    curves = [_points(x, y, "measured", "measured")]
+    curves = [Curve.of(x, y, "measured", "measured")]
     theory_x, theory_y = _pairs(gains, "error_theory")
+    line = ""
     if len(theory_x):
+        line = " The line is what Equation 5.4 makes of the friction recorded in the same trial."
         label = "Equation 5.4, of the friction that acted"
-        curves.insert(0, Curve(theory_x, values(theory_y), label, "fit"))
+        curves.insert(0, Curve(theory_x, np.array([e.value for e in theory_y]), label, "fit"))
     error = Axis("Stabilization error (1σ)", "rad", "mrad", scale="log")
-    _marks(gains, own, limit) + _without(gains, "error")
     yield Figure(
         key="error",
         title="Stabilization error over the gain of the observer",
         caption="Error over the gain, with its 95 % interval where it is wide enough to be seen."
-        + (
-            " The line is what Equation 5.4 makes of the friction recorded in the same trial."
-            if len(theory_x)
-            else ""
-        )
-        + _stability_words(gains),
+        f"{line}{_stability_words(gains)}",
         alt="Stabilization error over the observer's corner frequency, both logarithmic: falling "
         "dots beside a line of theory.",
-        panels=(
-            Panel(
-                CORNER, error, curves, marks=_marks(gains, own, limit) + _without(gains, "error")
-            ),
-        ),
+        panels=(Panel(CORNER, error, curves, marks=_marks(gains, own, limit, "error")),),
     )
 
 
@@ -105,10 +87,9 @@ def noise_figure(gains: Sequence[Gain], own: float, limit: float | None = None) 
     equation = np.array(theory, dtype=float).reshape(-1, 2)
     curves = [
         Curve(equation[:, 0], equation[:, 1], "Equation 5.5", "fit"),
-        _points(x, y, "measured", "measured"),
+        Curve.of(x, y, "measured", "measured"),
     ]
     rate = Axis("Rate of the load from noise (1σ)", "rad/s", "mrad/s", scale="log")
-    _marks(gains, own, limit) + _without(gains, "noise")
     yield Figure(
         key="noise",
         title="Gyro noise that reaches the load, over the gain of the observer",
@@ -117,9 +98,7 @@ def noise_figure(gains: Sequence[Gain], own: float, limit: float | None = None) 
         + _stability_words(gains),
         alt="Standard deviation of the load's rate due to gyro noise over the observer's corner "
         "frequency, rising, beside the line of Equation 5.5.",
-        panels=(
-            Panel(CORNER, rate, curves, marks=_marks(gains, own, limit) + _without(gains, "noise")),
-        ),
+        panels=(Panel(CORNER, rate, curves, marks=_marks(gains, own, limit, "noise")),),
     )
 
 
@@ -130,16 +109,13 @@ def rejection_figure(gains: Sequence[Gain], own: float) -> Iterator[Figure]:
         return
     curves = []
     for gain in _spread(usable, own):
-        if not gain.corner:
-            label, series = "no observer", "none"
-        else:
-            label = f"corner {gain.corner:.3g} Hz"
-            series = label
+        label = f"corner {gain.corner:.3g} Hz" if gain.corner else "no observer"
+        series = label if gain.corner else "none"
         frequency = np.array([point.frequency for point in gain.rejection])
         expected = np.array([point.expected for point in gain.rejection])
         measured = [point.measured for point in gain.rejection]
         curves.append(Curve(frequency, expected, label, series))
-        curves.append(_points(frequency, measured, "", series))
+        curves.append(Curve.of(frequency, measured, "", series))
     x = Axis("Frequency of the disturbance", "Hz", "Hz", scale="log")
     y = Axis("|ω/T|", "rad/s/(N m)", "mrad/s/(N m)", scale="log")
     yield Figure(

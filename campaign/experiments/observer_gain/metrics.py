@@ -9,10 +9,11 @@ import numpy as np
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
 from campaign.estimate import Estimate
-from campaign.estimation.intervals import LEVEL
+from campaign.estimation.intervals import LEVEL, multiplied
 from campaign.estimation.sine_amplitude import amplitude
 from campaign.estimation.stabilization_error import over_blocks, over_trials
 from campaign.experiments.interface import TrialData, bench_of
+from campaign.experiments.shared.common import by_value, compensation_of
 from campaign.experiments.shared.pointing_error import error_of, found, measured_part, of_each
 from campaign.physics import observer_loop as theory
 from campaign.physics.bench import Bench
@@ -69,10 +70,7 @@ class Gain:
 
 def own_observer(bench: Bench, name: str) -> tuple[float, float | None]:
     """Corner frequency (Hz) of the bench's observer, and the inertia it assumes (kg m^2)."""
-    if name not in bench.compensation:
-        named = ", ".join(bench.compensation) or "none"
-        raise ValueError(f"the bench has no compensation '{name}'; it has {named}")
-    observer = bench.compensation[name]
+    observer = compensation_of(bench, name)
     if observer.method != "observer":
         raise ValueError(f"'{name}' is no disturbance observer: its method is '{observer.method}'")
     known = complete(bench, "the theory of an observer")
@@ -152,11 +150,7 @@ def _together(group: Sequence[TrialData], name: str) -> Estimate | None:
 def _rejections(
     group: Sequence[TrialData], bench: CompleteBench, corner: float, inertia: float | None
 ) -> Iterator[Rejection]:
-    by_frequency: dict[float, list[TrialData]] = {}
-    for item in group:
-        frequency = float(str(item.trial.point["disturbance_frequency"]))
-        by_frequency.setdefault(frequency, []).append(item)
-    for frequency, items in sorted(by_frequency.items()):
+    for frequency, items in by_value(group, "disturbance_frequency").items():
         measured = _together(items, REJECTION)
         expected = abs(theory.rejection(bench, corner, inertia, np.array([frequency]))[0])
         if measured is not None:
@@ -215,18 +209,4 @@ def worst_ratio(gain: Gain) -> Estimate | None:
     if not gain.rejection:
         return None
     worst = max(gain.rejection, key=lambda point: abs(point.measured.value / point.expected - 1))
-    return multiple(worst.measured, 1.0 / worst.expected, "ratio", "")
-
-
-def multiple(estimate: Estimate, factor: float, name: str, unit: str) -> Estimate:
-    """An estimate times a positive number that is exact."""
-    error = estimate.standard_error
-    return replace(
-        estimate,
-        name=name,
-        unit=unit,
-        value=factor * estimate.value,
-        low=None if estimate.low is None else factor * estimate.low,
-        high=None if estimate.high is None else factor * estimate.high,
-        standard_error=None if error is None else factor * error,
-    )
+    return replace(multiplied(worst.measured, 1.0 / worst.expected), name="ratio", unit="")

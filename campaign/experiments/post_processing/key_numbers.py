@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
+from campaign.experiments.interface import KeyQuantity
 from campaign.published.draws import by_draw, together
 from campaign.result import Finding, Value
 
@@ -23,19 +23,6 @@ WITHIN_A_PLACE = (
     "statistic",
 )
 """Conditions in which numbers of one place of a sweep differ."""
-
-
-@dataclass(frozen=True)
-class KeyQuantity:
-    """A quantity of which findings are key numbers: those with all of these conditions."""
-
-    quantity: str
-    where: Mapping[str, Value]
-
-
-def key(quantity: str, **where: Value) -> KeyQuantity:
-    """`key("breakaway_torque", statistic="mean")`."""
-    return KeyQuantity(quantity, where)
 
 
 def key_numbers(

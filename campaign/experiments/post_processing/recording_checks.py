@@ -7,39 +7,17 @@ costs its own numbers and a note, not those of the other trials.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from campaign.channels import missing
 from campaign.entry_points import one_line
-from campaign.estimate import Estimate
+from campaign.experiments.interface import TrialData
 from campaign.reason import Cause, Reason
-from campaign.recording import Ending, Outcome, Recording
+from campaign.recording import Outcome, Recording
 from campaign.result import RecordingDoubt
 from campaign.signals import Zero
 from campaign.trial import Role, Trial
-
-
-class FinishedTrial(Protocol):
-    """What is looked at of a finished trial: a part of `interface.TrialData`."""
-
-    @property
-    def trial(self) -> Trial: ...
-
-    @property
-    def ending(self) -> Ending: ...
-
-    def recording(self) -> Recording: ...
-
-    def channel_names(self) -> frozenset[str]: ...
-
-    @property
-    def estimates(self) -> Sequence[Estimate]: ...
-
-    @property
-    def not_kept(self) -> str: ...
-
 
 FEWEST = 3
 """Samples below which nothing can be said of any signal."""
@@ -51,7 +29,7 @@ NOT_MEASURED = Cause("not measured", "{error}")
 NOT_KEPT = Cause("samples not kept", "nothing was measured, and the samples were not kept: {why}")
 
 
-def doubt(data: FinishedTrial) -> RecordingDoubt | None:
+def doubt(data: TrialData) -> RecordingDoubt | None:
     """What is wrong with the recording of a completed measurement.
 
     Nothing where it was measured when the trial ended, as its samples are not read again then, nor

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -30,12 +31,10 @@ from campaign.experiments.presliding_multisine.dynamics import (
     remarks,
     table_of,
 )
-from campaign.experiments.presliding_multisine.options import (
-    PreslidingMultisineOptions,
-    PreslidingOptions,
-)
 from campaign.experiments.presliding_multisine.parameters import identified
 from campaign.experiments.presliding_multisine.small_motions import (
+    PreslidingMultisineOptions,
+    PreslidingOptions,
     is_planned,
     options_of,
     records_of,
@@ -43,15 +42,14 @@ from campaign.experiments.presliding_multisine.small_motions import (
     usable,
 )
 from campaign.experiments.shared.captions import trials_of
-from campaign.experiments.shared.common import conditions, failures_note, grouped
-from campaign.experiments.shared.imported_scale import with_scale
+from campaign.experiments.shared.common import conditions, of_each_place
 from campaign.experiments.shared.multisine import (
     PER_LINE,
     below_breakaway,
     first_slip,
     odd_multisine,
 )
-from campaign.parameter import NOTHING_IDENTIFIED
+from campaign.experiments.shared.systematic import with_scale
 from campaign.physics.bench import Bench
 from campaign.result import Cell, Finding, Result
 from campaign.trial import Task, TrialRequest
@@ -105,10 +103,6 @@ def _warnings(options: PreslidingMultisineOptions, bench: Bench) -> Iterable[str
         )
 
 
-def _found(items: Sequence[TrialData]) -> dict[str, Estimate]:
-    return _told(_fit(items), items)
-
-
 def _told(found: PreslidingDynamics, items: Sequence[TrialData]) -> dict[str, Estimate]:
     """The numbers by name; of an imported torque with what its scale may be off by."""
     told = estimates_of(found, bench_of(items[0].trial))
@@ -127,27 +121,14 @@ def _fit(items: Sequence[TrialData]) -> PreslidingDynamics:
 
 def _measure(data: TrialData) -> Sequence[Estimate]:
     """What this trial says by itself."""
-    return tuple(_found([data]).values())
+    return tuple(_told(_fit([data]), [data]).values())
 
 
 def _analyse(data: TestData) -> Result:
     """Each place of the sweep by itself; a model is fitted to all small motions together."""
-    notes: list[str] = list(failures_note(data))
-    groups = [tuple(each) for each in grouped(data.completed(), own=OWN).values()]
     if data.model is not None:
-        groups = [data.trials]
-    results = [
-        _of_group(data, group, f"-{number}" if len(groups) > 1 else "")
-        for number, group in enumerate(groups, start=1)
-    ]
-    notes += [note for each in results for note in each.notes]
-    return Result(
-        tuple(table for each in results for table in each.tables),
-        tuple(figure for each in results for figure in each.figures),
-        tuple(finding for each in results for finding in each.findings),
-        tuple(dict.fromkeys(notes)),
-        identified=results[0].identified if results else NOTHING_IDENTIFIED,
-    )
+        return _of_group(data, data.trials, "")
+    return of_each_place(data.completed(), OWN, partial(_of_group, data))
 
 
 def _of_group(data: TestData, group: Sequence[TrialData], suffix: str) -> Result:

@@ -84,7 +84,7 @@ def panels(
     known = half < 1.0
     half = np.where(known, half, np.nan)
     level = DECIBEL * np.log(size)
-    phase = _turned(measured.values)
+    phase = turned(np.unwrap(np.angle(measured.values)))
     down = np.where(known, DECIBEL * np.log(np.maximum(1.0 - half, 1e-3)), np.nan)
     up = DECIBEL * np.log(1.0 + half)
     x = measured.frequency
@@ -103,9 +103,8 @@ def panels(
     return Panel(FREQUENCY, Axis(label), gains), Panel(FREQUENCY, PHASE, phases)
 
 
-def _turned(values: ComplexArray) -> Array:
-    """Phase (rad), unwrapped, its median within half a turn of -90 deg."""
-    phase = np.unwrap(np.angle(values))
+def turned(phase: Array) -> Array:
+    """A phase (rad), unwrapped, with its median within half a turn of -90 deg."""
     turns = np.round((np.median(phase) + 0.5 * np.pi) / (2.0 * np.pi))
     return np.asarray(phase - 2.0 * np.pi * turns)
 

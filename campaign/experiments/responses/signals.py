@@ -1,9 +1,10 @@
-"""Input, output and reference of a response, and stretches without gaps."""
+"""Input, output and reference of a response; stretches, period and amplitude of recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -18,11 +19,14 @@ from campaign.channels import (
     RELATIVE_ANGLE,
     RELATIVE_RATE,
 )
+from campaign.estimation.frequency.multisine import repetition
 from campaign.estimation.frequency.two_mass_model import Side
+from campaign.estimation.inverse.motion import whole_pieces
 from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Recording, Task
+from campaign.units import rate_text
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
     "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
@@ -163,12 +167,9 @@ def _answers(recording: Recording, bench: Bench) -> tuple[dict[Side, Array], dic
     return answers, channels
 
 
-def whole_stretches(parts: Sequence[Array], shortest: int) -> list[slice]:
+def whole_stretches(parts: Sequence[Array], shortest: int) -> Sequence[slice]:
     """Where all signals have numbers, for `shortest` samples or more."""
-    good = np.all([np.isfinite(part) for part in parts], axis=0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
-    pairs = edges.reshape(-1, 2)
-    return [slice(int(a), int(b)) for a, b in pairs if b - a >= shortest]
+    return whole_pieces(np.all([np.isfinite(part) for part in parts], axis=0), shortest)
 
 
 def base_frequency(frequencies: Sequence[float]) -> float:
@@ -183,3 +184,76 @@ def base_frequency(frequencies: Sequence[float]) -> float:
             one, other = other, rest
         base = one
     return base if base > 1e-3 * min(frequencies, default=0.0) else 0.0
+
+
+def repeated(trial: TrialData, excited: Excited) -> float | None:
+    """The period (s) of a recorded multisine; None where nothing repeats, and of planned trials."""
+    if trial.trial.task.mode != "recorded":
+        return None
+    recording = trial.recording()
+    name = DRIVE_TORQUE if excited == "input" else COMMAND
+    if name not in recording.channels or len(recording.time) < 2:
+        return None
+    samples = repetition(np.nan_to_num(recording[name]))
+    step = float(np.ptp(recording.time)) / (len(recording.time) - 1)
+    return None if samples is None else samples * step
+
+
+def found_repeating(period: float) -> str:
+    """The remark of a recording that was taken for a multisine."""
+    return (
+        f"What excites repeats every {period:.6g} s and has many lines: it is taken for a "
+        "multisine of that period. `frequency_response.period` says it otherwise."
+    )
+
+
+def unused(trials: Sequence[TrialData], bench: Bench) -> Iterator[str]:
+    """Of motor sensors that nobody can use, a sentence."""
+    if bench.ratio is not None:
+        return
+    there = {name for trial in trials for name in trial.channel_names()}
+    if names := [name for name in SENSORS["motor"] if name in there]:
+        verb = "is" if len(names) == 1 else "are"
+        yield (
+            f"{' and '.join(names)} {verb} not used: without `[gear]` motor and load move as one. "
+            "Where they do not, write `[gear] ratio` into the bench."
+        )
+
+
+SAME_SIZE = 1.1
+"""Ratio of neighbouring rms below which recordings are realisations of one amplitude. Realisations
+of one command have the same rms whatever their phases, and noise and a torque loop add a few
+percent; amplitudes that are to tell friction's part differ by a quarter or more."""
+
+Recorded = tuple[TrialData, Signals]
+
+
+def by_amplitude(told: Sequence[Recorded], period: float) -> list[list[Recorded]]:
+    """Groups of one rms of what was excited, the largest first; within each by number of trial.
+
+    A new group begins where neighbours in size differ by more than `SAME_SIZE`.
+
+    Args:
+        period: of the excitation (s).
+    """
+    sizes = {signal.number: _rms(signal.leading, signal, period) for _, signal in told}
+    falling = sorted(told, key=lambda each: -sizes[each[1].number])
+    groups = [falling[:1]]
+    for (_, before), each in pairwise(falling):
+        if sizes[before.number] > SAME_SIZE * sizes[each[1].number]:
+            groups.append([])
+        groups[-1].append(each)
+    return [sorted(group, key=lambda each: each[1].number) for group in groups]
+
+
+def _rms(samples: Array, signal: Signals, period: float) -> float:
+    """Of the last period without its mean: before, there may be rest, or a transient."""
+    return float(np.nanstd(samples[-round(period * signal.rate) :]))
+
+
+def size_of(told: Sequence[Recorded], period: float) -> str:
+    """The rms of one amplitude, in words; of a recording that of its torque: its unit is known."""
+    trial, first = told[0]
+    mode = trial.trial.task.mode
+    rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
+    return f"rms {rate_text(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"

@@ -20,17 +20,17 @@ from campaign.estimation.frequency_response import Response, make_response
 from campaign.estimation.local_fit import FRICTION
 from campaign.estimation.sine_point import SinePoint, sine_point
 from campaign.experiments.interface import TrialData
-from campaign.experiments.responses.amplitudes import Recorded, by_amplitude, size_of
-from campaign.experiments.responses.periodicity import (
-    found_repeating,
-    repeated,
-    unused,
-)
 from campaign.experiments.responses.signals import (
     Excited,
+    Recorded,
     Signals,
     base_frequency,
+    by_amplitude,
+    found_repeating,
+    repeated,
     signals,
+    size_of,
+    unused,
     whole_stretches,
 )
 from campaign.physics.bench import Bench

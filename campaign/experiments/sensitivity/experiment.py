@@ -19,39 +19,37 @@ from campaign.estimate import Estimate
 from campaign.estimation.stabilization_error import over_trials
 from campaign.estimation.threshold import Threshold
 from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
-from campaign.experiments.sensitivity.figures import (
-    sensitivity_figure,
-    thresholds_figure,
-)
 from campaign.experiments.sensitivity.model_variation import model_figures, model_trials
 from campaign.experiments.sensitivity.results import (
     SYMBOLS,
     Response,
     ResponseVerdict,
     judge,
+    sensitivity_figure,
     sensitivity_findings,
     sensitivity_table,
+    thresholds_figure,
 )
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import failures_note, with_changes
+from campaign.experiments.shared.common import compensation_of, parameter_paths, with_changes
 from campaign.experiments.shared.pointing_error import (
+    SineMotionOptions,
     error_of,
     found,
     measured_part,
     of_each,
+    seen_through,
     windows_of,
 )
-from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Figure, Finding, Result, Value
-from campaign.signals import Sine
-from campaign.trial import Task, TrialRequest
-from campaign.units import Angle, AngularAcceleration, Frequency, in_words
+from campaign.trial import TrialRequest
+from campaign.units import Angle, in_words
 
 CHANGES = (-0.8, -0.65, -0.5, -0.4, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8)
 
 
-class SensitivityOptions(Options):
+class SensitivityOptions(SineMotionOptions):
     """Options of a sensitivity study."""
 
     compensation: str = "lugre"
@@ -66,16 +64,6 @@ class SensitivityOptions(Options):
     """Error whose passing counts as too much."""
     threshold_ratio: float | None = Field(default=None, gt=1)
     """Instead: how many times the error with the unchanged model counts as too much."""
-    frequency: Frequency = Field(default=0.24, gt=0)
-    """Frequency of the base motion."""
-    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
-    """Amplitude of the base's angular acceleration."""
-    cycles: int = Field(default=3, ge=1, le=10_000)
-    """Whole cycles of the base motion that are measured."""
-    settle_cycles: int = Field(default=1, ge=0, le=1_000)
-    """Cycles before them, for the transient to pass."""
-    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
-    """Rate of the recording."""
     model_output: bool = True
     """Also run the model alone at a prescribed rate (Figures 5.12, 5.13): in simulation only."""
     model_change: float = Field(default=0.5, gt=0, lt=1)
@@ -88,20 +76,10 @@ class SensitivityOptions(Options):
 
 def varied_paths(bench: Bench, compensation: str, parameter: str) -> dict[str, float]:
     """Dotted path on the bench to value (SI), wherever the compensation's model has `parameter`."""
-    if compensation not in bench.compensation:
-        named = ", ".join(bench.compensation) or "none"
-        raise ValueError(f"the bench has no compensation '{compensation}'; it has {named}")
-    interfaces = bench.compensation[compensation].model_dump(mode="json").get("friction")
+    interfaces = compensation_of(bench, compensation).model_dump(mode="json").get("friction")
     if not isinstance(interfaces, Mapping):
         raise ValueError(f"'{compensation}' has no friction model whose parameters could vary")
-    found: dict[str, float] = {}
-    for name, model in interfaces.items():
-        where = f"compensation.{compensation}.friction.{name}"
-        for prefix, table in (("", model), ("negative.", model.get("negative") or {})):
-            value = table.get(parameter)
-            if isinstance(value, float | int):
-                found[f"{where}.{prefix}{parameter}"] = float(value)
-    return found
+    return parameter_paths(interfaces, f"compensation.{compensation}.friction", parameter)
 
 
 def _varied(bench: Bench, options: SensitivityOptions, parameter: str, change: float) -> Any:
@@ -130,16 +108,7 @@ def _trials(options: SensitivityOptions, bench: Bench) -> Iterator[TrialRequest]
         raise ValueError(
             f"the model of '{options.compensation}' has none of {', '.join(options.parameters)}"
         )
-    start = options.settle_cycles / options.frequency
-    stop = start + options.cycles / options.frequency
-    task = Task(
-        mode="rate",
-        base_acceleration=Sine(amplitude=options.acceleration, frequency=options.frequency),
-        compensation=options.compensation,
-        duration=stop,
-        window=(start, stop),
-        sample_rate=options.sample_rate,
-    )
+    task = options.task(options.compensation)
     refused = _refusals(bench, options)
     places: list[tuple[str, float]] = [("", 0.0)]
     places += [(p, c) for p in known for c in options.changes if c and (p, c) not in refused]
@@ -185,10 +154,10 @@ def _responses(measured: Sequence[TrialData]) -> dict[str, Response]:
 
 
 def _analyse(data: TestData) -> Result:
-    notes = list(failures_note(data))
     measured = list(data.completed())
     if not measured:
-        return Result(notes=tuple(notes))
+        return Result()
+    notes: list[str] = []
     options = SensitivityOptions.model_validate(measured[0].trial.options, context={"si": True})
     responses = _responses(measured)
     figures = tuple(model_figures(measured, options.compensation))
@@ -211,7 +180,7 @@ def _analyse(data: TestData) -> Result:
         "acceleration": options.acceleration,
     }
     findings: list[Finding] = []
-    whole = len(measured) == len(data.trials)
+    whole = len(measured) == len(data.trials) and not data.left_out
     if whole:
         findings += sensitivity_findings(judged, told)
     else:
@@ -219,7 +188,7 @@ def _analyse(data: TestData) -> Result:
     findings.append(Finding.of(unchanged, told))
     notes += _skipped_notes(measured, options)
     return Result(
-        (sensitivity_table(judged, limit),),
+        (sensitivity_table(judged, limit, seen_through(measured[0].trial)),),
         (*_figures(judged, limit, told, whole), *figures),
         tuple(findings),
         tuple(notes),

@@ -16,6 +16,7 @@ from campaign.channels import COMPENSATION_TORQUE, RELATIVE_RATE
 from campaign.estimate import Window
 from campaign.experiments.interface import TrialData, with_samples
 from campaign.experiments.shared.common import method_label
+from campaign.experiments.shared.friction_models import PARAMETER_LABELS
 from campaign.physics.bench import Bench
 from campaign.recording import Recording
 from campaign.result import Axis, Curve, Figure, Panel
@@ -32,14 +33,6 @@ SLOW = 0.35
 """Half width of the rate axis, as a share of the largest rate: the Stribeck effect is there."""
 FAST = ("viscous_friction",)
 DYNAMIC = ("bristle_stiffness", "bristle_damping")
-LABELS = {
-    "bristle_stiffness": "bristle stiffness σ0",
-    "bristle_damping": "bristle damping σ1",
-    "viscous_friction": "viscous friction σ2",
-    "static_torque": "static torque Ts",
-    "coulomb_torque": "Coulomb torque Tc",
-    "stribeck_velocity": "Stribeck velocity vs",
-}
 
 
 def model_trials(
@@ -161,7 +154,7 @@ def _panel(name: str, runs: dict[float, TrialData], view: View) -> Panel:
         series = "reference" if change == 0 else ("low" if change < 0 else "high")
         label = "unchanged" if change == 0 else f"{change:+.0%}".replace("-", "−")
         curves.append(Curve(x, y, label, series))
-    title = LABELS.get(name, name)
+    title = PARAMETER_LABELS.get(name, name)
     return Panel(axis, torque, curves, title[:1].upper() + title[1:])
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
 
+from campaign.estimate import Estimate
 from campaign.experiments.interface import TestData, TrialData
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
-from campaign.result import Value
+from campaign.result import Result, Value
 from campaign.trial import Tree, canonical_json
 from campaign.units import TORQUE
 
@@ -19,6 +20,12 @@ OF_NO_OPTION = {"average_friction": TORQUE}
 """What a condition measures that is neither an option of its experiment nor a path of a bench."""
 COUNTED = Cause("counted", "counted")
 OF_RECORDING = Cause("describes the recording", "it describes this recording")
+
+
+def of_recording(name: str, value: float, unit: str) -> Estimate:
+    """A number that describes one recording: it has no interval."""
+    return Estimate.without_interval(name, value, unit, OF_RECORDING())
+
 
 METHOD_LABELS = {
     "none": "no compensation",
@@ -60,6 +67,14 @@ def grouped(
     return {key: tuple(group) for key, group in groups.items()}
 
 
+def by_value(trials: Iterable[TrialData], name: str) -> dict[float, tuple[TrialData, ...]]:
+    """Trials by a number of their points (SI), ascending; repeats together."""
+    found: dict[float, list[TrialData]] = {}
+    for item in trials:
+        found.setdefault(float(str(item.trial.point[name])), []).append(item)
+    return {value: tuple(found[value]) for value in sorted(found)}
+
+
 def swept(data: TestData, own: Sequence[str] = ()) -> tuple[str, ...]:
     """Dotted paths that the test's matrix sweeps, in the order they were written."""
     paths: dict[str, None] = {}
@@ -75,16 +90,49 @@ def conditions(data: TrialData, *names: str) -> dict[str, Value]:
     return {k: v for k, v in told.items() if v is None or isinstance(v, str | int | float | bool)}
 
 
-def failures_note(data: TestData) -> tuple[str, ...]:
-    """A sentence when trials are missing from the analysis."""
-    failed = [item for item in data.trials if item.ending.outcome != "completed"]
-    if not failed:
-        return ()
-    note = (
-        f"{len(failed)} of {len(data.trials)} trials did not complete and are not analysed; "
-        "the table of failed trials says why."
+def joined(results: Iterable[Result]) -> Result:
+    """What several analyses found, one after the other."""
+    every = tuple(results)
+    return Result(
+        tuple(table for each in every for table in each.tables),
+        tuple(figure for each in every for figure in each.figures),
+        tuple(finding for each in every for finding in each.findings),
+        tuple(note for each in every for note in each.notes),
     )
-    return (note,)
+
+
+def of_each_place(
+    trials: Iterable[TrialData],
+    own: Sequence[str],
+    analyse: Callable[[tuple[TrialData, ...], str], Result],
+) -> Result:
+    """What each place of the sweep shows by itself; `own` names what the sweep is not about.
+
+    analyse: of the trials of a place, and what goes behind keys: "" where there is one place.
+    """
+    groups = grouped(trials, own).values()
+    suffixes = [f"-{number}" if len(groups) > 1 else "" for number in range(1, len(groups) + 1)]
+    return joined(map(analyse, groups, suffixes))
+
+
+def compensation_of(bench: Bench, name: str) -> Any:
+    """The options of a compensation. Raises ValueError where the bench has none of that name."""
+    if name not in bench.compensation:
+        named = ", ".join(bench.compensation) or "none"
+        raise ValueError(f"the bench '{bench.name}' has no compensation '{name}'; it has {named}")
+    return bench.compensation[name]
+
+
+def parameter_paths(
+    interfaces: Mapping[str, Mapping[str, Any]], where: str, parameter: str
+) -> dict[str, float]:
+    """Dotted path to value (SI), in every interface and direction that has a parameter."""
+    return {
+        f"{where}.{name}.{prefix}{parameter}": float(table[parameter])
+        for name, model in interfaces.items()
+        for prefix, table in (("", model), ("negative.", model.get("negative") or {}))
+        if isinstance(table.get(parameter), float | int)
+    }
 
 
 def with_changes(bench: Bench, changes: Mapping[str, Any]) -> Tree:

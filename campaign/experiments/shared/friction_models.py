@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,14 +12,28 @@ from campaign.estimate import Estimate
 from campaign.estimation.intervals import shifted_by
 from campaign.estimation.sampled_curve import together
 from campaign.experiments.interface import Metrics, TrialData, metrics
-from campaign.experiments.shared.common import grouped
+from campaign.experiments.shared.common import by_value, grouped
 from campaign.options import Options
 from campaign.physics.bench import Bench
+from campaign.physics.engine_version import ENGINE, TORQUE_ERRORS
 from campaign.physics.friction import friction_models
+from campaign.physics.friction.interface import FrictionModel
+from campaign.reason import Cause
 from campaign.result import Column, Value
+from campaign.text import nearest, pretty_unit
 from campaign.trial import Tree
 
 LABELS = {"stribeck": "static model", "lugre": "LuGre model"}
+PARAMETER_LABELS = {
+    "bristle_stiffness": "bristle stiffness σ0",
+    "bristle_damping": "bristle damping σ1",
+    "viscous_friction": "viscous friction σ2",
+    "static_torque": "static torque Ts",
+    "coulomb_torque": "Coulomb torque Tc",
+    "stribeck_velocity": "Stribeck velocity vs",
+    "stribeck_exponent": "Stribeck exponent δ",
+}
+"""Parameters as they are called on the page; the last word is the symbol."""
 SERIES = {"stribeck": "static"}
 """Models that are drawn like the compensation built on them; any other has its own name's look."""
 
@@ -33,6 +46,15 @@ def model_label(name: str) -> str:
 def model_series(name: str) -> str:
     """The series, and so the look, of a friction model's curves."""
     return SERIES.get(name, name)
+
+
+def model_called(name: str) -> FrictionModel:
+    """A friction model. Raises ValueError, with a message for the user, for an unknown one."""
+    known = friction_models()
+    if name not in known:
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
+        raise ValueError(f"there is no friction model {name!r}{hint}")
+    return known[name]
 
 
 def in_models(
@@ -52,14 +74,7 @@ def with_model(bench: Bench, name: str) -> Tree:
     preload say of them. Raises ValueError, with a message for the user, for an unknown model and
     for one that needs more than the bench says.
     """
-    known = friction_models()
-    if name not in known:
-        close = difflib.get_close_matches(name, list(known), 1)
-        hint = f"; did you mean '{close[0]}'?" if close else ""
-        raise ValueError(
-            f"no friction model is called '{name}'; there are {', '.join(known)}{hint}"
-        )
-    options = known[name].options
+    options = model_called(name).options
     tree: Any = bench.model_dump(mode="json", include={"friction"})
     friction: dict[str, Any] = {}
     for interface, fields in tree["friction"].items():
@@ -110,10 +125,7 @@ class ConditionGroup:
 
     def by(self, name: str) -> dict[float, tuple[TrialData, ...]]:
         """Its trials by what the experiment varies as `name` (SI), ascending; repeats together."""
-        found: dict[float, list[TrialData]] = {}
-        for item in self.trials:
-            found.setdefault(float(str(item.trial.point[name])), []).append(item)
-        return {value: tuple(found[value]) for value in sorted(found)}
+        return by_value(self.trials, name)
 
 
 OF_ONE = (
@@ -121,6 +133,11 @@ OF_ONE = (
     "scatter. --check-step shows what the time step of a simulation adds."
 )
 """For the note of a table of such experiments."""
+NONE_RESOLVED = Cause(
+    "not resolved by the simulation", "a simulated friction may be off by {error}: it is no larger"
+)
+RESOLVED = TORQUE_ERRORS[ENGINE]
+"""of a friction torque, that a simulation at its usual step may be off by."""
 
 
 def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
@@ -133,6 +150,19 @@ def simulated(found: Iterable[Estimate]) -> tuple[Estimate, ...]:
         each if each.kind == "count" else shifted_by(each, "time step of the simulation", None)
         for each in found
     )
+
+
+def resolved(found: Estimate, friction: float) -> Estimate:
+    """A difference of simulated friction; 0 where it is no larger than the error of the engine.
+
+    friction: what that error is a share of, in the unit of `found`.
+    """
+    error = RESOLVED * friction
+    if not found.is_determined or not abs(found.value) <= error:
+        return found
+    reason = NONE_RESOLVED(error=f"{error:.2g} {pretty_unit(found.unit)}".rstrip())
+    parts = found.systematic
+    return Estimate.without_interval(found.name, 0.0, found.unit, reason, systematic=parts)
 
 
 def combined(

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import Literal, Self
 
 import numpy as np
+from pydantic import ValidationInfo, model_validator
 
 from campaign.axis_kind import in_axis_terms
+from campaign.options import Options, TextFile
 from campaign.signals import Array, Polyline
 from campaign.units import ANGLE, ANGULAR_ACCELERATION, ANGULAR_RATE, TIME, Quantity
 
@@ -30,28 +32,62 @@ def kind_of(unit: str) -> Kind:
 
     Raises ValueError naming the units there are.
     """
-    for kind, quantity in KINDS.items():
+    return name_of(unit, KINDS, "a motion")  # type: ignore[return-value]
+
+
+def name_of(unit: str, quantities: Mapping[str, Quantity], what: str) -> str:
+    """Which of some quantities has a unit. Raises ValueError, for a unit of `what`, for none."""
+    for name, quantity in quantities.items():
         try:
             quantity.parse(f"1 {unit}")
         except ValueError:
             continue
-        return kind  # type: ignore[return-value]
+        return name
     known = "; ".join(
-        f"{in_axis_terms(kind)}: {', '.join(q.here.accepts)}" for kind, q in KINDS.items()
+        f"{in_axis_terms(name)}: {', '.join(q.here.accepts)}" for name, q in quantities.items()
     )
-    raise ValueError(f"{unit!r} is no unit of a motion; allowed are {known}")
+    raise ValueError(f"{unit!r} is no unit of {what}; allowed are {known}")
 
 
-def read_series(
-    text: str, name: str, time_column: str, value_column: str, time_unit: str, value_unit: str
-) -> tuple[Array, Array]:
-    """Times (s, from 0) and values (SI), each shape (n,), of a CSV text with a header line.
+class SeriesFile(Options):
+    """Numbers over time, from a CSV file with a header line."""
 
-    Separated by commas, or by semicolons where the header has any; empty lines and lines that
-    begin with # are left out. Raises ValueError with `name` and line for whatever is wrong.
-    """
-    value = KINDS[kind_of(value_unit)]
-    return read_table(text, name, (time_column, value_column), time_unit, value_unit, value)
+    file: TextFile
+    """Path of the CSV file, relative to the protocol."""
+    value: str
+    """Unit of the value column."""
+    time: str = "s"
+    """Unit of the time column."""
+    time_column: str = "time"
+    """Header of the time column."""
+    value_column: str = "value"
+    """Header of the value column."""
+
+    @property
+    def quantity(self) -> Quantity:
+        """What the values are. Raises ValueError naming the units there are."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _readable(self, info: ValidationInfo) -> Self:
+        if isinstance(info.context, Mapping) and info.context.get("si"):
+            return self  # it was read once, and here nobody need know of which axis
+        TIME.parse(f"1 {self.time}")
+        _ = self.quantity
+        if self.file.text is not None:
+            self.check(*self.samples())
+        return self
+
+    def check(self, time: Array, value: Array) -> None:
+        """Raises ValueError where the series is not as it has to be."""
+
+    def samples(self) -> tuple[Array, Array]:
+        """Times (s, from 0) and values (SI), each shape (n,)."""
+        if self.file.text is None:
+            raise ValueError(f"the text of {self.file.name} is not at hand")
+        wanted = (self.time_column, self.value_column)
+        text, name = self.file.text, self.file.name
+        return read_table(text, name, wanted, self.time, self.value, self.quantity)
 
 
 def read_table(
@@ -62,7 +98,14 @@ def read_table(
     value_unit: str,
     value: Quantity,
 ) -> tuple[Array, Array]:
-    """The same of values of any quantity; `wanted`: headers of the time and of the values."""
+    """Times (s, from 0) and values (SI), each shape (n,), of a CSV text with a header line.
+
+    Separated by commas, or by semicolons where the header has any; empty lines and lines that
+    begin with # are left out. Raises ValueError with `name` and line for whatever is wrong.
+
+    Args:
+        wanted: headers of the time and of the values.
+    """
     time_factor = TIME.parse(f"1 {time_unit}")
     value_factor = value.parse(f"1 {value_unit}")
     rows = _rows(text, name)

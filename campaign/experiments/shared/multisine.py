@@ -15,11 +15,9 @@ import numpy as np
 
 from campaign.estimation.excitation_design.multisines import first_passage
 from campaign.experiments.interface import ChosenValue
-from campaign.experiments.shared.rig import Rig
+from campaign.experiments.shared.rig import Rig, bristles
 from campaign.experiments.shared.rounded_choices import Choices, nice
 from campaign.physics.bench import Bench
-from campaign.physics.friction import friction_models
-from campaign.physics.loop import at_load
 from campaign.signals import MultiSine
 
 MOST_LINES = 1000
@@ -79,17 +77,11 @@ def first_slip(bench: Bench) -> tuple[float, float] | None:
 
     None where an interface says nothing of its presliding.
     """
-    angles, stiffness = [], 0.0
-    for options in bench.friction.values():
-        declared = friction_models()[options.model].small_signal
-        stuck = None if declared is None else declared(options).stuck
-        static = getattr(options, "static_torque", None)
-        if stuck is None or not stuck.stiffness > 0 or not static:
-            return None
-        torque, rate = at_load(options, bench)
-        angles.append(static / stuck.stiffness / rate)
-        stiffness += torque * rate * stuck.stiffness
-    return (min(angles) * stiffness, stiffness) if angles else None
+    known = [each for each in bristles(bench) if each is not None]
+    if not known or len(known) < len(bench.friction):
+        return None
+    stiffness = sum(own for _, own in known)
+    return min(angle for angle, _ in known) * stiffness, stiffness
 
 
 def below_breakaway(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:

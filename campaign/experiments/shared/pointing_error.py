@@ -8,17 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from campaign.channels import POINTING_ERROR
 from campaign.estimate import Estimate, Window
 from campaign.estimation import stabilization_error
-from campaign.experiments.interface import TrialData, metrics
+from campaign.experiments.interface import TrialData, bench_of, metrics
+from campaign.options import Options
+from campaign.physics.complete import pointing_high_pass
 from campaign.recording import Recording
-from campaign.result import Array, ends_of
+from campaign.result import Array
 from campaign.signals import Sine
 from campaign.trial import Task, Trial
+from campaign.units import AngularAcceleration, Frequency
 
 MEASURED = "measured"
 """The window that counts: after the transient; whole cycles of a sinusoidal motion."""
@@ -30,6 +35,42 @@ SHOWN_TIME = 60.0
 """s; of a motion that is not sinusoidal."""
 ROUNDING = 1e-6
 """of a cycle: what times may be off whole cycles by their rounding."""
+
+
+class SineMotionOptions(Options):
+    """Options of a test under a sinusoidal base motion."""
+
+    frequency: Frequency = Field(default=0.24, gt=0)
+    """Frequency of the base motion."""
+    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
+    """Amplitude of the base's angular acceleration."""
+    cycles: int = Field(default=3, ge=1, le=10_000)
+    """Whole cycles of the base motion that are measured."""
+    settle_cycles: int = Field(default=1, ge=0, le=1_000)
+    """Cycles before them, for the transient to pass."""
+    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
+    """Rate of the recording."""
+
+    def task(self, compensation: str) -> Task:
+        """The rate command is zero, and the hull swings."""
+        motion = Sine(amplitude=self.acceleration, frequency=self.frequency)
+        start = self.settle_cycles / self.frequency
+        stop = start + self.cycles / self.frequency
+        return rest_task(compensation, start, stop, self.sample_rate, base_acceleration=motion)
+
+
+def rest_task(
+    compensation: str, start: float, stop: float, sample_rate: float, **signals: Any
+) -> Task:
+    """A task whose rate command is zero, measured from start to stop (s); what acts on the load."""
+    return Task(
+        mode="rate",
+        compensation=compensation,
+        duration=stop,
+        window=(start, stop),
+        sample_rate=sample_rate,
+        **signals,
+    )
 
 
 def windows_of(task: Task) -> tuple[Window, Window]:
@@ -103,12 +144,7 @@ def of_each(group: Iterable[TrialData], measure: Measure, name: str) -> list[Est
     return [by_name[name] for by_name in by_trial if name in by_name]
 
 
-def values(estimates: Sequence[Estimate]) -> Array:
-    """Values of estimates, shape (n,), for a curve."""
-    return np.array([estimate.value for estimate in estimates], dtype=float)
-
-
-def ends(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
-    """Both ends of each interval, shape (n,), for a curve; `ends_of` says which are open."""
-    low, high = np.array([ends_of(estimate) for estimate in estimates]).reshape(-1, 2).T
-    return low, high
+def seen_through(trial: Trial) -> str:
+    """A sentence for a table of errors, where the bench sees them through a high-pass."""
+    corner = pointing_high_pass(bench_of(trial))
+    return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 from campaign.experiments.interface import Experiment, Model, Suits, TestData
-from campaign.experiments.shared.common import failures_note
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.result import Result
@@ -41,17 +40,16 @@ def of_any_motion(
     def analyse(data: TestData) -> Result:
         if data.model is not None:
             return identify(data, data.model)
-        notes = failures_note(data)
         trials, why = suits(tuple(data.completed()))
         if not trials:
-            return Result(notes=(*notes, f"{why}."))
+            return Result(notes=(f"{why}.",))
         own = options.model_validate(trials[0].trial.options, context={"si": True})
         try:
             found = identify(replace(data, trials=tuple(trials)), own)
         except ValueError as error:
-            return Result(notes=(*notes, f"{error}."))
+            return Result(notes=(f"{error}.",))
         warnings = (each.text for each in found.identified.warnings)
-        return replace(found, notes=(*notes, *warnings, *found.notes))
+        return replace(found, notes=(*warnings, *found.notes))
 
     return Experiment(
         name,

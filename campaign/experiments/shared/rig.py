@@ -6,6 +6,7 @@ Where friction is not described its sizes are None, and whoever asks takes what 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +29,19 @@ MOST = 0.9
 """of a limit that an experiment may use up by its own choice."""
 
 
+def bristles(bench: Bench) -> Iterator[tuple[float, float] | None]:
+    """Of each interface Ts / sigma0 (rad) and sigma0 (N m/rad), at the load; None where unknown."""
+    for options in bench.friction.values():
+        declared = friction_models()[options.model].small_signal
+        stuck = None if declared is None else declared(options).stuck
+        static = getattr(options, "static_torque", None)
+        if stuck is None or not stuck.stiffness > 0 or not static:
+            yield None
+            continue
+        torque, rate = at_load(options, bench)
+        yield static / stuck.stiffness / rate, torque * rate * stuck.stiffness
+
+
 @dataclass(frozen=True)
 class Rig:
     """A bench as the sizes of an experiment follow from it; SI, at the load."""
@@ -42,14 +56,8 @@ class Rig:
     @cached_property
     def presliding(self) -> float | None:
         """Largest Ts / sigma0 of its interfaces (rad): friction's memory is some of these."""
-        spans = []
-        for options in self.bench.friction.values():
-            declared = friction_models()[options.model].small_signal
-            stuck = None if declared is None else declared(options).stuck
-            static = getattr(options, "static_torque", None)
-            if stuck is not None and stuck.stiffness > 0 and static:
-                spans.append(static / stuck.stiffness / at_load(options, self.bench)[1])
-        return max(spans, default=None)
+        known = (each for each in bristles(self.bench) if each is not None)
+        return max((span for span, _ in known), default=None)
 
     @cached_property
     def stribeck_velocity(self) -> float | None:

@@ -10,13 +10,12 @@ import numpy as np
 
 from campaign.estimate import Estimate
 from campaign.experiments.shared.common import method_label, short_label
-from campaign.experiments.shared.pointing_error import ends
 from campaign.experiments.shared.swept_words import axis_of, name_of, words
 from campaign.options import Options
 from campaign.result import Axis, Cell, Curve, Figure, Panel, Value
 from campaign.trial import Trial
 
-COMPENSATION = "compensation"
+COMPENSATION, QUANTITY = "compensation", "stabilization_error"
 FOUND = frozenset({"error", "peak", "stuck", "repeats", "spread", "next"})
 """Entries of a row that are no condition."""
 BARE = frozenset({"frequency", "acceleration", "motion"})
@@ -110,23 +109,11 @@ def _curves_along(path: str, rows: Rows) -> list[Curve]:
     curves = []
     for name, points in methods.items():
         points.sort(key=lambda point: point[0])
-        low, high = ends([error for _, error, _ in points])
         told = _conditions(points[0][2])
         told.pop(path, None)
-        curves.append(
-            Curve(
-                np.array([x for x, _, _ in points]),
-                np.array([error.value for _, error, _ in points]),
-                method_label(name),
-                name,
-                "line+points",
-                low=low,
-                high=high,
-                quantity="stabilization_error",
-                along=path,
-                conditions=told,
-            )
-        )
+        values, errors, _ = zip(*points, strict=True)
+        curve = Curve.of(values, errors, method_label(name), name, "line+points")
+        curves.append(replace(curve, quantity=QUANTITY, along=path, conditions=told))
     return curves
 
 
@@ -164,18 +151,8 @@ def method_axis(methods: Sequence[str]) -> Axis:
 def _dot(row: Mapping[str, Cell], methods: Sequence[str]) -> Curve:
     method, error = str(row[COMPENSATION]), _error(row)
     assert error is not None  # noqa: S101 (for the type checker; its rows have one)
-    low, high = ends([error])
-    return Curve(
-        np.array([float(methods.index(method))]),
-        np.array([error.value]),
-        "",
-        method,
-        "points",
-        low=low,
-        high=high,
-        quantity="stabilization_error",
-        conditions=_conditions(row),
-    )
+    place, told = float(methods.index(method)), _conditions(row)
+    return Curve.of([place], [error], "", method, quantity=QUANTITY, conditions=told)
 
 
 def _axis(rows: Rows) -> Axis:

@@ -29,21 +29,29 @@ from campaign.estimation.intervals import of_next
 from campaign.estimation.sampled_curve import LOST, drop_interval_if_deterministic
 from campaign.estimation.stabilization_error import BLOCKS, over_trials, whole_cycles
 from campaign.estimation.time_stuck import UNRESOLVED, over_recordings, time_stuck
-from campaign.experiments.interface import Experiment, TestData, TrialData, bench_of, key
+from campaign.experiments.interface import Experiment, TestData, TrialData, key
 from campaign.experiments.shared import default_options
-from campaign.experiments.shared.common import conditions, failures_note, grouped, swept
+from campaign.experiments.shared.common import conditions, grouped, swept
 from campaign.experiments.shared.detected_trials import hull_sine
 from campaign.experiments.shared.pointing_error import (
     MEASURED,
+    SineMotionOptions,
     error_of,
     found,
     largest_of,
     measured_part,
     of_each,
     rate_of,
+    rest_task,
+    seen_through,
     windows_of,
 )
-from campaign.experiments.stabilization.comparisons import compared, preload_of
+from campaign.experiments.stabilization.comparisons import (
+    beside_rows,
+    beside_table,
+    compared,
+    preload_of,
+)
 from campaign.experiments.stabilization.errors import BY_METHOD
 from campaign.experiments.stabilization.figures import stabilization_figures
 from campaign.experiments.stabilization.hull_motion import (
@@ -52,19 +60,12 @@ from campaign.experiments.stabilization.hull_motion import (
     ShipMotion,
     SineMotion,
 )
-from campaign.experiments.stabilization.identified_compensations import (
-    beside_rows,
-    beside_table,
-)
-from campaign.options import Options
 from campaign.physics.bench import Bench
-from campaign.physics.complete import pointing_high_pass
 from campaign.reason import Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Cell, Column, Finding, Result, Table, Value
 from campaign.signals import Sine
-from campaign.trial import OfferedRecording, Task, Trial, TrialRequest
-from campaign.units import AngularAcceleration, Frequency
+from campaign.trial import OfferedRecording, Trial, TrialRequest
 
 SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
@@ -80,23 +81,17 @@ SHOW_STUCK = (BASE_RATE, RELATIVE_ANGLE, GYRO_RATE)
 """Channels of the rate of the hull and of what resolves the rate relative to it."""
 
 
-class StabilizationOptions(Options):
+class StabilizationOptions(SineMotionOptions):
     """Options of a stabilization test."""
 
     motion: Motion = SineMotion()
     """How the hull moves; frequency, acceleration and cycles are those of a sine."""
-    frequency: Frequency = Field(default=0.24, gt=0)
-    """Frequency of the base motion."""
-    acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
-    """Amplitude of the base's angular acceleration."""
     compensation: str = "none"
     """Compensation method, by its name on the bench; none for none."""
     cycles: int = Field(default=6, ge=1, le=10_000)
     """Whole cycles of the base motion that are measured."""
     settle_cycles: int = Field(default=2, ge=0, le=1_000)
     """Cycles before them, for the transient to pass."""
-    sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
-    """Rate of the recording."""
 
     def without_effect(self) -> frozenset[str]:
         return frozenset(() if isinstance(self.motion, SineMotion) else OF_A_SINE)
@@ -114,16 +109,7 @@ def _trials(options: StabilizationOptions, bench: Bench) -> Iterator[TrialReques
             f"a recording at {options.sample_rate:.4g} Hz shows fewer than {SAMPLES_PER_CYCLE} "
             f"samples per cycle of a {options.frequency:.4g} Hz motion; raise sample_rate"
         )
-    start = options.settle_cycles / options.frequency
-    stop = start + options.cycles / options.frequency
-    task = Task(
-        mode="rate",
-        base_acceleration=Sine(amplitude=options.acceleration, frequency=options.frequency),
-        compensation=options.compensation,
-        duration=stop,
-        window=(start, stop),
-        sample_rate=options.sample_rate,
-    )
+    task = options.task(options.compensation)
     note = f"{options.cycles} cycles measured after {options.settle_cycles} to settle"
     yield TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
 
@@ -148,14 +134,8 @@ def _irregular(options: StabilizationOptions, motion: SeriesMotion | ShipMotion)
             f"'{motion.kind}'; remove one or the other"
         )
     signal, start, stop = motion.signal()
-    task = Task(
-        mode="rate",
-        base_acceleration=signal,
-        compensation=options.compensation,
-        duration=stop,
-        window=(start, stop),
-        sample_rate=options.sample_rate,
-    )
+    rate, name = options.sample_rate, options.compensation
+    task = rest_task(name, start, stop, rate, base_acceleration=signal)
     note = f"{stop - start:.4g} s measured after {start:.4g} s to settle"
     return TrialRequest(task, note=note, can_use=_can_use(options), windows=windows_of(task))
 
@@ -217,12 +197,11 @@ def _analyse(data: TestData) -> Result:
         findings += [Finding.of(cell, told) for cell in told_of if isinstance(cell, Estimate)]
         rows.append({**told, **row})
     firsts = [group[0] for group in groups.values()]
-    high_pass = pointing_high_pass(bench_of(firsts[0].trial)) if firsts else 0.0
     errors = [finding for finding in findings if finding.quantity == "stabilization_error"]
     findings += compared(errors)
     figures = list(stabilization_figures(firsts, paths, rows, StabilizationOptions))
     extra = [path for path in paths if path not in columns]
-    tables = [_table(rows, extra, _seen_through(high_pass))]
+    tables = [_table(rows, extra, seen_through(firsts[0].trial) if firsts else "")]
     beside = beside_rows(rows)
     if beside:
         tables.insert(0, beside_table(beside, extra))  # what such a test is about
@@ -230,7 +209,6 @@ def _analyse(data: TestData) -> Result:
         tuple(tables),
         tuple(figures),
         tuple(findings),
-        failures_note(data),
         telling=_telling([figure.key for figure in figures]),
     )
 
@@ -299,11 +277,6 @@ def _table(rows: Sequence[Mapping[str, Cell]], extra: Sequence[str], remark: str
         + ("the measured time." if irregular else "whole cycles.")
         + remark,
     )
-
-
-def _seen_through(corner: float) -> str:
-    """A sentence when the bench sees its position error through a high-pass (Hz)."""
-    return f" The bench sees it through a high-pass at {corner:.3g} Hz." if corner > 0 else ""
 
 
 EXPERIMENT = Experiment(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
 from campaign.axis_kind import is_linear
-from campaign.experiments.shared.motion_series import kind_of, motion_signal, read_series
-from campaign.options import Options, TextFile
+from campaign.experiments.shared.motion_series import KINDS, SeriesFile, kind_of, motion_signal
+from campaign.options import Options
 from campaign.physics.ship_motion import ShipRoll, roll_acceleration
-from campaign.signals import MultiSine, Polyline
-from campaign.units import TIME, Frequency, Length, Time
+from campaign.signals import Array, MultiSine, Polyline
+from campaign.units import Frequency, Length, Quantity, Time
 
 
 class SineMotion(Options):
@@ -22,53 +21,29 @@ class SineMotion(Options):
     """A sinusoidal acceleration."""
 
 
-class SeriesMotion(Options):
+class SeriesMotion(SeriesFile):
     """A measured time series, from a CSV file with a header line."""
 
     kind: Literal["series"]
     """A measured time series."""
-    file: TextFile
-    """Path of the CSV file, relative to the protocol."""
-    time: str = "s"
-    """Unit of the time column."""
     value: str
     """Unit of the value column: it says whether it is an angle, a rate or an acceleration."""
-    time_column: str = "time"
-    """Header of the time column."""
-    value_column: str = "value"
-    """Header of the value column."""
     lead_in: Time = Field(default=1.0, gt=0)
     """Before the series, for the hull to come from rest to the rate with which it begins."""
     settle: Time = Field(default=2.0, ge=0)
     """Beginning of the series that is not measured, for the transient to pass."""
 
-    @model_validator(mode="after")
-    def _readable(self, info: ValidationInfo) -> SeriesMotion:
-        if isinstance(info.context, Mapping) and info.context.get("si"):
-            return self  # it was read once, and here nobody need know of which axis
-        TIME.parse(f"1 {self.time}")
-        kind_of(self.value)
-        if self.file.text is not None:
-            end = self._samples()[0][-1]
-            if self.settle >= end:
-                raise ValueError(f"the series lasts {end:.4g} s, no longer than settle")
-        return self
+    @property
+    def quantity(self) -> Quantity:
+        return KINDS[kind_of(self.value)]
 
-    def _samples(self) -> tuple[Any, Any]:
-        if self.file.text is None:
-            raise ValueError(f"the text of {self.file.name} is not at hand")
-        return read_series(
-            self.file.text,
-            self.file.name,
-            self.time_column,
-            self.value_column,
-            self.time,
-            self.value,
-        )
+    def check(self, time: Array, value: Array) -> None:
+        if self.settle >= time[-1]:
+            raise ValueError(f"the series lasts {time[-1]:.4g} s, no longer than settle")
 
     def signal(self) -> tuple[Polyline, float, float]:
         """Acceleration of the hull (rad/s^2), and start and stop of what is measured (s)."""
-        time, value = self._samples()
+        time, value = self.samples()
         signal = motion_signal(time, value, kind_of(self.value), self.lead_in)
         return signal, self.lead_in + self.settle, self.lead_in + float(time[-1])
 

@@ -11,24 +11,22 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from campaign.estimate import Estimate, Origin
+from campaign.estimate import Origin
 from campaign.estimation.gate import admitted
 from campaign.estimation.inverse.terms import Term
 from campaign.experiments.any_motion.inverse_fit import InverseDynamics
 from campaign.experiments.any_motion.inverse_fit import find as find_inverse
 from campaign.experiments.any_motion.motions import (
     MotionPiece,
-    force_of,
     read,
     usable,
+    with_constants,
     with_slowest,
 )
 from campaign.experiments.interface import TestData
-from campaign.experiments.shared.imported_scale import with_scale
 from campaign.experiments.shared.recorded_motion import of_any_motion
-from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
-from campaign.experiments.whole_model.models import USUAL
 from campaign.experiments.whole_model.parts import telling_parts
+from campaign.experiments.whole_model.residuals import USUAL
 from campaign.experiments.whole_model.tables_and_figures import figures, models_table, values_table
 from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
 from campaign.options import Options
@@ -141,21 +139,11 @@ def _parameters(best: Fit, data: TestData) -> Iterator[Parameter]:
             advice = numbers[name].advice
             bench = numbers[name].key and f"{FRICTION}.{numbers[name].key}"
         display = "ms" if name == "delay" else ""
-        one = admitted(_scaled(estimate, data))
+        one = admitted(with_constants(estimate, data))
         yield Parameter(one, meanings.get(name, ""), display, bench, advice)
     for each in best.model.derived:
-        one = admitted(_scaled(derived(each, best.values, best.fit), data))
+        one = admitted(with_constants(derived(each, best.values, best.fit), data))
         yield Parameter(one, each.meaning, "", f"{FRICTION}.{each.key}", each.advice)
-
-
-def _scaled(one: Estimate, data: TestData) -> Estimate:
-    """With what a wrong constant of the force would do to it."""
-    if not one.unit.startswith(("N", "kg")) or one.origin is Origin.NOT_DETERMINED:
-        return one
-    first = data.trials[0]
-    if data.bench.motor is not None and not first.trial.recording:
-        one = with_systematic(one, data.bench, TORQUE_CONSTANT, one.value)
-    return with_scale(one, first, force_of(first))
 
 
 def _settings(best: Fit, parameters: Sequence[Parameter]) -> dict[str, tuple[object, str, str]]:

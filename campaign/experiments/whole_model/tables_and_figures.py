@@ -8,14 +8,14 @@ import numpy as np
 
 from campaign.arrays import Array
 from campaign.estimation.inverse.motion import Motion
-from campaign.estimation.inverse.rows import all_rows, moving, rows
+from campaign.estimation.inverse.rows import moving, rows
 from campaign.estimation.inverse.terms import Term
 from campaign.estimation.inverse.terms import columns as columns_of
 from campaign.estimation.inverse.validation import Prediction
 from campaign.experiments.any_motion.figures import FORCE, LEFT, PLACE, RATE, TIME, with_gaps
 from campaign.experiments.any_motion.inverse_fit import CandidateFit, InverseDynamics, together
-from campaign.experiments.any_motion.motions import MotionPiece
-from campaign.experiments.any_motion.tables import AS_THEY_ARE
+from campaign.experiments.any_motion.motions import MotionPiece, place_and_rate
+from campaign.experiments.any_motion.tables import COMPARED, validation_columns
 from campaign.experiments.whole_model.whole_model_fit import Fit, Whole
 from campaign.physics.friction import friction_models
 from campaign.result import Cell, Column, Curve, Figure, Mark, Panel, Table
@@ -34,17 +34,11 @@ def models_table(found: Whole) -> Table:
     columns = [
         Column("model", "Friction model"),
         Column("numbers", "Numbers", exact=True),
-        Column("residual", "Residual", "", "percent", reason=AS_THEY_ARE()),
-        Column("held_out", "Blocks left out", "", "percent", reason=AS_THEY_ARE()),
-        Column("criterion", "BIC", exact=True),
+        *COMPARED,
         Column("agreeing", "Starts that agree"),
     ]
     validated = found.fits[0].validation is not None
-    if validated:
-        columns += [
-            Column("validation", "Validation", "", "percent"),
-            Column("gain", "Lower than the first by", "", "percent"),
-        ]
+    columns += validation_columns("the first") if validated else ()
     rows_: list[Mapping[str, Cell]] = []
     for index, each in enumerate(found.fits):
         row: dict[str, Cell] = {
@@ -169,7 +163,7 @@ def _left_figure(
             told.append((PLAIN, together(reference.predictions)))
     fits = _drawn(found, MOST_LEFT_OVER - len(told))
     told += [(each.model.name, together(each.predictions)) for each in fits]
-    place = _places(found, unseen)
+    place = place_and_rate(unseen, found.filtering)
     panels = []
     for name, prediction in told:
         left = prediction.residuals
@@ -191,9 +185,3 @@ def _left_figure(
         across=3,
         one_scale=True,
     )
-
-
-def _places(found: Whole, unseen: Sequence[MotionPiece]) -> Array:
-    own = (Term("q", "", "", "", lambda m: m.position), Term("v", "", "", "", lambda m: m.rate))
-    parts = [all_rows(each.motion, own, found.filtering).columns for each in unseen]
-    return np.concatenate(parts)

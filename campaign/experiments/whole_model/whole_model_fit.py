@@ -30,8 +30,13 @@ from campaign.estimation.whole_model import (
 from campaign.experiments.any_motion.inverse_fit import together
 from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.experiments.interface import say_at
-from campaign.experiments.whole_model.models import USUAL, Model, models
-from campaign.experiments.whole_model.residuals import Residuals, steps_between
+from campaign.experiments.whole_model.residuals import (
+    USUAL,
+    Model,
+    Residuals,
+    models,
+    steps_between,
+)
 from campaign.physics.friction.unknowns import DerivedOption, Sizes
 from campaign.reason import Cause, Reason
 from campaign.text import words

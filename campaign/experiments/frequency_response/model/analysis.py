@@ -21,7 +21,6 @@ from campaign.estimation.frequency.welch import Estimator
 from campaign.estimation.gate import admitted, admitted_together
 from campaign.estimation.intervals import MODEL_MISFIT
 from campaign.experiments.frequency_response.model.axis_numbers import by_rule, odd_distortion
-from campaign.experiments.frequency_response.model.figures import figures
 from campaign.experiments.frequency_response.model.frequency_fit import (
     Band,
     FrequencyFit,
@@ -33,6 +32,7 @@ from campaign.experiments.frequency_response.model.frequency_fit import (
 )
 from campaign.experiments.frequency_response.model.tables import (
     correlations_table,
+    figures,
     fits_table,
     loop_tables,
     masses_table,
@@ -48,14 +48,13 @@ from campaign.experiments.interface import Model, TestData, TrialData
 from campaign.experiments.responses.signals import Excited, usable
 from campaign.experiments.responses.sources import Reading, sources
 from campaign.experiments.responses.tables import distortion_tables, sources_table
+from campaign.experiments.shared.systematic import TORQUE_CONSTANT, known_uncertainty
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
-from campaign.physics.bench import Bench
 from campaign.result import Finding, Result
 from campaign.text import words
 from campaign.units import Frequency, Time
 
-TORQUE_CONSTANT = "motor.torque_constant"
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
 AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
 MORE_PHASES = (
@@ -119,7 +118,7 @@ def identified(data: TestData) -> Result:
     found = [found_in(each, band) for each in measured]
     best = best_source(found)
     found.sort(key=lambda each: (each is not best, -each.source.rms))  # what tells most comes first
-    torque = _torque_uncertainty(data.bench)
+    torque = known_uncertainty(data.bench, TORQUE_CONSTANT)
     told = masses(best, data.bench, options.place, band, torque, found)
     parameters = tuple(_parameters(told, best or found[0]))
     fits = tuple(models(found, told, band))
@@ -150,7 +149,7 @@ def identified(data: TestData) -> Result:
         notes=(
             *_undetermined(parameters),
             *_notes(found, told, remarks),
-            *_validation_notes(validation),
+            *(f"Of the validation: {each}" for each in validation.remarks),
         ),
         identified=IdentifiedRig(
             parameters,
@@ -176,18 +175,6 @@ def _correlations(told: Masses, parameters: Sequence[Parameter]) -> Mapping[tupl
 
 def _told_names(parameters: Sequence[Parameter]) -> set[str]:
     return {each.estimate.name for each in parameters if each.estimate.has_interval}
-
-
-def _validation_notes(validation: Validation) -> Iterator[str]:
-    yield from (f"Of the validation: {each}" for each in validation.remarks)
-
-
-def _torque_uncertainty(bench: Bench) -> float | None:
-    """Relative, of the torque constant; None where nobody has said it."""
-    known = bench.known_uncertainty(TORQUE_CONSTANT)
-    if known is None or bench.motor is None:
-        return None
-    return known / bench.motor.torque_constant
 
 
 def _parameters(told: Masses, best: FrequencyFit) -> Iterator[Parameter]:

@@ -1,19 +1,29 @@
-"""Tables of frequency responses: setup, orders, modes, margins, two masses."""
+"""Tables and figures of identified responses: orders, modes, margins, two masses."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
+from campaign.arrays import Array, ComplexArray
 from campaign.estimate import Estimate
 from campaign.estimation.frequency.drive import TwoMass
 from campaign.estimation.frequency.one_inertia import METHOD as RIGID_METHOD
 from campaign.estimation.frequency.orders import order_of
 from campaign.estimation.frequency.two_mass import METHOD
+from campaign.estimation.frequency.two_mass_model import Side
+from campaign.experiments.frequency_response.figures import closed_loop_figures
 from campaign.experiments.frequency_response.model.frequency_fit import FrequencyFit, Masses
 from campaign.experiments.frequency_response.tables import Sweep, margin_tables
+from campaign.experiments.responses.figures import (
+    FittedResponse,
+    coherence_figure,
+    response_figures,
+)
 from campaign.experiments.responses.tables import NAME, SENSOR
-from campaign.result import Column, Table
+from campaign.result import Column, Figure, Mark, Table
 from campaign.text import words
 
 
@@ -74,35 +84,21 @@ def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
 
 def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
     """Resonances and antiresonances."""
-    rows: list[dict[str, Any]] = [
-        {
-            "source": each.source.name,
-            "side": side,
-            "kind": "antiresonance" if mode.is_zero else "resonance",
-            "frequency": mode.frequency,
-            "damping": mode.damping,
-        }
-        for each in found
-        for side, modes in each.modes.items()
-        for mode in modes
-    ]
+    told: list[tuple[str, str, str, Estimate, Estimate | None]] = []
     for each in found:
-        for side, local in each.local.items():
-            for kind, frequency, damping in (
-                ("resonance", local.frequency, local.damping_ratio),
-                ("antiresonance", local.antiresonance, None),
-            ):
-                rows.append(
-                    {
-                        "source": each.source.name,
-                        "side": side,
-                        "kind": f"{kind}, on top of a smooth response",
-                        "frequency": frequency,
-                        "damping": damping,
-                    }
-                )
-    if not rows:
+        for side, modes in each.modes.items():
+            for mode in modes:
+                kind = "antiresonance" if mode.is_zero else "resonance"
+                told.append((each.source.name, side, kind, mode.frequency, mode.damping))
+    smooth = "on top of a smooth response"
+    for each in found:
+        for side, one in each.local.items():
+            own, kind = (each.source.name, side), f"resonance, {smooth}"
+            told.append((*own, kind, one.frequency, one.damping_ratio))
+            told.append((*own, f"anti{kind}", one.antiresonance, None))
+    if not told:
         return None
+    names = ("source", "side", "kind", "frequency", "damping")
     return Table(
         "modes",
         "Resonances and antiresonances",
@@ -113,7 +109,7 @@ def modes_table(found: Sequence[FrequencyFit]) -> Table | None:
             Column("frequency", "Frequency", "Hz", "Hz"),
             Column("damping", "Damping ratio", ""),
         ),
-        tuple(rows),
+        tuple(dict(zip(names, each, strict=True)) for each in told),
     )
 
 
@@ -204,3 +200,45 @@ def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
         ),
         note="By scatter alone: what a wrong torque constant or friction does, moves them as well.",
     )
+
+
+FINE = 800
+"""Frequencies at which a fitted function is drawn."""
+
+
+def figures(found: Sequence[FrequencyFit], masses: Masses) -> Iterator[Figure]:
+    """All of them, the most telling first."""
+    sources = [each.source for each in found]
+    yield from response_figures(
+        sources,
+        {
+            (index, side): _fitted(each, side, masses)
+            for index, each in enumerate(found)
+            for side in each.source.responses
+        },
+    )
+    loops = [(each.source.name, each.source.closed, each.margins) for each in found]
+    closed = [(name, name, loop) for name, loop, _ in loops if loop is not None]
+    if closed:
+        margins = [told for _, loop, told in loops if loop is not None]
+        yield from closed_loop_figures(closed, margins)
+    yield coherence_figure(sources)
+
+
+def _fitted(each: FrequencyFit, side: Side, masses: Masses) -> FittedResponse:
+    lines: list[tuple[str, Array, ComplexArray]] = []
+    fit = each.fits.get(side)
+    if fit is not None:
+        label = "rational function" + (", misfit" if fit.fit.misfit else "")
+        fine = np.geomspace(fit.fit.lowest, fit.fit.highest, FINE)
+        lines.append((label, fine, fit.fit.value(fine)))
+    place = masses.places.get(side)
+    if masses.drive is not None and masses.source is each.source and place is not None:
+        label = drive_name(masses.drive) + (", misfit" if masses.drive.misfit else "")
+        measured = each.source.responses[side]
+        first = max(masses.lowest, measured.frequency[0])
+        fine = np.geomspace(first, measured.frequency[-1], FINE)
+        lines.append((label, fine, masses.drive.value(fine, place)))
+    modes = [mode for mode in each.modes.get(side, ()) if mode.frequency.has_interval]
+    marks = tuple(Mark(f"{mode.frequency.value:.3g} Hz", x=mode.frequency.value) for mode in modes)
+    return FittedResponse(lines, marks, None if fit is None else fit.fit.value)

@@ -120,30 +120,23 @@ def _lines(predictions: Sequence[Prediction]) -> Table:
 
 
 def _outputs(validation: Validation) -> Table:
+    told = [("fitted", model.source, model, error) for model, error in validation.own]
+    told += [
+        ("unseen", each.source, each.model, each.output)
+        for each in validation.predictions
+        if each.output is not None
+    ]
     rows: list[dict[str, Any]] = [
         {
-            "data": "fitted",
-            "source": model.source.name,
+            "data": data,
+            "source": source.name,
             "side": model.side,
             "model": model.name,
             "lowest": model.lowest,
             "highest": model.highest,
             "error": error,
         }
-        for model, error in validation.own
-    ]
-    rows += [
-        {
-            "data": "unseen",
-            "source": each.source.name,
-            "side": each.model.side,
-            "model": each.model.name,
-            "lowest": each.model.lowest,
-            "highest": each.model.highest,
-            "error": each.output,
-        }
-        for each in validation.predictions
-        if each.output is not None
+        for data, source, model, error in told
     ]
     return Table(
         "output-error",

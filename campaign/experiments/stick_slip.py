@@ -7,7 +7,7 @@ spring because sliding friction is smaller, and sticks again (Figure 2.12).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -20,17 +20,18 @@ from campaign.estimation.intervals import of_repeats, shifted_by
 from campaign.estimation.sampled_curve import LOST, SAMPLES, bracketed, peak, upward_crossings
 from campaign.experiments.interface import Experiment, TestData, TrialData
 from campaign.experiments.shared.captions import amount, sentence, setting, trials_of
-from campaign.experiments.shared.common import COUNTED, failures_note
+from campaign.experiments.shared.common import COUNTED
 from campaign.experiments.shared.friction_models import (
     OF_ONE,
     ConditionGroup,
     combined,
     in_models,
+    model_label,
     model_series,
     places,
     simulated,
 )
-from campaign.experiments.stick_slip.stick_slip_map import HISTORIES, Measured, map_of
+from campaign.experiments.shared.swept_words import axis_of, name_of, words
 from campaign.options import Options
 from campaign.physics.bench import Bench
 from campaign.reason import Cause
@@ -154,7 +155,7 @@ def _period(between: Array, step: float) -> Estimate:
 def _analyse(data: TestData) -> Result:
     found = places(data.completed(), own=())
     if not found:
-        return Result(notes=failures_note(data))
+        return Result()
     measured = [(place, _shown(place)) for place in found]
     rows: list[dict[str, Cell]] = [
         {
@@ -194,18 +195,12 @@ def _analyse(data: TestData) -> Result:
     ]
     whose = few if len(few) <= HISTORIES else [f"{len(few)} of {len(measured)} pulls"]
     notes = (
-        *failures_note(data),
-        *(
-            f"{who}: fewer than three slips, so there is no period; pull longer, slower, or "
-            "through a softer spring."
-            for who in whose
-        ),
+        f"{who}: fewer than three slips, so there is no period; pull longer, slower, or through a "
+        "softer spring."
+        for who in whose
     )
-    drawn = map_of(measured, StickSlipOptions)
-    if drawn is not None:
-        return Result((table,), (drawn,), findings, notes)
-    figures = tuple(filter(None, (_figure(measured),)))
-    return Result((table,), figures, findings, notes)
+    drawn = map_of(measured, StickSlipOptions) or _figure(measured)
+    return Result((table,), tuple(filter(None, (drawn,))), findings, tuple(notes))
 
 
 def _count(slips: float) -> int | float | None:
@@ -293,6 +288,100 @@ def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
     times = f"slips {slips:g} times" if slips != 1 else "slips once"
     every = f", every {amount(period, 's')} after the first" if math.isfinite(period) else ""
     return sentence(f"{who}: it sticks, {times}{every}, and is then up to {top} fast")
+
+
+Measured = Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]
+"""What the pulls of each place show, by name."""
+SHORT = 0.1
+"""Of a pull, within which the load must first slip: a load that sticks again does so within twice
+that time, and a swing."""
+HISTORIES = 8
+"""So many pulls are drawn over time; of more with two swept numbers a map is drawn."""
+
+
+def _kind(found: Mapping[str, Estimate], place: ConditionGroup) -> str:
+    if math.isnan(found["rests"].value):
+        return "not determined"
+    if found["rests"].value > 1.0:
+        return "stick-slip"
+    early = found["first_slip"].value < SHORT * place.trials[0].trial.task.duration
+    return "smooth" if early else "pull too short"
+
+
+def _counts(measured: Measured) -> str:
+    """In how many pulls each model sticks and slips."""
+    kinds: dict[str, list[str]] = {}
+    for place, found in measured:
+        model = str(place.point.get("model", ""))
+        kinds.setdefault(model and f" ({model_label(model)})", []).append(_kind(found, place))
+    told = (f"{own.count('stick-slip')} of {len(own)} pulls{who}" for who, own in kinds.items())
+    return f"Stick-slip in {', '.join(told)}."
+
+
+def map_of(measured: Measured, options: type[Options]) -> Figure | None:
+    """Stick-slip over the two swept numbers with most values; None where there are few pulls.
+
+    Rests in several periods tell stick-slip from a swing that dies out.
+    """
+    swept: dict[str, set[float]] = {}
+    for place, _ in measured:
+        for path, value in place.point.items():
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                swept.setdefault(path, set()).add(value)
+    across = sorted((p for p in swept if len(swept[p]) > 1), key=lambda p: -len(swept[p]))[:2]
+    if len(measured) <= HISTORIES or len(across) < 2:
+        return None
+    trial = measured[0][0].trials[0].trial
+    x_axis, y_axis = (
+        replace(
+            axis_of(path, trial, options),
+            scale="log" if min(swept[path]) > 0.0 else "linear",
+            label=name_of(path.split(".")[-1]),
+        )
+        for path in across
+    )
+    panels: dict[str, list[tuple[str, float, float]]] = {}
+    for place, found in measured:
+        others = {path: value for path, value in place.point.items() if path not in across}
+        told = words(others, trial, options, frozenset(others))
+        title = ", ".join(reversed(list(told)))
+        x, y = (float(str(place.point[path])) for path in across)
+        panels.setdefault(title, []).append((_kind(found, place), x, y))
+    looks = {
+        "stick-slip": "measured",
+        "smooth": "alternative",
+        "pull too short": "reference",
+        "not determined": "none",
+    }
+    return Figure(
+        key="stick-slip",
+        title="Where a pulled load sticks and slips",
+        caption=f"{_counts(measured)} A mark for each pull: stick-slip where the load rests for "
+        "about a fifth of a period in two or more periods in a "
+        f"row, up to the last; too short where it first slips after {SHORT:.0%} of the pull.",
+        alt="Marks of stick-slip and of smooth sliding over two swept numbers.",
+        panels=tuple(
+            Panel(
+                x_axis,
+                y_axis,
+                [
+                    Curve(
+                        np.array([x for own, x, _ in points if own == kind]),
+                        np.array([y for own, _, y in points if own == kind]),
+                        kind,
+                        look,
+                        "points",
+                    )
+                    for kind, look in looks.items()
+                    if any(own == kind for own, _, _ in points)
+                ],
+                title,
+            )
+            for title, points in panels.items()
+        ),
+        across=min(3, len(panels)),
+        thesis=("2.12",),
+    )
 
 
 EXPERIMENT = Experiment(

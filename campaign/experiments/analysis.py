@@ -1,0 +1,264 @@
+"""From the trials of a test to its result: checks, metrics, the experiment's analysis, notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from campaign.axis_kind import BOTH_ROTARY, axis_terms, sides_in
+from campaign.channels import missing
+from campaign.errors import ArchiveError, UsageError
+from campaign.estimate import Estimate
+from campaign.experiments.interface import Experiment, TestData, TrialData
+from campaign.experiments.post_processing.axis_units import (
+    estimate_in_axis_terms,
+    in_axis_units,
+)
+from campaign.experiments.post_processing.draws import draws_of, merged
+from campaign.experiments.post_processing.key_numbers import key_numbers
+from campaign.experiments.post_processing.recording_checks import (
+    doubt,
+    doubted,
+    not_measured,
+    notes_on,
+)
+from campaign.experiments.post_processing.swept_tables import table_names
+from campaign.published.draws import SEED
+from campaign.reason import Cause
+from campaign.result import RecordingDoubt, Result
+from campaign.trial import canonical_json
+
+EMPTY = Result()
+TOO_LONG = Cause(
+    "too long",
+    "it has {samples:.3g} samples, more than the {most:.0e} that are looked at in one: cut it by "
+    "start and stop, or by each",
+)
+
+
+def suitable(experiment: Experiment, trials: Sequence[TrialData]) -> tuple[list[TrialData], str]:
+    """Of recorded trials, those that the experiment's model can use; where none, why."""
+    if experiment.model.suits is not None:
+        found, why = experiment.model.suits(trials)
+        return list(found), why
+    needed = experiment.requires.keys()
+    own = [t for t in trials if t.trial.kind == experiment.name and needed <= t.channel_names()]
+    channels = f" with {' and '.join(needed)}" if needed else ""
+    return own, "" if own else f"there is no trial of {experiment.name}{channels}"
+
+
+def result_of(experiment: Experiment, data: TestData) -> Result:
+    """What the analysis finds, with a note on every trial and channel that it had to do without.
+
+    Of a test that sweeps the seed of its bench's scatter each draw is analysed by itself. Metrics
+    of trials of other kinds, which a model may suit, are those of other analyses, and not used.
+    """
+    with axis_terms(sides_in(data.trials[0].trial.bench) if data.trials else BOTH_ROTARY):
+        draws = draws_of(item.trial for item in data.trials) if data.model is None else ()
+        result = in_axis_units(_result_of(experiment, data, draws))
+        chosen = key_numbers(result.findings, experiment.key_numbers, draws)
+        return replace(result, key_numbers=chosen)
+
+
+def _result_of(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> Result:
+    if data.model is not None:
+        data = replace(data, trials=tuple(_own(experiment, item) for item in data.trials))
+    doubted_of = [(item, _doubt(experiment, item)) for item in data.trials]
+    before = tuple(found for _, found in doubted_of if found)
+    usable = with_named_tables(
+        _without(data, [item for item, found in doubted_of if found and found.fatal])
+    )
+    result = EMPTY
+    if usable.trials or not data.trials:
+        result = _of_draws(experiment, usable, draws) if draws[1:] else analysed(experiment, usable)
+    doubts = (*result.doubts, *before)
+    notes = (
+        *_failures(experiment, data),
+        *result.notes,
+        *notes_on(doubts, len(data.trials)),
+        *_lacking(experiment, data),
+    )
+    return replace(result, notes=tuple(dict.fromkeys(notes)), doubts=doubts)
+
+
+def analysed(experiment: Experiment, data: TestData) -> Result:
+    """What an analysis finds; a trial that cannot be measured costs no more than itself.
+
+    Raises what the analysis raises, and ValueError where a model has no trial left.
+    """
+    good, doubts = _measured_trials(experiment, data)
+    if doubts and not any(good.completed()):
+        if data.model is not None:  # who asks for parameters is told why there are none
+            raise ValueError(doubts[0].reason.text)
+        return Result(doubts=doubts)
+    return replace(experiment.analyse(good), doubts=doubts)
+
+
+def _without(data: TestData, lost: Sequence[TrialData]) -> TestData:
+    """The same without some of its trials."""
+    gone = {id(item) for item in lost}
+    kept = tuple(item for item in data.trials if id(item) not in gone)
+    return replace(data, trials=kept, left_out=(*data.left_out, *(item.trial for item in lost)))
+
+
+def _measured_trials(
+    experiment: Experiment, data: TestData
+) -> tuple[TestData, tuple[RecordingDoubt, ...]]:
+    """The trials with their metrics, and why others cannot be measured.
+
+    A model that says which trials suit it measures them itself.
+    """
+    if experiment.measure is None or not _is_own(experiment, data):
+        return data, ()
+    doubts: list[RecordingDoubt] = []
+    lost: list[TrialData] = []
+    found: dict[int, TrialData] = {}
+    for item in data.completed():
+        if item.estimates:
+            continue
+        try:
+            estimates = tuple(map(estimate_in_axis_terms, experiment.measure(item)))
+            found[id(item)] = _Instead(item, item.trial.point, estimates)
+        except (ArchiveError, UsageError):
+            raise
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever it is, of one trial
+            doubts.append(not_measured(item.trial, error))
+            lost.append(item)
+    good = _without(data, lost)
+    trials = tuple(found.get(id(item), item) for item in good.trials)
+    return replace(good, trials=trials), tuple(doubts)
+
+
+def _is_own(experiment: Experiment, data: TestData) -> bool:
+    """Whether the trials are the experiment's own, and not those that suit its model."""
+    return data.model is None or experiment.model.suits is None
+
+
+def _failures(experiment: Experiment, data: TestData) -> Iterator[str]:
+    """A sentence when trials are missing from the analysis."""
+    failed = sum(item.ending.outcome != "completed" for item in data.trials)
+    if failed and _is_own(experiment, data) and not experiment.uses_failed:
+        yield (
+            f"{failed} of {len(data.trials)} trials did not complete and are not analysed; "
+            "the table of failed trials says why."
+        )
+
+
+def _lacking(experiment: Experiment, data: TestData) -> Iterator[str]:
+    """Channels that were not recorded, with what there is none of, and samples not kept."""
+    lacking: dict[str, None] = {}
+    for item in data.trials:
+        own = data.model is None or item.trial.kind == experiment.name
+        if own and item.trial.can_use and item.ending.outcome == "completed":
+            lacking |= dict.fromkeys(missing(item.trial.can_use, item.channel_names()))
+    for name in lacking:
+        yield f"Without {name}: no {lost_without(experiment, name)}."
+    if gone := sum(bool(item.not_kept) for item in data.trials):
+        yield f"Samples of {gone} of {len(data.trials)} trials were not kept."
+
+
+def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
+    """What a recording says by itself, of an experiment that measures.
+
+    Raises ValueError with a message for the user where it says nothing, or cannot.
+    """
+    wrong = _doubt(experiment, data)
+    if wrong and wrong.fatal:
+        raise ValueError(wrong.reason.text)
+    if experiment.measure is None:
+        return ()
+    with axis_terms(sides_in(data.trial.bench)):
+        return tuple(map(estimate_in_axis_terms, experiment.measure(data)))
+
+
+def lost_without(experiment: Experiment, name: str) -> str:
+    """What there is none of without a channel that the experiment can use."""
+    return experiment.can_use.get(name, "result that needs it")
+
+
+def _own(experiment: Experiment, data: TrialData) -> TrialData:
+    """The trial without the metrics of another experiment."""
+    if data.trial.kind == experiment.name or not data.estimates:
+        return data
+    return _Instead(data, data.trial.point, ())
+
+
+def _doubt(experiment: Experiment, data: TrialData) -> RecordingDoubt | None:
+    """Why a recording is not analysed; of one that is too long no sample is read to find out.
+
+    A model that suits trials of other kinds looks at them itself.
+    """
+    if data.trial.kind != experiment.name:
+        return None
+    most, task = experiment.most_samples, data.trial.task
+    samples = task.duration * task.sample_rate
+    if most is not None and samples > most:
+        return doubted(data.trial, TOO_LONG(samples=samples, most=most))
+    return doubt(data)
+
+
+def with_named_tables(data: TestData) -> TestData:
+    """The same, with a name in place of each swept value that is a table (`table_names`)."""
+    swept = [value for item in data.trials for value in item.trial.point.values()]
+    names = table_names(swept)
+    if not names:
+        return data
+
+    def named(point: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            path: names[canonical_json(value)] if isinstance(value, dict) else value
+            for path, value in point.items()
+        }
+
+    return _with_points(data, ((item, named(item.trial.point)) for item in data.trials))
+
+
+def _of_draws(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> Result:
+    """Each draw of a random bench, as if nothing but that draw had been executed."""
+    parts = {}
+    for seed in draws:
+        points = (
+            (item, {path: v for path, v in item.trial.point.items() if path != SEED})
+            for item in data.trials
+            if item.trial.point.get(SEED) == seed
+        )
+        lost = tuple(trial for trial in data.left_out if trial.point.get(SEED) == seed)
+        part = replace(_with_points(data, points), left_out=lost)
+        parts[seed] = _of_draw(experiment, part, seed)
+    return merged(parts)
+
+
+def _of_draw(experiment: Experiment, part: TestData, seed: Any) -> Result:
+    """What one draw found; one whose analysis fails costs no more than itself."""
+    if not part.trials:
+        return EMPTY
+    try:
+        return analysed(experiment, part)
+    except (ArchiveError, UsageError):
+        raise
+    except Exception as error:  # noqa: BLE001 - a fit may wander with one draw of many
+        told = f"{type(error).__name__}: {error}"
+        return Result(notes=(f"The draw of seed {seed} could not be analysed: {told}.",))
+
+
+def _with_points(data: TestData, moved: Iterable[tuple[TrialData, Mapping[str, Any]]]) -> TestData:
+    """These trials, each at another point of the sweep."""
+    return replace(data, trials=tuple(_Instead(*each) for each in moved))
+
+
+class _Instead:
+    """A trial told to be at another point of the sweep, or measured; all else is as it was."""
+
+    def __init__(
+        self,
+        data: TrialData,
+        point: Mapping[str, Any],
+        estimates: Sequence[Estimate] | None = None,
+    ) -> None:
+        self.trial = data.trial.model_copy(update={"point": dict(point)})
+        self.ending = data.ending
+        self.recording = data.recording
+        self.channel_names = data.channel_names
+        self.not_kept = data.not_kept
+        self.estimates = data.estimates if estimates is None else estimates

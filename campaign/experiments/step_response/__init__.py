@@ -1,1 +1,0 @@
-"""Step responses of the loop."""

@@ -1,1 +1,0 @@
-"""Stick-slip: a load pulled through a spring."""
