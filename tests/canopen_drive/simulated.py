@@ -352,20 +352,23 @@ class SimulatedDrive:
 
     def _ticks(self) -> None:
         while not self.closed:
-            time.sleep(TICK)
+            time.sleep(TICK)  # what it takes longer is a busy machine, and no silence
+            with self._lock:
+                timeout = (
+                    self.get(0x1016, 1) & 0xFFFF if 0x1016 in self.node.object_dictionary else 0
+                )
+                if self._beat is not None:
+                    self._beat += TICK * self.speed
+                    if timeout and self._beat > timeout * 1e-3:
+                        self._lost_heartbeat()
+                self._since_sync += TICK
             self._pass_time()
 
     def _pass_time(self) -> None:
+        """Of the axis, up to now, while no SYNC moves it."""
         with self._lock:
             now = time.monotonic()
-            passed = min(now - self._then, 4 * TICK)  # a busy machine is no silence
-            self._then = now
-            timeout = self.get(0x1016, 1) & 0xFFFF if 0x1016 in self.node.object_dictionary else 0
-            if self._beat is not None:
-                self._beat += passed * self.speed
-                if timeout and self._beat > timeout * 1e-3:
-                    self._lost_heartbeat()
-            self._since_sync += passed
+            passed, self._then = min(now - self._then, 4 * TICK), now
             if self.state != "enabled":
                 self._advance(passed * self.speed)
             elif self._since_sync > NO_SYNC:

@@ -12,6 +12,7 @@ import pytest
 
 from campaign.backends.canopen import BACKEND
 from campaign.canopen_drive import objects as od
+from campaign.canopen_drive import proof
 from campaign.canopen_drive.address import address_of
 from campaign.canopen_drive.drive import Drive, DriveError
 from campaign.canopen_drive.line import Latch
@@ -69,7 +70,7 @@ def test_an_emergency_message_ends_the_trial_as_the_fault_that_it_names(
     code: int, fault: Fault, drives: Make
 ) -> None:
     name, drive = drives()
-    ending = ended(name, drive, lambda: drive.fail(code), late=30.0)
+    ending = ended(name, drive, lambda: drive.fail(code), late=3.0)
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, fault)
     assert f"{code:04X}h" in ending.reason
     assert ending.safe_state is SafeState.CONFIRMED
@@ -94,7 +95,7 @@ def test_a_lost_answer_to_sync_is_marked_and_ends_the_trial(drives: Make) -> Non
     def lose() -> None:
         drive.quirks["frames"] = lambda syncs: 0
 
-    ending = ended(name, drive, lose, late=30.0)
+    ending = ended(name, drive, lose, late=3.0)
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.LOST_SAMPLES)
     assert ending.safe_state is SafeState.CONFIRMED
 
@@ -117,7 +118,7 @@ def test_a_drive_that_starts_anew_ends_the_trial(drives: Make) -> None:
         drive.become("switch on disabled")
         drive.network.send_message(0x700 + 5, b"\0")
 
-    ending = ended(name, drive, reboot, late=30.0)
+    ending = ended(name, drive, reboot, late=3.0)
     assert (ending.outcome, ending.fault) == (Outcome.FAULT, Fault.RESET)
 
 
@@ -240,7 +241,10 @@ def test_another_gear_of_the_bench_is_another_scale_to_confirm(drives: Make) -> 
 
 
 @pytest.mark.slow
-def test_a_drive_that_goes_on_without_a_heartbeat_is_refused(drives: Make) -> None:
+def test_a_drive_that_goes_on_without_a_heartbeat_is_refused(
+    drives: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proof, "REACTION", 0.0)
     name, drive = drives(**{"no reaction": True})
     refused(name, drive, "heartbeat fell silent")
 

@@ -26,16 +26,12 @@ def stop_outside(name: str) -> None:
 
 def check(name: str, speed: float) -> None:
     bus, bad = channel(), channel()
-    long = name.startswith(("stops_", "keeps_a_stop"))
     with SimulatedDrive(bus, speed=speed) as drive, SimulatedDrive(bad, speed=speed) as failing:
         failing.on_sync = lambda count: failing.fail(0x2310) if failing.syncs == 150 else None
-        possible = LONG if long else trial()
-        if name == "keeps_a_stop_from_outside":
-            possible = trial()
         CHECKS[name](
             BackendUnderTest(
                 open=lambda: backend(bus, heartbeat=5.0 if speed > 1.0 else 2.0),
-                possible=possible,
+                possible=LONG if name == "stops_in_mid_trial" else trial(),
                 impossible=SWUNG,
                 names="task.base_acceleration",
                 failing=lambda: backend(bad),

@@ -111,7 +111,7 @@ def test_a_killed_relay_is_followed_by_a_stop(state_folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_pulled_cable_is_the_drives_own_business() -> None:
-    with rig() as (drive, hub), host(hub, drive, late=5.0, safe_time=1.0) as process:
+    with rig() as (drive, hub), host(hub, drive, late=2.0, safe_time=1.0) as process:
         since = len(drive.log)
         hub.fate = cut
         stays_off(drive, since)
@@ -158,7 +158,7 @@ CASES = (
 @pytest.mark.slow
 def test_a_lost_or_doubled_frame_is_no_other_sample(fast: float) -> None:
     """SYNC, and an answer to it, once samples have come."""
-    with rig(fast) as (drive, hub), connected(hub, late=20.0) as backend:
+    with rig(fast) as (drive, hub), connected(hub, late=2.0) as backend:
         for cob, copies, outcome in CASES:
             recorder, left = MemoryRecorder(), [1]
             hub.fate = partial(_harm, recorder, left, cob, copies)
