@@ -302,11 +302,11 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
     assert answer.remarks == (remark,)
     with axis_terms(DIRECT):
         assert list(remarks(table)) == [remark]
-        assert systematic(found) == "force constant unknown"
+        assert systematic(found, "N") == "force constant unknown"
         assert "; largest systematic part: force constant" in _bias(
             "f", np.array([1.0, 2.0, 3.0]), "torque constant"
         )
-    assert systematic(found) == "torque constant unknown"
+    assert systematic(found, "N") == "torque constant unknown"
 
 
 def test_axis_terms_end_with_their_block() -> None:

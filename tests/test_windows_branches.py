@@ -67,10 +67,11 @@ def test_a_run_is_locked_by_msvcrt(
 
 
 def test_a_stop_is_kept_in_its_file(on_windows: Any, tmp_path: Path) -> None:
+    on_windows("archive.layout.files")
     latch = on_windows("device.latch")
-    stop = latch.Stop(latched=True, count=3, by="a host")
-    latch._write(tmp_path / "latch.json", stop)
-    assert latch._read(tmp_path / "latch.json").count == 3
+    memory = latch.LatchMemory(tmp_path / "latch.json", boot=3)
+    assert memory.set(session=1, by="a host")
+    assert latch._read(tmp_path / "latch.json") == memory.stop
 
 
 @pytest.mark.parametrize(

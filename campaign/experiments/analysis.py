@@ -74,8 +74,8 @@ def _result_of(experiment: Experiment, data: TestData, draws: Sequence[Any]) -> 
         result = _of_draws(experiment, usable, draws) if draws[1:] else analysed(experiment, usable)
     doubts = (*result.doubts, *before)
     notes = (
-        *_failures(experiment, data),
         *result.notes,
+        *_failures(experiment, data),
         *notes_on(doubts, len(data.trials)),
         *_lacking(experiment, data),
     )

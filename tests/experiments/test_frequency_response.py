@@ -303,4 +303,4 @@ def test_a_response_of_fewer_than_three_counts_is_none() -> None:
     with pytest.raises(ValueError, match="below 3 counts"):
         _point(done[1])
     notes = " ".join(analyse(KIND, done).notes)
-    assert "frequency=40]: its response is below 3 counts" in notes
+    assert "frequency=40 Hz]: its response is below 3 counts" in notes

@@ -245,7 +245,9 @@ class _Trials:
         return LazyTrials(outlines, partial(self._again, kept)), before
 
     def _again(self, kept: Mapping[int, TrialFinished], number: int) -> ArchivedTrial:
-        return self._archived(entry_name(number), kept[number])
+        entry = entry_name(number)
+        with safe_hdf5.guarded(self.path, f"/{entry}"):
+            return self._archived(entry, kept[number])
 
     def _told(self) -> list[TrialFinished]:
         """Every finished attempt that the journal tells of; the index makes up for lost lines."""
@@ -262,11 +264,10 @@ class _Trials:
         trees: Trees = self.trees
         if (line := self.lines.get(told.record)) is not None:
             record = parse_record(self.path, f"/{entry}", line)
+            check_identity(self.path, entry, record, told)
         if line is None or not record.tree_names <= trees.keys():
             with safe_hdf5.open_file(self.path) as file:
-                record, trees = read_entry(self.path, file, entry, told.record)
-        if (record.number, record.attempt) != (told.trial, told.attempt):
-            raise ArchiveError(f"{self.path}: /{entry}: is not the trial that the journal names")
+                record, trees = read_entry(self.path, file, entry, told)
         # Where its samples are there, whatever is said of them, they are held against the record.
         not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
         if entry not in self.groups and not not_kept:
@@ -293,13 +294,23 @@ def _as_finished(record: TrialRecord) -> TrialFinished:
     )
 
 
-def read_entry(path: Path, file: h5py.File, name: str, digest: str) -> tuple[TrialRecord, Trees]:
+def check_identity(path: Path, entry: str, record: TrialRecord, told: TrialFinished) -> None:
+    """ArchiveError unless a record is of the trial and attempt that the journal names."""
+    if (record.number, record.attempt) != (told.trial, told.attempt):
+        raise ArchiveError(f"{path}: /{entry}: is not the trial that the journal names")
+
+
+def read_entry(
+    path: Path, file: h5py.File, name: str, told: TrialFinished
+) -> tuple[TrialRecord, Trees]:
     """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
     with safe_hdf5.guarded(path, f"/{name}"):
         entry = safe_hdf5.inner_group(file, name)
         kept = safe_hdf5.inner_group(entry, "record")
         record, trees = (safe_hdf5.unchecked_text_at(kept, text) for text in ("json", "trees"))
-        return packed_record(path, name, PackedTrial(record=record, trees=trees), digest)
+        found = packed_record(path, name, PackedTrial(record=record, trees=trees), told.record)
+        check_identity(path, name, found[0], told)
+        return found
 
 
 def read_not_kept(texts: SealedTexts) -> dict[str, str]:

@@ -111,7 +111,7 @@ class EntryCheck:
         self.unreadable.add(entry)
         with self.problems.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
             group = safe_hdf5.group_at(file, entry, "NXentry")
-            record, trees = read_entry(self.path, file, entry, finished.record)
+            record, trees = read_entry(self.path, file, entry, finished)
             self.datasets += 1
             self._record(f"/{entry}", entry, record, trees)
             self._says(group, record)
