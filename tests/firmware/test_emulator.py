@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import json
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -180,7 +182,7 @@ class Pair:
         self.file = None if past == "forgetful" else folder / f"latch-{next(PLACES)}"
         if self.file is not None:
             stop = memory.Stop(True, 3, wire.LatchCause.STOPPED, "ada") if past else memory.Stop()
-            memory._write(self.file, stop)
+            self.file.write_text(json.dumps(asdict(stop)), encoding="utf-8")
         self.python = Rehearsal(console, self.file)
 
     def send(self, kind: int, body: bytes, turn: str) -> None:
@@ -234,18 +236,16 @@ class Breakable:
     works = True
 
     @classmethod
-    def write(cls, write, file: Path, stop: memory.Stop) -> None:
+    def write(cls, file: Path, text: str) -> None:
         if not cls.works:
             raise OSError(28, "no space left on device")
-        write(file, stop)
+        file.write_text(text, encoding="utf-8")
 
 
 @pytest.fixture
 def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
     """What keeps the controller from simulating a trial, and from random numbers."""
-    write = memory._write
-    monkeypatch.setattr(memory.os, "fsync", lambda file: None)
-    monkeypatch.setattr(memory, "_write", lambda file, stop: Breakable.write(write, file, stop))
+    monkeypatch.setattr(memory, "write_atomically", Breakable.write)
     armed = SimpleNamespace(task=SimpleNamespace(sample_rate=1000.0))
     monkeypatch.setattr(rehearsal, "make_trial", lambda bench, parameters: armed)
     monkeypatch.setattr(rehearsal, "secrets", Boots)

@@ -42,7 +42,7 @@ def test_every_loop_and_every_fact_of_a_shipped_bench(
     assert lines[-1] == "Bode picture: platform-check.svg"
     picture = ET.parse(tmp_path / "platform-check.svg").getroot()
     texts = {element.text for element in picture.iter() if element.text}
-    assert {"Magnitude of L (dB)", "Phase of L (deg)", "Frequency (Hz)", "observer"} <= texts
+    assert {"Magnitude of L (dB)", "Phase of L (°)", "Frequency (Hz)", "observer"} <= texts
 
 
 @pytest.mark.slow

@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from campaign.archive import open_run
-from tests.system.test_ctrl_c import started
-from tests.system.user import campaign, command, environment, write
+from tests.forks import Begun
+from tests.system.user import Process, campaign, command, environment, forks, write
 
 AWK = shutil.which("awk")
 RIG = Path(__file__).with_name("rig.awk")
@@ -84,7 +84,7 @@ def play(attempt: Path, fault: str = "") -> None:
     (returned / "done").touch()
 
 
-def waited_for(path: Path, run: subprocess.Popen[str]) -> Path:
+def waited_for(path: Path, run: Process) -> Path:
     end = time.monotonic() + WAITING
     while not path.exists():
         assert run.poll() is None, run.communicate()
@@ -198,7 +198,7 @@ def test_a_plan_says_what_no_rig_can_do_and_writes_nothing(tmp_path: Path) -> No
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_ctrl_c_ends_the_wait_and_the_run_goes_on_later(tmp_path: Path) -> None:
     write(tmp_path, PROTOCOL)
-    process = started(tmp_path, *BY_HAND)
+    process = Begun(forks(), tmp_path, "run", "protocol.toml", *BY_HAND, environment=environment())
     waited_for(tmp_path / "out" / "trial-00004" / "manifest.json", process)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=WAITING)
