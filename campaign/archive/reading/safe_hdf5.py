@@ -169,7 +169,7 @@ def _raw_text(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, bytes]:
     dataset = _text_id(parent, name)
     value = np.empty((), dtype=dataset.dtype)
     dataset.read(h5s.ALL, h5s.ALL, value)
-    return dataset, bytes(value[()])
+    return dataset, value.tobytes().rstrip(b"\0")  # one copy: an index may be large
 
 
 def _text_id(parent: h5py.Group, name: str) -> h5d.DatasetID:
