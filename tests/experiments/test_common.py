@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from campaign.estimate import Estimate
 from campaign.experiments.shared.common import with_changes
+from campaign.experiments.shared.friction_models import resolved
 from campaign.physics.bench import Bench
 
 BENCHES = Path(__file__).parents[2] / "protocols" / "benches"
@@ -47,3 +49,12 @@ def test_an_unknown_path_names_the_nearest(bench: Bench, path: str, said: str) -
 def test_a_value_the_bench_refuses_says_where(bench: Bench) -> None:
     with pytest.raises(ValueError, match=r"load.*coulomb_torque: Input should be greater than 0"):
         with_changes(bench, {"friction.load.coulomb_torque": -1.0})
+
+
+def test_a_difference_no_larger_than_the_engine_s_error_is_0_and_says_so() -> None:
+    width = Estimate("friction_lag_width", -1e-3, "N m", -1.1e-3, -0.9e-3, 0.95, "m")
+    assert resolved(width, 1.0) is width  # the engine's error is 2e-4 of the friction
+    found = resolved(width, 10.0)
+    assert (found.value, found.low, found.high) == (0.0, None, None)
+    assert found.reason.code == "not resolved by the simulation"
+    assert "0.002" in found.reason.text

@@ -69,6 +69,8 @@ def test_measured_beside_theory(done) -> None:
     assert any("Stable at every gain" in note for note in result.notes)
     limit = finding(result, "unstable_corner_frequency").estimate
     assert (limit.kind, limit.value) == ("at least", 8.0)
+    own = next(row for row in rows if row["corner"] == pytest.approx(4.0))
+    assert finding(result, "stabilization_error").value == own["error"]
 
 
 def test_every_number_has_an_interval_or_a_reason_and_repeats_count(done) -> None:
