@@ -260,6 +260,20 @@ def test_a_record_that_is_none_costs_only_its_trial(sealed, text):
     only_the_first_is_refused(sealed)
 
 
+def test_verifying_names_each_forged_record_of_trials_without_samples(sealed):
+    entries = ("trial_00001", "trial_00002")
+    with h5py.File(sealed, "r+") as file:
+        for entry in entries:
+            change_record(file, entry, lambda record: record.update({"channels": 1.5}))
+        for entry in entries:
+            del file[entry]
+        put_text(file, "run/not_kept/type", "application/json")
+        put_text(file, "run/not_kept/file_name", "not-kept.json")
+        put_text(file, "run/not_kept/data", json.dumps(dict.fromkeys(entries, "no room")))
+    for entry in entries:
+        placed(sealed, f"/{entry}: channels: ")
+
+
 def test_a_text_is_held_against_the_seal_whatever_its_own_checksum_says(sealed):
     with h5py.File(sealed, "r+") as file:
         for place in ("run/provenance/notes", "run/source_001/data"):

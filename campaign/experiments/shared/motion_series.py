@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Literal, Self
 
@@ -64,9 +65,9 @@ class SeriesFile(Options):
     """Header of the value column."""
 
     @property
+    @abstractmethod
     def quantity(self) -> Quantity:
         """What the values are. Raises ValueError naming the units there are."""
-        raise NotImplementedError
 
     @model_validator(mode="after")
     def _readable(self, info: ValidationInfo) -> Self:
