@@ -119,6 +119,8 @@ def test_a_name_means_the_file_then_the_one_in_protocols_then_the_shipped_one(
     assert capsys.readouterr().err == ""  # a path says itself which file it is
     with pytest.raises(UsageError, match=r"no such file.*did you mean 'quickstart'"):
         find_protocol("elsewhere/quickstarts.toml")
+    with pytest.raises(UsageError, match=r"^ramp\.csv: no such file$"):  # names no protocol
+        find_protocol("ramp.csv")
 
 
 def test_without_a_terminal_a_table_is_tab_separated_and_one_line_per_row(capsys):

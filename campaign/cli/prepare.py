@@ -281,6 +281,8 @@ def find_protocol(text: str) -> Path:
             return found
     if path.exists():
         return path  # a folder: whoever reads it says so
+    if path.suffix not in ("", ".toml"):
+        raise UsageError(f"{text}: no such file")
     names = shipped_protocols()
     hint = nearest(path.stem, names) or f"; shipped are {', '.join(names)}"
     raise UsageError(f"{text}: no such file, and no protocol of that name{hint}")
