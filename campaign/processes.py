@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import multiprocessing
 import os
 import pickle
@@ -89,8 +91,24 @@ def initialize_worker() -> None:
     """First call in a worker: it ignores Ctrl-C and exits with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise_gc_threshold()
+    keep_freed_memory()
     sys.stdout = sys.stderr  # prints of a plug-in
     threading.Thread(target=_exit_with_parent, daemon=True).start()
+
+
+def keep_freed_memory() -> None:
+    """Do not return memory of arrays to the system: the next trial needs as much.
+
+    Returned and taken again, each page is zeroed: a tenth of the processor time of a trial without
+    samples. For the GNU C library; elsewhere nothing changes.
+    """
+    with contextlib.suppress(AttributeError, TypeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, 1 << 25)  # no more is allowed everywhere
+        mallopt(_TRIM_THRESHOLD, 1 << 30)
+
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # malloc.h; bytes
 
 
 def _exit_with_parent() -> None:

@@ -165,8 +165,8 @@ def _first_violation(watch: LimitWatch, time: Array, block: Array) -> tuple[int,
     Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
     Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
     """
-    bad = ~np.isfinite(block).all(axis=0)
-    first = int(np.argmax(bad)) if bad.any() else len(time)
+    finite = np.isfinite(block)
+    first = len(time) if finite.all() else int(np.argmin(finite.all(axis=0)))
     violation = watch.look(time[:first], block[:, :first])
     if violation is not None:  # the offending sample is kept: it is the evidence
         return violation.index + 1, Ending(Outcome.LIMIT, violation.text)

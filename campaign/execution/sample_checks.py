@@ -153,10 +153,10 @@ def wrong_time(task: Task, first: int, time: Array) -> tuple[int, Verdict] | Non
 
 def undefined(names: Sequence[str], time: Array, block: Array) -> tuple[int, Verdict] | None:
     """The first sample that is infinite or no number in any channel."""
-    bad = ~np.isfinite(block).all(axis=0)
-    if not bad.any():
+    finite = np.isfinite(block)
+    if finite.all():
         return None
-    index = int(np.argmax(bad))
+    index = int(np.argmin(finite.all(axis=0)))
     row = int(np.argmax(~np.isfinite(block[:, index])))
     reason = f"{names[row]} is {block[row, index]} at {time[index]:.4g} s"
     return index, Verdict("undefined", Outcome.DIVERGED, reason, float(time[index]))

@@ -139,6 +139,8 @@ class LimitWatch:
             values, beyond = block[row], bound
             if watched.limit == "rate":
                 values, beyond = self._sums(values, bound)
+            if _within(values[:first], beyond):
+                continue
             broken = np.abs(values[:first]) > beyond
             if broken.any():
                 first = int(np.argmax(broken))
@@ -155,14 +157,18 @@ class LimitWatch:
         self._seen += count
 
     def _sums(self, rates: Array, bound: float) -> tuple[Array, float]:
-        """Of the last n rates, at each of them; and what their magnitude must not pass."""
-        rates = np.where(np.isnan(rates), 0.0, rates)
+        """Of the last n rates, at each of them; and what their magnitude must not pass.
+
+        None where no rate is beyond `bound`: then no mean is.
+        """
         count, since = self._count, self._seen % self._count
-        joined = np.concatenate([self._rates, rates])
-        self._remember(joined, len(rates))
         beyond = bound * count * (1.0 + ROUNDING)
-        if not np.any(np.abs(joined) > bound):  # then no mean is
-            return np.zeros_like(rates), beyond
+        joined = np.concatenate([self._rates, rates])
+        if _within(joined, bound):
+            self._remember(joined, len(rates))
+            return rates[:0], beyond
+        joined = np.where(np.isnan(joined), 0.0, joined)
+        self._remember(joined, len(rates))
         windows = np.zeros((-(-len(joined) // count), count))
         windows.ravel()[: len(joined)] = joined
         with np.errstate(over="ignore", invalid="ignore"):
@@ -193,3 +199,9 @@ class LimitWatch:
             f"{watched.channel} reached {shown}{mean} at {time:.4g} s; "
             f"the {in_axis_terms(watched.limit)} limit is {limit}"
         )
+
+
+def _within(values: Array, bound: float) -> bool:
+    """Whether all are at most `bound` either way, none undefined; faster than by magnitudes."""
+    low, high = np.min(values, initial=0.0), np.max(values, initial=0.0)
+    return bool(-bound <= low and high <= bound)

@@ -194,7 +194,10 @@ def test_without_samples_nobody_looks(tmp_path: Path, kit) -> None:
     writer.close()
 
 
-def test_samples_that_are_not_kept_are_measured_before_they_go(tmp_path: Path, kit) -> None:
+@pytest.mark.parametrize("seconds", [5.0, 50.0])  # planned: 5000 samples, more than come
+def test_samples_that_are_not_kept_are_measured_before_they_go(
+    tmp_path: Path, kit, seconds: float
+) -> None:
     time, block = kit.samples(9000)  # more than one chunk
     read = []
 
@@ -203,7 +206,10 @@ def test_samples_that_are_not_kept_are_measured_before_they_go(tmp_path: Path, k
         return FOUND
 
     writer = begun(tmp_path, kit)
-    dropped = kit.started(writer, kit.trial(1), (), kit.CHANNELS, SampleRetention("none"))
+    trial = kit.trial(1)
+    task = trial.task.model_copy(update={"duration": seconds})
+    trial = trial.model_copy(update={"task": task})
+    dropped = kit.started(writer, trial, (), kit.CHANNELS, SampleRetention("none"))
     for part in (slice(0, 4000), slice(4000, 9000)):
         dropped.append(time[part], block[:, part])
     dropped.finish(Ending(Outcome.COMPLETED), kit.STARTED, kit.ENDED)

@@ -93,7 +93,7 @@ class SampleColumns:
     def __init__(self, names: Sequence[str], file: PackedFile, chunk: int = CHUNK) -> None:
         self._file = file
         self._names = tuple(names)
-        self._buffer = np.zeros((len(names), chunk), dtype=SAMPLE)
+        self._buffer = np.empty((len(names), chunk), dtype=SAMPLE)
         self._filled = 0
         self._written = 0
         self._places: list[list[Place]] = [[] for _ in names]

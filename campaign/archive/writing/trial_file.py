@@ -91,7 +91,8 @@ class TrialFile:
         self._channels: tuple[ChannelInfo, ...] = ()
         self._shown = 0
         self._columns: SampleColumns | None = None
-        self._held: list[Array] = []  # blocks, of a trial whose end decides what is kept
+        self._held = np.empty((0, 0))  # rows of a trial whose end decides what is kept
+        self._count = 0  # of samples in it
         self._preview = Preview()
         self._events: list[Event] = []
         self._whole: Array | None = None  # a recording that was one chunk
@@ -109,6 +110,7 @@ class TrialFile:
         names = [channel.name for channel in channels]
         self._shown = names.index(Aim.of(self._trial.task, self._trial.requires).channel(names))
         self._columns = SampleColumns((TIME.name, *names), self._file)
+        self._held = np.empty((1 + len(names), 0))
 
     def append(self, time: Array, block: Array) -> None:
         """Add samples: `time` (n,) in s, `block` (channels, n); ArchiveError on a full disk."""
@@ -120,7 +122,7 @@ class TrialFile:
                 f"{time.shape} and {len(self._channels)} channels"
             )
         if self._rule is not None:
-            self._held.append(np.vstack([time, block]))
+            self._hold(time, block)
             return
         self._put(self._columns, [time, *block])
 
@@ -212,11 +214,20 @@ class TrialFile:
             for chunk in columns.append(rows):
                 self._add_to_preview(chunk)
 
+    def _hold(self, time: Array, block: Array) -> None:
+        """Keep samples in memory until the trial ends; room for all of them is made at once."""
+        start, self._count = self._count, self._count + len(time)
+        if self._count > self._held.shape[1]:
+            planned = math.ceil(self._trial.task.duration * self._trial.task.sample_rate) + 1
+            room = np.empty((1 + len(block), max(planned, 2 * start, self._count)))
+            room[:, :start] = self._held[:, :start]
+            self._held = room
+        self._held[0, start : self._count] = time
+        self._held[1:, start : self._count] = block
+
     def _put_held(self, columns: SampleColumns) -> None:
         """Write what waited for the trial's end, unless only its digests are wanted."""
-        nothing = np.empty((1 + len(self._channels), 0))
-        self._whole = np.concatenate([nothing, *self._held], axis=1)
-        self._held.clear()
+        self._whole = self._held[:, : self._count]
         if not self._not_kept:
             self._put(columns, list(self._whole))
 
