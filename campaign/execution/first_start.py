@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
 
+from campaign.gc_threshold import raise_gc_threshold
 from campaign.physics.complete import CompleteBench, complete
 from campaign.physics.machine_code import (
     WIDTHS,
@@ -165,6 +166,7 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
+    raise_gc_threshold()  # a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a word
     threading.Thread(target=_end_with_parent, daemon=True).start()
     for line in _lines(int(sys.argv[1]), *sys.argv[2:]):
