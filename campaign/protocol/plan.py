@@ -186,7 +186,7 @@ def make_plan(
         raise ProtocolError(problems)
     for test, expanded in zip(chosen, expansions, strict=True):
         try:
-            own = [LimitUse(t.number, margin) for t, margin in _all_margins(expanded)]
+            own = list(_limit_uses(expanded))
         except IncompleteBenchError as error:
             problems += incomplete(test, error).problems
             continue
@@ -267,15 +267,19 @@ def _size_of_stages(plan: Plan) -> int:
     return most.samples * BYTES + most.trials * each
 
 
-def _all_margins(expanded: ExpandedTest) -> Iterator[tuple[Trial, Margin]]:
+def _limit_uses(expanded: ExpandedTest) -> Iterator[LimitUse]:
+    """Of trials with one bench and task the first one's, and of each all that break a limit."""
     known: dict[tuple[int, Task], tuple[Margin, ...]] = {}
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
         if trial.recording:  # it has been executed, and broke what it broke
             continue
         key = (id(bench), trial.task)
-        if key not in known:
+        first = key not in known
+        if first:
             known[key] = (*margins(bench, trial.task), *resolution_margins(bench, trial.task))
-        yield from ((trial, margin) for margin in known[key])
+        for margin in known[key]:
+            if first or margin.broken:
+                yield LimitUse(trial.number, margin)
 
 
 def _planned(
