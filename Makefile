@@ -32,8 +32,9 @@ demo: $(VENV)/installed
 # Files stay whole, for what their tests share, in the order that tests/conftest.py gives them.
 # A worker that died is not replaced: pytest-xdist would wait for ever for the rest of its file.
 # A test that hangs tells where after 20 minutes, and ends its worker.
-# A process of each core with as many threads of its own would wait for each other.
-PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --max-worker-restart 0
+# A process of each core with as many threads of its own would wait for each other. Byte code is kept:
+# half of what a worker needs until its first test is compiling.
+PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --max-worker-restart 0
 WHOLE_FILES = --dist loadfile --no-loadscope-reorder
 HANGING = -o faulthandler_timeout=1200 -o faulthandler_exit_on_timeout=true
 

@@ -14,6 +14,8 @@ from typing import Any
 import hypothesis
 import pytest
 
+from campaign.gc_threshold import raise_gc_threshold
+
 # Nothing here may need a display, and what a terminal looks like must not depend on the machine.
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line has it
@@ -41,7 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The time starts now."""
+    """The time starts now, and garbage is collected as seldom as in a run of the program."""
+    raise_gc_threshold()
     config.stash[ENDS] = time.monotonic() + 60.0 * (config.getoption("--minutes") or 0.0)
 
 
