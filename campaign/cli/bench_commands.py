@@ -210,7 +210,7 @@ def device(
         Path | None, option("--log", "FILE", "Note drive, stops and hosts there.")
     ] = None,
 ) -> Ended:
-    """Be a servo controller with a simulated bench, to rehearse against; Ctrl-C ends it."""
+    """Emulate a servo controller with a simulated bench; Ctrl-C ends it."""
     from campaign.cli.device import run_device
 
     return run_device(

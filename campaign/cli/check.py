@@ -123,7 +123,7 @@ def _write_picture(bench: CompleteBench, path: Path) -> None:
 
 def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> None:
     print_line(f"{bench.name}{f': {bench.description}' if bench.description else ''}")
-    print_line(", ".join(_counted([*loops, *facts])))
+    print_line("; ".join(_counted([*loops, *facts])))
     print_line()
     if loops:
         spare = ("slowest decay", "delay margin", "least damped", "crossover")
@@ -141,7 +141,7 @@ def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> N
 
 
 def _counted(checked: Sequence[CheckedLoop | Fact]) -> Iterator[str]:
-    """How many have which verdict: `9 fine, 3 low margin`."""
+    """How many have which verdict: `9 fine`, `3 low margin`."""
     for verdict, count in Counter(each.verdict for each in checked).items():
         yield f"{count} {verdict}"
 

@@ -69,8 +69,8 @@ def _serve(
             if hasattr(signal, name):  # Windows has no SIGHUP
                 signal.signal(getattr(signal, name), _interrupt)
         print_line(line.name)
-        print_note(f"rehearsing {setup.bench.name!r}; Ctrl-C ends it")
-        print_note(f"its latch is in {setup.latch_file or 'no memory that lasts'}")
+        print_note(f"emulating the controller of {setup.bench.name!r}; Ctrl-C ends it")
+        print_note(f"panic stops are kept in {setup.latch_file or 'no file'}")
         server.serve()
     except KeyboardInterrupt:
         pass  # how a rehearsal ends

@@ -32,5 +32,5 @@ def export_archive(
     folder = output or run.path.with_name(f"{run.path.stem}-{to}")
     exported = export_run(run, kinds[to], folder, tests, trials)
     code = say_damaged(run.path, exported.damaged)
-    print_note(f"{exported.files} recordings written")
+    print_note(f"recordings written: {exported.files}")
     return exported.folder, code

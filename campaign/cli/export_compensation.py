@@ -42,7 +42,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
     low = [each.verdict for each in _loops(made.bench, name) if each.verdict != "fine"]
     if low:
         print_note(
-            f"of its loops {len(low)} are not fine: {', '.join(dict.fromkeys(low))}", "yellow"
+            f"of its loops {len(low)} are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
         )
     return [output / file for file in texts]
 

@@ -89,7 +89,7 @@ def _print(
         print_line(plan.protocol.title)
     archive = results / f"{new_run_name(results, prepared.path.stem, datetime.now(UTC))}.nxs"
     print_line(
-        f"{len(plan.trials)} trials, {clock(plan.duration)} of bench time; backend "
+        f"{_trials(len(plan.trials))}, {clock(plan.duration)} of bench time; backend "
         f"{prepared.kind.name}; would write {archive}, at most {bytes_text(plan.size)}"
     )
     if (most := plan.following).trials:
@@ -114,8 +114,11 @@ def _print(
 
 def in_short(most: Most) -> str:
     """E.g. `at most 14 trials, 0:42 of bench time`."""
-    trials = "1 trial" if most.trials == 1 else f"{most.trials} trials"
-    return f"at most {trials}, {clock(most.duration)} of bench time"
+    return f"at most {_trials(most.trials)}, {clock(most.duration)} of bench time"
+
+
+def _trials(count: int) -> str:
+    return "1 trial" if count == 1 else f"{count} trials"
 
 
 def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:

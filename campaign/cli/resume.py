@@ -87,6 +87,8 @@ def resume_run(
     guardian = under_guardian(find_backend(run.header.backend))
     read = say_damaged(path, run.damaged)
     check_resumable(run)
+    if run.first_stage:
+        run.full_plan.trial(1)  # the sealed file needs it: if it is damaged, nothing is executed
     with compiling_meanwhile(run.header.backend) as compiling:
         remade = remake(run, port)
         _check_truth(run, remade.trials)
@@ -239,7 +241,9 @@ def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:
 def _check_changes(run: RunReader, changes: Sequence[str], *, accepted: bool) -> None:
     if not changes:
         return
-    text = f"{run.name}: not everything is as it was when the run began:\n{listed(changes)}"
+    text = f"{run.name}: changed since the start of the run (SI units):\n{listed(changes)}"
     if not accepted:
-        raise UsageError(f"{text}\n--accept-changes goes on all the same, with what it is today")
+        raise UsageError(
+            f"{text}\n--accept-changes continues with the new values, and archives that"
+        )
     print_warning(text)

@@ -122,7 +122,7 @@ class PlainDisplay:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._test = ""
+        self._begun: set[str] = set()
         self._printed = time.monotonic()
         self._patience: threading.Timer | None = None
 
@@ -137,8 +137,8 @@ class PlainDisplay:
             return
         test = current_test(progress)
         due = time.monotonic() - self._printed >= PLAIN_INTERVAL
-        if test and (test != self._test or due or not progress.left):
-            self._test = test
+        if test and (test not in self._begun or due or not progress.left):
+            self._begun.add(test)
             parts = ", ".join(filter(None, (counts(progress), time_left(progress))))
             self._print(Text(f"{test}: {parts}"))
 

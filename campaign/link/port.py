@@ -177,7 +177,10 @@ def _plain(error: Exception) -> str:
 def _advice(error: Exception) -> str:
     text = str(error)
     if "No such file" in text or "FileNotFound" in text:
-        return "is the adapter plugged in? `python -m serial.tools.list_ports` lists the ports"
+        return (
+            "is the adapter plugged in? `python -m serial.tools.list_ports` lists the ports; a TCP "
+            "port is written socket://HOST:PORT"
+        )
     if "ermission" in text:
         return "your account may lack the right to use it (on Linux the group `dialout`)"
     if "lock" in text or "temporarily unavailable" in text:

@@ -103,7 +103,7 @@ def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collec
         case "friction_path":
             return keys, "value" if isinstance(keys[-1], int) else "key", str(detail["msg"])
         case _:
-            return keys, "value", _wrong_value(shape, detail)
+            return keys, "value", _wrong_value(shape, detail, _value_at(tree, keys))
 
 
 def _wrong_tag(keys: Keys, shape: Shape | None, tree: Any, context: Mapping[str, Any]) -> Fault:
@@ -147,7 +147,8 @@ _COMPARED = {
 }
 
 
-def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
+def _wrong_value(shape: Shape | None, detail: ErrorDetails, written: Any = None) -> str:
+    """The message; `written` is the value before its unit was converted, where that is known."""
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     here = shown(value)
     if isinstance(value, float) and not math.isfinite(value):
@@ -161,7 +162,8 @@ def _wrong_value(shape: Shape | None, detail: ErrorDetails) -> str:
         limit, words = _COMPARED[kind]
         quantity = shape.quantity.here if shape is not None and shape.quantity else None
         unit = f" {quantity.si}" if quantity else ""
-        return f"{here}{unit} is out of range; it must be {words} {context[limit]:g}{unit}"
+        here = shown(written) if isinstance(written, str) else f"{here}{unit}"
+        return f"{here} is out of range; it must be {words} {context[limit]:g}{unit}"
     if kind in _WANTED:
         wanted = _WANTED[kind]
         if shape is not None and shape.quantity and "number" in wanted:

@@ -58,6 +58,24 @@ def test_without_a_terminal_there_are_plain_lines_only_when_there_is_news():
     assert last == "test: 2 done, 1 failed, 0 left"
 
 
+def test_tests_that_run_at_once_have_one_plain_line_each():
+    stream = io.StringIO()
+    with progress_display(Console(file=stream, force_terminal=False, width=40)) as display:
+        trials = [
+            trial.model_copy(update={"test": test})
+            for trial, test in zip(make_trials(4), ("map", "ramp") * 2, strict=True)
+        ]
+        ledger = Ledger(trials, display, {})
+        for trial in trials:
+            ledger.begin(trial)
+            ledger.end(trial, COMPLETED)
+    assert [line.split(", ")[0] for line in stream.getvalue().splitlines()] == [
+        "map: 0 done",
+        "ramp: 1 done",
+        "ramp: 4 done",
+    ]
+
+
 def test_trials_that_a_stop_interrupts_are_not_told_one_by_one():
     """The end of the run says how many they are, and who stopped it."""
     stream = io.StringIO()

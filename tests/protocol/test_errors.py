@@ -59,7 +59,11 @@ SWEPT = GOOD + "[test.matrix]\n"
         (HEAD + 'frequency = §"1 rad/s"\n', r"'rad/s' is not a unit of frequency; allowed are Hz"),
         (HEAD + 'frequency = §"0.24 Hurtz"\n', r"'Hurtz' is not a unit; allowed are Hz"),
         (HEAD + 'frequency = §"fast"\n', r"does not begin with a number"),
-        (HEAD + 'frequency = §"-1 Hz"\n', r"-1.0 Hz is out of range; it must be greater than 0 Hz"),
+        (HEAD + 'frequency = §"-1 Hz"\n', r"'-1 Hz' is out of range; it must be greater than 0 Hz"),
+        (
+            GOOD + 'acceleration = §"-18 deg/s^2"\n',
+            r"'-18 deg/s\^2' is out of range; it must be greater than 0 rad/s\^2",
+        ),
         (HEAD + 'frequency = §"nan Hz"\n', r"not a finite number"),
         (HEAD + "frequency = §nan\n", r"nan is not a finite number"),
         (HEAD + "frequency = §true\n", r"true is not a frequency as text"),

@@ -161,6 +161,8 @@ BOUND = estimate(half=None, kind="at least")
             ["A, B in 1 of 2 rows (a single trial)."],
         ),
         ({"a": [GIVEN, estimate()]}, {}, []),  # its cell says so
+        # No reader of the page sees that column.
+        ({"a": [1.0]}, {"a": {"reason": "a standard error", "file_only": True}}, []),
     ],
 )
 def test_each_reason_for_no_interval_is_said_once(

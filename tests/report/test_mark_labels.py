@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,27 @@ def drawn(monkeypatch: pytest.MonkeyPatch, *panels: Panel, across: int = 1) -> l
     monkeypatch.setattr(figures, "to_svg", keep)
     figures.draw(Figure("key", "Title", "Caption", "Alt", panels, across=across))
     return sheets[0].axes[: len(panels)]
+
+
+@pytest.mark.parametrize("end", [0.0164, 15000.0])
+def test_labels_of_a_linear_axis_do_not_touch(monkeypatch: pytest.MonkeyPatch, end: float):
+    """Such as hours of runs that are a minute apart: `0.0025` is wider than matplotlib expects."""
+    boxes: list[Bbox] = []
+    original = figures.to_svg
+
+    def measured(sheet: Canvas) -> str:  # in the style in which the figure is drawn
+        sheet.draw_without_rendering()
+        low, high = sheet.axes[0].get_xlim()
+        labels = zip(sheet.axes[0].get_xticks(), sheet.axes[0].get_xticklabels(), strict=True)
+        boxes.extend(text.get_window_extent() for at, text in labels if low <= at <= high)
+        return original(sheet)
+
+    monkeypatch.setattr(figures, "to_svg", measured)
+    x = np.linspace(0.0, end, 5)
+    panel = Panel(Axis("Time", "h"), Axis("Torque", "N m"), (Curve(x, x),))
+    figures.draw(Figure("key", "Title", "Caption", "Alt", (panel,) * 12, across=2))
+    assert len(boxes) >= 2
+    assert all(one.x1 + figures.GAP / 2 < other.x0 for one, other in pairwise(boxes))
 
 
 def label_boxes(ax: Axes) -> dict[str, Bbox]:

@@ -93,7 +93,7 @@ def test_a_run_as_planned_says_what_was_asked_and_found(made_up: ModuleType, tmp
     run = completed(made_up.made_up_run(tmp_path, tests={"stabilization": ()}))
     alone = Finding.of(estimate(2e-4), {})
     found = opening(made_up, tmp_path, run=run, stabilization=says(ratio(2.9, 2.7, 3.1), alone))
-    assert found.asked == "What was asked: 1 test of 4 trials on the bench simulink, simulated."
+    assert found.asked == "1 test, 4 trials on the bench simulink, simulated."
     assert found.wrong == ()
     assert found.compared == ""
     (answer,) = found.answers
@@ -218,7 +218,7 @@ def test_instability_that_was_sought_is_no_failure(made_up: ModuleType, tmp_path
         (
             RunStatus.INCOMPLETE,
             "",
-            "There is no word of the run's end: it goes on, or it was killed.",
+            "The archive has no end of the run: it is in progress, or it was killed.",
         ),
     ],
 )

@@ -171,4 +171,4 @@ def test_of_several_interfaces_it_is_told_what_is_true_of_which(
     found = Estimate("damping_at_rest", 900.0, "N m s/rad", 800.0, 1000.0, 0.95)
     (table,) = _document(made_up, tmp_path, (Finding.of(found, {}),)).truths.values()
     assert table.rows[0]["of"] == "the sum of 2 interfaces, before any slips"
-    assert "True of" in [column.label for column in table.columns]
+    assert "Applies to" in [column.label for column in table.columns]

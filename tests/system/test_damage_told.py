@@ -286,6 +286,17 @@ def test_a_run_that_was_killed_is_told_of_alike(archive: Path, tmp_path: Path):
         done = told.run_campaign(command[0], "killed", *command[1:], "--results", tmp_path)
         assert done.exit_code == 4
         assert "trial-00002: trial-00002.trial: there is no such file" in done.stderr
+    trees = tmp_path / "killed.partial" / "plan-trees.jsonl"
+    trees.unlink()
+    done = told.run_campaign("resume", "killed", "--results", tmp_path)
+    assert told.code_of(done) == 4  # before anything is executed: no run is sealed without it
+    assert str(done.exception).startswith(f"{trees}: cannot be read")
+    journal = tmp_path / "killed.partial" / "journal.jsonl"
+    journal.unlink()
+    done = told.run_campaign("report", "killed", "--results", tmp_path)
+    assert told.code_of(done) == 4
+    assert str(done.exception) == f"{journal}: cannot be read: No such file or directory"
+    assert str(journal) in told.run_campaign("list", "--results", tmp_path).stderr
 
 
 def test_a_report_says_so_above_everything_else(archive: Path, tmp_path: Path):

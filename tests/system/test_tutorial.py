@@ -50,7 +50,7 @@ def test_from_a_data_sheet_to_a_compensated_axis(tmp_path: Path) -> None:
         run = followed(tmp_path, block, run)
     found = tomllib.loads((tmp_path / "found.toml").read_text())["friction"]["load"]
     for name, value in TRUE.items():
-        assert float(found[name].split()[0]) == pytest.approx(value, rel=1e-3)
+        assert float(found[name].split()[0]) == pytest.approx(value, rel=1e-2)
     (table,) = tmp_path.glob("results/*-sea-report/tables/waves-stabilization-error.csv")
     with table.open(newline="") as rows:
         errors = {row["compensation"]: float(row["error_mrad"]) for row in csv.DictReader(rows)}

@@ -67,7 +67,9 @@ def summarise(path: Path) -> RunSummary:
             return summarise(sealed)  # sealed while it was looked at
         if isinstance(error, ArchiveError):
             return RunSummary(path.stem, path, size, problem=str(error))
-        return RunSummary(path.stem, path, size, problem=f"{path}: {error.strerror}")
+        return RunSummary(
+            path.stem, path, size, problem=f"{error.filename or path}: {error.strerror}"
+        )
 
 
 def _benches(header: RunHeader) -> tuple[str, ...]:

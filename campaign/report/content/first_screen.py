@@ -263,19 +263,19 @@ def _has_intervals(figure: Figure) -> bool:
 
 
 def _asked(run: RunReader, tests: Sequence[AnalysedTest]) -> str:
-    """`What was asked: 3 tests of 35 trials on the bench platform, simulated.`"""
+    """`3 tests, 35 trials on the bench platform, simulated.`"""
     if not tests:
-        return "No test was asked for."
+        return "The protocol has no test."
     trials, count = len(run.plan), "1 test" if len(tests) == 1 else f"{len(tests)} tests"
     benches = list(dict.fromkeys(test.bench.name for test in tests if test.bench))
-    words = [f"What was asked: {count} of {trials} {'trial' if trials == 1 else 'trials'}"]
+    words = [f"{count}, {trials} {'trial' if trials == 1 else 'trials'}"]
     if benches:
         names = " and ".join(filter(None, (", ".join(benches[:-1]), benches[-1])))
         words.append(f" on the {'bench' if len(benches) == 1 else 'benches'} {names}")
     source = FROM.get(next((test.source for test in tests if test.source), ""), "")
     words.append(f", {source}" if source else "")
     if run.header.truth.plants:
-        words.append("; plan and analysis did not know the bench that was simulated")
+        words.append("; the simulated bench is another one than plan and analysis use")
     if changes := run.header.overrides:
         told = (f"{path} = {value}" for path, value in sorted(changes.items()))
         words.append(f". Changed on the command line: {', '.join(told)}")

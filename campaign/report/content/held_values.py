@@ -223,8 +223,8 @@ def _table(
         Column("held", "As stated", exact=True),
         Column("found", "As identified"),
         Column("true", "True", exact=True),
-        Column("of", "True of"),
-        Column("inside", "Inside"),
+        Column("of", "Applies to"),
+        Column("inside", "True value in the interval"),
     ]
     note = f"{held(rows)} (last column). " if held(rows) else ""
     note += "The parts of a sum count as independent. "

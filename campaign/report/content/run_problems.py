@@ -21,7 +21,7 @@ WORDS = {
 ENDED = {
     RunStatus.INTERRUPTED: "The run was interrupted",
     RunStatus.FAULT: "The run ended early, by a fault",
-    RunStatus.INCOMPLETE: "There is no word of the run's end: it goes on, or it was killed",
+    RunStatus.INCOMPLETE: "The archive has no end of the run: it is in progress, or it was killed",
 }
 SOUGHT = (Outcome.LIMIT, Outcome.DIVERGED)
 """How a loop that becomes unstable ends its trial."""

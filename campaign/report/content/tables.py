@@ -206,7 +206,7 @@ def _by_reason(
 ) -> list[str]:
     """`columns (reason)` for each reason, in the order of the columns; of some rows, which."""
     found: dict[str, dict[str, set[int]]] = {}
-    uncertain = [c for c in table.columns if _numbers(table, c) and not c.exact]
+    uncertain = [c for c in table.columns if _numbers(table, c) and not c.exact and not c.file_only]
     for column in uncertain:
         for place, cell in _placed(table, column):
             for reason in reasons(cell, column):

@@ -32,7 +32,7 @@ from campaign.report.drawing.decimate import points_of_each
 from campaign.report.drawing.legends import add_legend, published_signs
 from campaign.report.drawing.mark_labels import PanelMarks, draw_marks, place_labels
 from campaign.report.drawing.published_marks import Marks, PublishedMarks
-from campaign.report.drawing.ticks import decade_letters, set_ticks
+from campaign.report.drawing.ticks import decade_letters, set_ticks, thin_out
 from campaign.report.palette import MUTED, Look, looks
 from campaign.result import Axis, Figure, Panel
 from campaign.text import pretty_unit
@@ -298,6 +298,7 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
     number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
     set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
+    thin_out(ax.xaxis, lambda letters: int(room[0] / (LETTER * letters + GAP)))
     if _turned(panel, room[0]):
         names = [name.replace("-\n", "-").replace("\n", " ") for _, name in panel.x.places]
         ax.set_xticklabels(names, rotation=90)

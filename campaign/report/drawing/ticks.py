@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,6 +68,21 @@ def set_ticks(
     elif (axis.display or axis.unit) == "deg" and high - low >= WIDE_ANGLE:
         steps = [step for step in TURN if high - low <= MOST_STEPS * step]
         drawn.set_major_locator(MultipleLocator(steps[0]) if steps else MaxNLocator(nbins=8))
+
+
+def thin_out(drawn: DrawnAxis, most: Callable[[int], int]) -> None:
+    """Fewer ticks of a linear axis with plain steps, where its labels would touch.
+
+    most: how many labels of so many letters the axis has room for.
+    """
+    from matplotlib.ticker import AutoLocator, MaxNLocator
+
+    low, high = sorted(drawn.get_view_interval())
+    places = [place for place in drawn.get_majorticklocs() if low <= place <= high]
+    labels = drawn.get_major_formatter().format_ticks(places)
+    room = max(2, most(max(map(len, labels), default=0)))
+    if type(drawn.get_major_locator()) is AutoLocator and len(labels) > room:
+        drawn.set_major_locator(MaxNLocator(nbins=room - 1))
 
 
 def logarithmic(low: float, high: float, most: int = MOST_DECADES) -> list[float]:

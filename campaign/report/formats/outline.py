@@ -160,7 +160,7 @@ def _section(section: Section, answer: Answer, telling: ShownFigure | None) -> I
     yield from (section.references)
     for figure in section.figures:
         if figure is telling:
-            told = f"Figure {figure.number}, {figure.title}, stands on top of the report."
+            told = f"Figure {figure.number}, {figure.title}, is at the top of the report."
             yield Paragraph(told)
         else:
             yield figure
