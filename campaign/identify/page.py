@@ -30,6 +30,7 @@ CURES = {
     "angle": "slide over all of a turn, at several speeds in both directions",
     "band": "half the band finds otherwise, so that either the model lacks something (look at what "
     "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",
+    "exponent": "slide at more, and slower, speeds, or measure a velocity map",
     "what the model misses": "the model lacks something; look at what is left over",
     "friction, at this excitation": "excite with more torque, of which friction is less, "
     "and with a second amplitude, half of it",

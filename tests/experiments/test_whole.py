@@ -115,11 +115,12 @@ def test_what_a_loop_makes_of_noise_is_in_the_interval_of_viscous_friction(
     filtering = FilterSettings.for_rate(1000.0)
     motion = motion_of_position(rig.time, rig.angle, rig.force, filtering.low_pass)
     filtering = replace(filtering, slowest=0.005 * float(np.abs(motion.rate).max()))
-    [found] = find([MotionPiece(1, motion, None)], [], filtering, starts=1).fits
+    found, free = find([MotionPiece(1, motion, None)], [], filtering, starts=1).fits
+    assert free.model.name == f"{found.model.name}, exponent free"
     assert found.values["delay"] - rig.truth["delay"] > 5e-4
     for name in ("viscous_positive", "viscous_negative"):
         estimate = found.fit.estimates[name]
-        assert [part.source for part in estimate.systematic] == ["band", "delay"]
+        assert [part.source for part in estimate.systematic] == ["band", "exponent", "delay"]
         assert holds(estimate, rig.truth[name])
         assert estimate.half_width < 0.15 * estimate.value
 

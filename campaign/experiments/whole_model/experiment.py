@@ -85,13 +85,8 @@ def _identify(data: TestData, options: WholeModelOptions) -> Result:
     known = held.delay if held is not None and held.of_wanted else None
     found = find(
         pieces, unseen, filtering, extra, options.starts, data.say, known=known,
-        names=options.models,
+        names=options.models, wanted=options.model,
     )  # fmt: skip
-    names = [each.model.name for each in found.fits]
-    if options.model and options.model not in names:
-        raise ValueError(f"there is no model {options.model!r}; there are {', '.join(names)}")
-    if options.model:
-        found = replace(found, best=names.index(options.model))
     best = found.fits[found.best]
     parameters = tuple(_parameters(best, data))
     return Result(

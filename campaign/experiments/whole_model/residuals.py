@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,11 +17,13 @@ from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import Values
 from campaign.experiments.shared.friction_models import model_called
 from campaign.physics.friction import friction_models
-from campaign.physics.friction.unknowns import DerivedOption, FrictionUnknown, Sizes
+from campaign.physics.friction.unknowns import EXPONENT, DerivedOption, FrictionUnknown, Sizes
 from campaign.physics.friction_response import Along
 
 USUAL = ("stribeck", "lugre")
 """What is tried unless something else is said; the first one with directions alike, too."""
+EXPONENT_FREE = ", exponent free"
+"""End of the name of a model whose exponent is fitted."""
 WAYS = (("directions alike", False), ("by direction", True))
 
 
@@ -48,6 +50,18 @@ class Model:
             Unknown(each.name, each.low, each.high, each.start, each.logarithmic)
             for each in self.numbers
         )
+
+    def with_exponent_free(self, values: Mapping[str, float]) -> Model | None:
+        """The same with the exponent of its Stribeck curve as a further unknown.
+
+        None where it has none, or where that is free. values: of a fit, where a search begins.
+        """
+        there = "stribeck_exponent" in friction_models()[self.model].options.model_fields
+        names = {each.name for each in self.numbers}
+        if not there or EXPONENT.name in names or "stribeck_velocity" not in names:
+            return None
+        numbers = (*(replace(each, start=values[each.name]) for each in self.numbers), EXPONENT)
+        return replace(self, name=f"{self.name}{EXPONENT_FREE}", numbers=numbers)
 
     def options(self, values: Mapping[str, float]) -> dict[str, Any]:
         """An interface's options (SI) from the values of unknowns, by name."""

@@ -31,13 +31,14 @@ from campaign.experiments.any_motion.inverse_fit import together
 from campaign.experiments.any_motion.motions import MotionPiece, never_moved
 from campaign.experiments.interface import say_at
 from campaign.experiments.whole_model.residuals import (
+    EXPONENT_FREE,
     USUAL,
     Model,
     Residuals,
     models,
     steps_between,
 )
-from campaign.physics.friction.unknowns import DerivedOption, Sizes
+from campaign.physics.friction.unknowns import EXPONENT, DerivedOption, Sizes
 from campaign.reason import Cause, Reason
 from campaign.text import words
 
@@ -55,6 +56,7 @@ DELAY_UNKNOWN = Cause(
     "delay unknown", "a delay of {milliseconds:.2g} ms more or less leaves it open"
 )
 HALF_BAND = Cause("half band differs", "half the band finds {shown}")
+OTHER_EXPONENT = Cause("exponent left open", "with another exponent it is {shown}")
 LOOP_IN_DELAY = Cause("loop in the delay", "it takes what a loop makes of noise as well")
 BASE_UNKNOWN = Cause("base unknown", "without a known {base} it means nothing")
 UNRESOLVED = Cause(
@@ -158,27 +160,47 @@ def find(
     *,
     known: Estimate | None = None,
     names: Sequence[str] = USUAL,
+    wanted: str = "",
 ) -> Whole:
-    """Fit every model. Raises ValueError where the motion does not slide in both directions.
+    """Fit every model, and the best one with its exponent free, too.
 
     known: the delay as instruments along the wanted motion have it (s); None without any.
-    names: of the friction models; ValueError for one that does not say what is fitted of it.
+    names: of the friction models. wanted: name of a model that is taken in place of the best.
+
+    Raises ValueError where the motion does not slide in both directions, for a friction model that
+    does not say what is fitted of it, and where no model has the name that is wanted.
     """
     motions = [each.motion for each in pieces]
     sizes, inertia = _sizes(motions, filtering)
     fits: list[Fit] = []
     tried = models(sizes, names)
-    for number, model in enumerate(tried, 1):
-        done = partial(say_at, say, f"model {number} of {len(tried)} ({model.name})")
+
+    def add(model: Model, inertia: float) -> None:
+        done = partial(say_at, say, f"model {len(fits) + 1} of {len(tried) + 1} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
         one = _fitted(model, terms, motions, filtering, inertia, starts, done, known)
         if unseen:
             one = _validated(one, fits[0] if fits else None, unseen, filtering)
         fits.append(one)
-    above = _above(fits)
-    best = min(range(len(fits)), key=above.__getitem__)
-    return Whole(tuple(fits), best, filtering, tuple(pieces))
+
+    for model in tried:
+        add(model, inertia)
+    held = fits[_chosen(fits, wanted.removesuffix(EXPONENT_FREE))]
+    if (free := held.model.with_exponent_free(held.values)) is not None:
+        add(free, held.values["inertia"])
+    return Whole(tuple(fits), _chosen(fits, wanted), filtering, tuple(pieces))
+
+
+def _chosen(fits: Sequence[Fit], wanted: str) -> int:
+    """Which one is wanted, or has the lowest BIC."""
+    names = [each.model.name for each in fits]
+    if not wanted:
+        above = _above(fits)
+        return min(range(len(fits)), key=above.__getitem__)
+    if wanted not in names:
+        raise ValueError(f"there is no model {wanted!r}; there are {', '.join(names)}")
+    return names.index(wanted)
 
 
 def _sizes(motions: Sequence[Motion], filtering: FilterSettings) -> tuple[Sizes, float]:
@@ -233,7 +255,18 @@ def _fitted(
     other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
-    fit = _with_delay(_with_band(fit, again), doubt)
+    fit = _without_loop(_shifted(fit, again, "band", HALF_BAND))
+    free = model.with_exponent_free(dict(zip(names, fit.values, strict=True)))
+    if free is not None:
+        say("another exponent")
+        more = Residuals(
+            [*names, EXPONENT.name], free, extra, motions, filtering, steps_between(filtering)
+        )
+        exponent = free.unknowns[-1]
+        begin = np.append(fit.found.shares, exponent.share(EXPONENT.start))
+        other = refitted((*unknowns, exponent), more, begin)
+        fit = _shifted(fit, dict(zip(names, other, strict=False)), "exponent", OTHER_EXPONENT)
+    fit = _with_delay(fit, doubt)
     fit = with_bases(resolved(fit, model, motions, filtering), model)
     say("blocks left out")
     forces = [
@@ -295,32 +328,35 @@ def _open(one: Estimate, reason: Reason) -> Estimate:
     )
 
 
-def _with_band(fit: ModelFit, other: dict[str, float]) -> ModelFit:
-    """With what half the band says otherwise as a systematic part; too much of it leaves open."""
+def _shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -> ModelFit:
+    """With what another fit finds otherwise as a systematic part; too much of it leaves open."""
     found = {}
     for name, one in fit.estimates.items():
-        told = shifted_by(one, "band", abs(other[name] - one.value)) if one.has_interval else one
+        told = shifted_by(one, source, abs(other[name] - one.value)) if one.has_interval else one
         if told.half_width > USELESS * abs(told.value):
             shown = f"{other[name]:.3g} {one.unit}".rstrip()
-            reason = HALF_BAND(shown=shown, value=other[name])
-            told = _open(one, reason)
+            told = _open(one, cause(shown=shown, value=other[name]))
         found[name] = told
-    delay = found["delay"]
-    found["delay"] = Estimate.without_interval(
-        "delay", delay.value, "s", LOOP_IN_DELAY(), method=METHOD
-    )
     return replace(fit, estimates=found)
+
+
+def _without_loop(fit: ModelFit) -> ModelFit:
+    """The delay without interval: what a loop makes of noise is in it."""
+    delay = fit.estimates["delay"]
+    told = Estimate.without_interval("delay", delay.value, "s", LOOP_IN_DELAY(), method=METHOD)
+    return replace(fit, estimates={**fit.estimates, "delay": told})
 
 
 def with_bases(fit: ModelFit, model: Model) -> ModelFit:
     """Without what means nothing, as nothing is measured that it rests on."""
     found = dict(fit.estimates)
     for each in model.numbers:
-        bases = [found[name] for name in each.rests_on]
-        lost = bases and all(base.origin is not Origin.MEASURED for base in bases)
-        if lost and found[each.name].origin is Origin.MEASURED:
-            reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
-            found[each.name] = _open(found[each.name], reason)
+        for names in each.rests_on:
+            bases = [found[name] for name in names]
+            lost = all(base.origin is not Origin.MEASURED for base in bases)
+            if lost and found[each.name].origin is Origin.MEASURED:
+                reason = BASE_UNKNOWN(base=" or ".join(words(base.name) for base in bases))
+                found[each.name] = _open(found[each.name], reason)
     return replace(fit, estimates=found)
 
 

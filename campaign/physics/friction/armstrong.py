@@ -223,7 +223,7 @@ def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
     dwell = FrictionUnknown(
         "dwell_time", "dwell_time", "s", "Time at rest after which half of stiction is back.",
         1e-3, 1e3, 0.1, "rest for different times before it breaks away", logarithmic=True,
-        rests_on=("bristle_stiffness",), lasts=BENDING,
+        rests_on=(("bristle_stiffness",),), lasts=BENDING,
     )  # fmt: skip
     return (*curve(sizes, by_direction=by_direction), stiffness(sizes), lag, dwell)
 

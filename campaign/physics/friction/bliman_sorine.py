@@ -170,7 +170,7 @@ def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
 
     share = FrictionUnknown(
         "slow_share", "", "", "Slow stiffness, over the most with which friction has a peak.",
-        1e-3, 0.99, 0.3, PRESLIDE, logarithmic=True, rests_on=("bristle_stiffness",),
+        1e-3, 0.99, 0.3, PRESLIDE, logarithmic=True, rests_on=(("bristle_stiffness",),),
         lasts=BENDING,
     )  # fmt: skip
     slow = DerivedOption(

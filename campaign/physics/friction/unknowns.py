@@ -11,6 +11,9 @@ STATIC = (0.05, 3.0)
 """Static friction over Coulomb friction; real axes have less than 1."""
 MOST_VISCOUS = 5.0
 """Viscous over Coulomb friction at the fastest rate, at least up to which it is looked for."""
+FAR = 3.0
+"""times the Stribeck velocity, where less than a twentieth of the fall from static friction is left
+(exponent 1): without such a rate Coulomb friction is extrapolated."""
 SLIDE = "slide at more, and further apart, speeds"
 SLIDE_SLOWER = "slide at more, and slower, speeds"
 REVERSE = "reverse more often"
@@ -60,7 +63,7 @@ class FrictionUnknown:
         key: of the option that it is; dotted within a table; "" where options are derived from it.
         low, high, start: between which it is looked for, and where first (SI).
         advice: what motion tells more of it.
-        rests_on: unknowns of which one at least has to be measured for it to mean anything.
+        rests_on: groups of unknowns: one of each has to be measured for it to mean anything.
         lasts: how long what it says takes in a reversal; None where it is seen between reversals.
         below_one, about_one: of a ratio, what it says where its interval lies below one or has it.
     """
@@ -74,7 +77,7 @@ class FrictionUnknown:
     start: float
     advice: str
     logarithmic: bool = False
-    rests_on: tuple[str, ...] = ()
+    rests_on: tuple[tuple[str, ...], ...] = ()
     lasts: ReversalTime | None = None
     below_one: str = ""
     about_one: str = ""
@@ -147,8 +150,12 @@ def static(
     by_direction: bool,
     ratio: tuple[float, float] = STATIC,
     start: float = 0.9,
+    rests_on: tuple[tuple[str, ...], ...] = (),
 ) -> Unknowns:
-    """Static friction of each direction, as a ratio to Coulomb friction."""
+    """Static friction of each direction, as a ratio to Coulomb friction.
+
+    rests_on: as of `FrictionUnknown`, besides Coulomb friction.
+    """
     found: list[FrictionUnknown | DerivedOption] = []
     for prefix, tail, told in _ways(by_direction):
         name, base = f"static_over_coulomb{tail}", f"coulomb{tail}"
@@ -162,7 +169,7 @@ def static(
             FrictionUnknown(
                 name, "", "",
                 f"Static friction over Coulomb friction{told}; below 1 where none stands out.",
-                *ratio, start, SLIDE_SLOWER, rests_on=(base,), lasts=lasts,
+                *ratio, start, SLIDE_SLOWER, rests_on=((base,), *rests_on), lasts=lasts,
                 below_one=rises, about_one=open_,
             ),
             DerivedOption(
@@ -178,15 +185,24 @@ def curve(sizes: Sizes, *, by_direction: bool) -> Unknowns:
     slow = FrictionUnknown(
         "stribeck_velocity", "stribeck_velocity", "rad/s",
         "Rate over which friction goes from static to Coulomb.",
-        1e-4 * sizes.rate, sizes.rate, 0.1 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
-        rests_on=tuple(f"coulomb{tail}" for _, tail, _ in _ways(by_direction)), lasts=PASSING,
+        1e-4 * sizes.rate, sizes.rate / FAR, 0.1 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
+        rests_on=(tuple(f"coulomb{tail}" for _, tail, _ in _ways(by_direction)),), lasts=PASSING,
     )  # fmt: skip
     # One direction may rise to its Coulomb friction, and the other fall to it.
     return (
         *line(sizes, by_direction=by_direction),
-        *static(PASSING, by_direction=by_direction),
+        # What lies at rest is extrapolated where the rate over which it falls is not known.
+        *static(PASSING, by_direction=by_direction, rests_on=((slow.name,),)),
         slow,
     )
+
+
+EXPONENT = FrictionUnknown(
+    "stribeck_exponent", "stribeck_exponent", "", "Shape of the curve between the two.",
+    0.2, 5.0, 2.0, SLIDE_SLOWER, logarithmic=True,
+    rests_on=(("stribeck_velocity",),), lasts=PASSING,
+)  # fmt: skip
+"""Of a Stribeck curve; a motion that tells it is rare, so it is held first."""
 
 
 def stiffness(sizes: Sizes) -> FrictionUnknown:
@@ -204,7 +220,7 @@ def damping(sizes: Sizes) -> FrictionUnknown:
     return FrictionUnknown(
         "bristle_damping", "bristle_damping", "N m s/rad", "Damping of presliding.",
         1e-6 * thick, 1e4 * thick, thick, PRESLIDE, logarithmic=True,
-        rests_on=("bristle_stiffness",), lasts=BENDING,
+        rests_on=(("bristle_stiffness",),), lasts=BENDING,
     )  # fmt: skip
 
 
