@@ -33,7 +33,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.units import display_value
+from campaign.units import display_value, in_words
 
 RIPPLE = {
     "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
@@ -270,11 +270,11 @@ def _speeds(points: Sequence[Point]) -> str:
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
     """What a map leaves in its torques, and does not find, where the bench states no inertia."""
     if bench.axis.inertia is None and points:
-        most = float(np.rad2deg(max(abs(point.acceleration) for point in points)))
+        most = max(abs(point.acceleration) for point in points)
         yield (
-            f"The bench '{bench.name}' does not say axis.inertia: the torque that accelerates the "
-            f"load, by up to {most:.2g} deg/s² in these windows, is not taken out of friction, and "
-            "no ripple over position is looked for."
+            f"The bench '{bench.name}' does not say axis.inertia. Friction includes the torque "
+            f"that accelerates the load, by up to {in_words(most, 'rad/s^2', 'deg/s^2', '.2g')} in "
+            "these windows. Ripple over position is not estimated."
         )
 
 
