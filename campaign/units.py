@@ -259,11 +259,6 @@ def torque_text(value: float, form: str = ".3g") -> str:
     return in_words(value, "N m", form=form)
 
 
-def display_value(value: float, unit: str, display: str) -> float:
-    """A number (SI) in the unit that a reader is shown; see `in_words`."""
-    return float(convert(value, axis_unit(unit), axis_unit(display)))
-
-
 def _quantity(
     name: str,
     si: str,

@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from campaign.axis_kind import axis_unit
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, NORMAL_LOAD, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import multiplied
@@ -33,7 +32,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.units import display_value, in_words
+from campaign.units import in_words, rate_text
 
 RIPPLE = {
     "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
@@ -263,8 +262,7 @@ def _with_rule(point: Point, reason: Reason) -> Point:
 
 
 def _speeds(points: Sequence[Point]) -> str:
-    told = (f"{display_value(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
-    return f"{', '.join(told)} {axis_unit('deg/s')}"
+    return ", ".join(rate_text(point.speed) for point in points)
 
 
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
