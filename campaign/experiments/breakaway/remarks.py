@@ -50,8 +50,7 @@ def _inertia(ramps: Ramps) -> Iterator[str]:
     found = [abs(each.value) for each in ramps.values("peak_acceleration")]
     inertia = bench_of(ramps.trials[0].trial).axis.inertia
     if found and inertia is not None:
-        size = 0.01 * float(np.mean(found)) * inertia
-        moved = torque_text(size, ".2g")
+        moved = torque_text(0.01 * float(np.mean(found)) * inertia, ".2g")
         yield f"An error of 1 % of the inertia moves the breakaway torque by {moved}."
 
 

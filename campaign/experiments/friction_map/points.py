@@ -32,7 +32,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.units import in_words, rate_text
+from campaign.units import in_words
 
 RIPPLE = {
     "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
@@ -262,7 +262,9 @@ def _with_rule(point: Point, reason: Reason) -> Point:
 
 
 def _speeds(points: Sequence[Point]) -> str:
-    return ", ".join(rate_text(point.speed) for point in points)
+    told = (in_words(point.speed, "rad/s", "deg/s").split() for point in points)
+    numbers, units = zip(*told, strict=True)
+    return f"{', '.join(numbers)} {units[0]}"
 
 
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:

@@ -150,10 +150,8 @@ def _left_out(
 
 def _over_a_turn(held: OverATurn) -> str:
     """Of a torque that follows from the angle, in words."""
-    told = " and ".join(
-        f"by {torque_text(amplitude)} {times}"
-        for amplitude, times in zip(held.amplitudes, ("once", "twice"), strict=False)
-    )
+    often = zip(held.amplitudes, ("once", "twice"), strict=False)
+    told = " and ".join(f"by {torque_text(amplitude)} {times}" for amplitude, times in often)
     return (
         f"Within steady stretches the torque changes with the angle, as gravity does: {told} over "
         f"{angle_text(math.tau, '.4g')}, which is {100 * held.share:.3g} % of all that changes "
