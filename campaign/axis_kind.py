@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
@@ -125,79 +124,50 @@ _UNITS = {
 reader is shown for what a reader is shown."""
 
 
-def axis_unit(unit: str) -> str:
-    """The unit that stands for one of a rotary axis, of the axis that is meant here.
+def axis_unit(unit: str, sides: Sides | None = None) -> str:
+    """The unit that stands for one of a rotary axis, of the axis that is meant, or of these sides.
 
     What has no angle and no torque in it stays. Not for phases: those are angles of no axis.
     """
-    return _UNITS.get(unit, unit) if is_linear() else unit
+    linear = (sides or current_sides()).load is AxisKind.LINEAR
+    return _UNITS.get(unit, unit) if linear else unit
 
 
 # Words --------------------------------------------------------------------------------------------
 
-_NAMED = r"(?<![\w.'\"])(?<!phase ){}(?![\w\"]|'(?!s)|\.\w| =)"
-"""A word of a sentence: no name of a field or option, as in `limits.torque`."""
-_WORDS = (
-    ("moments of inertia", "masses"),
-    ("moment of inertia", "mass"),
-    ("it turns", "it moves"),
-    ("component turns", "component moves"),
-    ("counts as turning", "counts as moving"),
-    ("slow speeds turn", "slow speeds travel"),
-    ("per revolution", "per 2π m"),
-    ("an inertia", "a mass"),
-    ("an angle", "a position"),
-    ("settle angle", "settle travel"),
-    ("window angle", "window travel"),
-    ("inertias", "masses"),
-    ("inertia's", "mass's"),
-    ("inertia", "mass"),
-    ("angles", "positions"),
-    ("angle", "position"),
-    ("torques", "forces"),
-    ("torque's", "force's"),
-    ("torque", "force"),
-)
-_PATTERNS = (
-    (re.compile(r"\b[Aa]ngular (?=\w)"), ""),
-    *(
-        (re.compile(_NAMED.format(f"(?:{word}|{word.capitalize()})")), other)
-        for word, other in _WORDS
-    ),
-)
-_OF_MOTOR = re.compile(r"\btorque constant\b")
-"""What a motor that turns has, whatever it drives."""
-_KEPT = "\N{SYMBOL FOR SUBSTITUTE}"
-_TEXT_UNITS = tuple(
-    (re.compile(rf"(?<![\w·]){rotary}(?![\w·/²^])"), linear)
-    for rotary, linear in (
-        (r"rad/s per N[· ]m", "m/s per N"),
-        (r"N[· ]m[· ]s/rad", "N·s/m"),
-        (r"N[· ]m/rad", "N/m"),
-        (r"N[· ]m/s", "N/s"),
-        (r"N[· ]m/A", "N/A"),
-        (r"N[· ]m", "N"),
-        (r"kg[· ]m(?:²|\^2)", "kg"),
-        (r"rad/s(?:²|\^2)", "m/s²"),
-        (r"rad/s", "m/s"),
-    )
-)
-"""Where the number before them, if any, is the same: SI units alone."""
+_TERMS = {
+    "torque": "force",
+    "torques": "forces",
+    "torque constant": "force constant",
+    "inertia": "mass",
+    "inertias": "masses",
+    "an inertia": "a mass",
+    "angle": "position",
+    "angles": "positions",
+    "an angle": "a position",
+}
+"""What a text about a rotary axis says, and one about a linear axis says in its place."""
+_OF_MOTOR = "torque constant"
+"""Term that follows the motor."""
+_LONGEST_FIRST = "|".join(sorted(_TERMS, key=len, reverse=True))
+_TERM = re.compile(rf"(?<![\w.'\"`])(?:{_LONGEST_FIRST})(?!\w|\.\w|'(?!s)|`)", re.IGNORECASE)
+"""A term in a sentence, but not in the name of an option: `limits.torque`, `torque_rate`."""
 
 
-def in_axis_terms(text: str) -> str:
-    """A text for people, in the words of the axis that is meant here."""
-    if not text or not is_linear():
+def in_axis_terms(text: str, sides: Sides | None = None) -> str:
+    """A text for people, in the terms of the axis that is meant, or of a bench with these sides.
+
+    Units follow their numbers, by `units.in_words`.
+    """
+    sides = sides or current_sides()
+    if sides.load is AxisKind.ROTARY:
         return text
-    for pattern, linear in _TEXT_UNITS:
-        text = pattern.sub(linear, text)
-    if _SIDES.get().motor is AxisKind.ROTARY:
-        text = _OF_MOTOR.sub(_KEPT, text)
-    for pattern, word in _PATTERNS:
-        text = pattern.sub(partial(_like, word), text)
-    return text.replace(_KEPT, "torque constant")
 
+    def linear(found: re.Match[str]) -> str:
+        rotary = found[0].lower()
+        if rotary == _OF_MOTOR and sides.motor is AxisKind.ROTARY:
+            return found[0]
+        term = _TERMS[rotary]
+        return term.capitalize() if found[0][0].isupper() else term
 
-def _like(word: str, found: re.Match[str]) -> str:
-    """`word` with a capital where what it stands for has one."""
-    return word.capitalize() if found[0][:1].isupper() else word
+    return _TERM.sub(linear, text)

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from campaign.axis_kind import AxisKind as AxisKind  # known by this name to backends
-from campaign.axis_kind import Sides
+from campaign.axis_kind import Sides, axis_unit, in_axis_terms
 from campaign.recording import ChannelInfo
 from campaign.units import factor
 
@@ -87,7 +87,7 @@ class ChannelMeaning:
     Attributes:
         label: for people, on a rotary axis.
         meaning: one sentence.
-        linear_label: the label where the axis is linear, if that is another one.
+        linear_label: on a linear axis, where `in_axis_terms` does not give it.
     """
 
     name: str
@@ -120,7 +120,6 @@ VOCABULARY = {
             _CONTROLLER,
             "Reference of the angle",
             "Where the load should be relative to the hull, for a loop that follows an angle.",
-            "Reference of the position",
         ),
         ChannelMeaning(
             BASE_RATE,
@@ -154,7 +153,6 @@ VOCABULARY = {
             _SENSOR,
             "Angle of the load relative to the hull",
             "Angle of the load relative to the hull, as the encoder shows it.",
-            "Position of the load relative to the hull",
         ),
         ChannelMeaning(
             MOTOR_ANGLE,
@@ -163,7 +161,6 @@ VOCABULARY = {
             _SENSOR,
             "Angle of the motor",
             "Angle of the motor shaft, before the gear.",
-            "Position of the motor",
         ),
         ChannelMeaning(
             MOTOR_RATE,
@@ -188,7 +185,6 @@ VOCABULARY = {
             _CONTROLLER,
             "Drive torque at the load",
             "Torque of the drive as seen at the load: motor current, torque constant and gear.",
-            "Drive force at the load",
         ),
         ChannelMeaning(
             JOINT_TORQUE,
@@ -197,7 +193,6 @@ VOCABULARY = {
             _SENSOR,
             "Torque in the joint",
             "Torque between gear and load, by a sensor that sits there.",
-            "Force in the joint",
         ),
         ChannelMeaning(
             POINTING_ERROR,
@@ -205,7 +200,7 @@ VOCABULARY = {
             _LOAD,
             _CONTROLLER,
             "Integrated gyro rate",
-            "Integral of the gyro's rate: how far the load has turned in space.",
+            "Integral of the gyro's rate: how far the load has moved in space.",
             "Integrated inertial rate",
         ),
         ChannelMeaning(
@@ -215,7 +210,6 @@ VOCABULARY = {
             _CONTROLLER,
             "Compensation torque",
             "What the friction compensation adds, as seen at the load.",
-            "Compensation force",
         ),
         ChannelMeaning(
             NORMAL_LOAD,
@@ -240,7 +234,6 @@ VOCABULARY = {
             _SIMULATOR,
             "True friction torque",
             "Friction of the whole axis as seen at the load.",
-            "True friction force",
         ),
         ChannelMeaning(
             LOAD_RATE,
@@ -254,12 +247,12 @@ VOCABULARY = {
 }
 
 COMMANDS = {
-    "rate": (Quantity.RATE, "Commanded rate", ""),
-    "torque": (Quantity.TORQUE, "Commanded torque", "Commanded force"),
-    "prescribed": (Quantity.RATE, "Prescribed relative rate", ""),
-    "spring": (Quantity.ANGLE, "Angle of the spring's far end", "Position of the spring's far end"),
+    "rate": (Quantity.RATE, "Commanded rate"),
+    "torque": (Quantity.TORQUE, "Commanded torque"),
+    "prescribed": (Quantity.RATE, "Prescribed relative rate"),
+    "spring": (Quantity.ANGLE, "Angle of the spring's far end"),
 }
-"""What the command holds by the mode of the task: quantity, label, label on a linear axis."""
+"""What the command holds by the mode of the task: quantity, label."""
 
 _ROTARY = {
     Quantity.ANGLE: ("rad", "deg"),
@@ -273,14 +266,11 @@ _ROTARY = {
     Quantity.DEPENDS: ("", ""),
 }
 UNITS = {
-    AxisKind.ROTARY: _ROTARY,
-    AxisKind.LINEAR: {
-        **_ROTARY,
-        Quantity.ANGLE: ("m", "mm"),
-        Quantity.DEVIATION: ("m", "um"),
-        Quantity.RATE: ("m/s", "mm/s"),
-        Quantity.TORQUE: ("N", "N"),
-    },
+    kind: {
+        quantity: (axis_unit(unit, Sides(kind)), axis_unit(display, Sides(kind)))
+        for quantity, (unit, display) in _ROTARY.items()
+    }
+    for kind in AxisKind
 }
 """SI unit and the unit a reader is shown, by kind of axis and quantity."""
 
@@ -297,11 +287,11 @@ def info(
         own_rate: of a slower channel (Hz): see above.
     """
     what = VOCABULARY[name]
-    quantity, label, linear = what.quantity, what.label, what.linear_label
+    quantity, label = what.quantity, what.label
     if name == COMMAND and mode in COMMANDS:
-        quantity, label, linear = COMMANDS[mode]
-    if axis == AxisKind.LINEAR and linear:
-        label = linear
+        quantity, label = COMMANDS[mode]
+    if axis == AxisKind.LINEAR:
+        label = what.linear_label or in_axis_terms(label, Sides(axis, axis))
     unit, display_unit = UNITS[axis][quantity]
     measured = what.known_by is not KnownBy.SIMULATOR
     return ChannelInfo(name, unit, label, display_unit, measured, own_rate)
@@ -332,7 +322,7 @@ def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[Channe
     known = VOCABULARY.get(channel.name)
     unit = info(channel.name, mode, axis=axis_of(channel.name, sides)).unit if known else ""
     # What a command is depends on the loop that was closed, in a recording perhaps another one.
-    of_commands = {UNITS[sides.load][quantity][0] for quantity, _, _ in COMMANDS.values()}
+    of_commands = {UNITS[sides.load][quantity][0] for quantity, _ in COMMANDS.values()}
     if (
         not unit
         or channel.unit == unit

@@ -19,6 +19,7 @@ from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from campaign.axis_kind import AxisKind, Sides, axis_unit, current_sides
+from campaign.text import pretty_unit
 from campaign.unit_grammar import Unit, parse_unit, respelled
 
 
@@ -233,13 +234,14 @@ DISPLAY = {
 """What a reader is shown in place of an SI unit, where nothing says another one."""
 
 
-def in_words(value: float, unit: str, display: str, form: str = ".3g") -> str:
+def in_words(value: float, unit: str, display: str = "", form: str = ".3g") -> str:
     """`5 mm/s`: a number (SI) with the unit that a reader is shown, of the axis that is meant.
 
-    `unit` and `display` are those of a rotary axis, such as rad/s and deg/s.
+    `unit` and `display` (absent: the same) are those of a rotary axis, such as rad/s and deg/s.
     """
-    shown = axis_unit(display)
-    return f"{convert(value, axis_unit(unit), shown):{form}} {shown}"
+    shown = axis_unit(display or unit)
+    told = "deg" if shown == "deg" else pretty_unit(shown)
+    return f"{convert(value, axis_unit(unit), shown):{form}} {told}"
 
 
 def angle_text(value: float, form: str = ".3g") -> str:
@@ -252,9 +254,9 @@ def rate_text(value: float, form: str = ".3g") -> str:
     return in_words(value, "rad/s", "deg/s", form)
 
 
-def display_value(value: float, unit: str, display: str) -> float:
-    """A number (SI) in the unit that a reader is shown; see `in_words`."""
-    return float(convert(value, axis_unit(unit), axis_unit(display)))
+def torque_text(value: float, form: str = ".3g") -> str:
+    """`5 N·m`, or `5 N`, of a torque (N m) or a force (N)."""
+    return in_words(value, "N m", form=form)
 
 
 def _quantity(

@@ -12,7 +12,7 @@ from campaign.archive.layout.journal import RunResumed, TrialFinished
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import hidden_trials, lost_trials, of_test
 from campaign.archive.reading.sound_samples import Trials, damaged_records, without_damaged
-from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
+from campaign.axis_kind import BOTH_ROTARY, Sides, in_axis_terms
 from campaign.errors import ArchiveError, UsageError, explain_in_debug
 from campaign.experiments.analysis import result_of
 from campaign.experiments.interface import Experiment, TestData, bench_of
@@ -97,8 +97,8 @@ class AnalysedTest:
     @property
     def account(self) -> tuple[str, ...]:
         """What an analysis that did not fail does without: trials, or any result, and why."""
-        with axis_terms(self.sides):
-            told = tuple(map(in_axis_terms, notes_on(self.result.left_out, len(self.trials))))
+        notes = notes_on(self.result.left_out, len(self.trials))
+        told = tuple(in_axis_terms(note, self.sides) for note in notes)
         if told or self.problem or not self.lacks_result:
             return told
         return (f"no result: {' '.join(self.result.notes) or 'nothing was found'}",)

@@ -76,8 +76,8 @@ app = typer.Typer(
     name="campaign",
     cls=GroupedCommands,
     help="Friction experiments on stabilized servo platforms: run, archive, identify, report.",
-    epilog="Exit codes: 0 done, 1 some trials failed, 2 bad usage or protocol, 3 a limit or a "
-    "backend fault, 4 a damaged archive, 5 safe state NOT confirmed, 6 no result, "
+    epilog="Exit codes: 0 done; 1 some trials failed; 2 bad usage or protocol; 3 a limit or a "
+    "backend fault; 4 a damaged archive; 5 safe state NOT confirmed; 6 no result; "
     "130 interrupted.",
     no_args_is_help=True,
     add_completion=True,

@@ -94,8 +94,7 @@ def _text(name: str, bench: Bench, file: str) -> str:
         "methods": ", ".join(f'"{method}"' for method in ("none", *bench.compensation)),
     }
     template = Template((TEMPLATES / f"{name}.toml").read_text(encoding="utf-8"))
-    with axis_terms(bench.sides):
-        return in_axis_terms(template.substitute(words))
+    return in_axis_terms(template.substitute(words), bench.sides)
 
 
 def _with_reasons(path: Path) -> None:

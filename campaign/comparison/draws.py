@@ -32,9 +32,9 @@ def common_draws(pairing: Pairing) -> Iterator[str]:
         have = "trial has" if len(theirs) == 1 else "trials have"
         yield (
             f"{seeds} of {len(theirs)} {have} the seed in common, and so their random draws,"
-            " but not all of bench and task. They are judged as independent runs: as far as the"
-            " draws act alike in both, the intervals are too wide, and a difference that there is"
-            " may not be shown. Another seed in one of the protocols makes them independent."
+            " but not all of bench and task. They are judged as independent runs. As far as the"
+            " draws act alike in both, intervals are too wide and may hide a difference. Another"
+            " seed in one of the protocols makes them independent."
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from campaign.axis_kind import axis_terms, in_axis_terms
+from campaign.axis_kind import in_axis_terms
 from campaign.comparison.finding_pairs import Pair
 from campaign.comparison.overlays import Letters, overlays
 from campaign.comparison.pictures import draw_side_by_side, with_names
@@ -103,7 +103,7 @@ def _how(comparison: Comparison) -> Iterator[str]:
         "squares. The change in percent is in the interval exactly where the difference is."
     )
     yield (
-        f"All {comparison.tested} p values of this page are one family: of what is declared "
+        f"All {comparison.tested} p values of this page are one family. Of what is declared "
         f"different, at most {100 * RATE:g} % is expected to be false (Benjamini and Hochberg). "
         "Each interval is one of 95 % by itself; of the changes that are declared, the largest "
         "tend to look larger than they are."
@@ -200,9 +200,8 @@ def _test(
         why = Items(tuple(not_judged(rest)))
         shown = folder.shown_table(table, (), f"{name}-not-judged")
         yield FoldedSection(f"Found in both runs and not judged ({len(rest)})", (why, shown))
-    with axis_terms(tested.reference.sides):
-        shared = against.shared.get(tested.reference.name, ())
-        cancelled = ", ".join(sorted(map(in_axis_terms, shared)))
+    shared = against.shared.get(tested.reference.name, ())
+    cancelled = ", ".join(sorted(in_axis_terms(each, tested.reference.sides) for each in shared))
     if cancelled:
         common = "Both runs have these errors in common, so that they are in no difference"
         yield Paragraph(f"{common}: {cancelled}.", "note")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, run_title
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
-from campaign.axis_kind import BOTH_ROTARY, axis_terms, in_axis_terms
+from campaign.axis_kind import BOTH_ROTARY, in_axis_terms
 from campaign.comparison.circumstances import Change, changes
 from campaign.comparison.finding_pairs import Pair, pairs_of
 from campaign.comparison.same_quantity import Pairing, pair_tests
@@ -156,8 +156,7 @@ def _exchanged(reference: Side, name: str) -> str:
     axis = next((test.sides for test in reference.tests if test.bench), BOTH_ROTARY)
     source = source_called(name, SOURCES.values(), axis)
     if source is None:
-        with axis_terms(axis):
-            known = ", ".join(map(in_axis_terms, SOURCES.values()))
+        known = ", ".join(in_axis_terms(each, axis) for each in SOURCES.values())
         raise UsageError(f"--exchanged {name!r}: is none of {known}")
     return source
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from campaign.api.analysis import AnalysedTest
-from campaign.axis_kind import Sides, axis_terms, in_axis_terms
+from campaign.axis_kind import Sides, in_axis_terms
 from campaign.experiments.shared.systematic import SOURCES
 from campaign.physics.bench_knowledge import number_at
 from campaign.physics.truth import value_at
@@ -42,8 +42,7 @@ def shared_sources(
 
 def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None:
     """The source that a page of such a rig calls so, or that has this code; None for none."""
-    with axis_terms(sides):
-        return next((each for each in sources if name in (each, in_axis_terms(each))), None)
+    return next((each for each in sources if name in (each, in_axis_terms(each, sides))), None)
 
 
 def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:

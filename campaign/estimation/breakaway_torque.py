@@ -21,6 +21,7 @@ from campaign.estimation.autocorrelated_errors import FitErrors, errors_of
 from campaign.estimation.intervals import shifted_by, student, with_error
 from campaign.estimation.relative_rate import mean, slides_from, slope
 from campaign.reason import Cause
+from campaign.units import rate_text
 
 NAME = "breakaway_torque"
 DEGREE = 5
@@ -94,7 +95,7 @@ def breakaway_torque(
     sliding = slides_from(seen, threshold)
     if sliding is None:
         raise ValueError(
-            f"the rate never reached {threshold:.4g} rad/s: the ramp ended below breakaway"
+            f"the rate never reached {rate_text(threshold, '.4g')}: the ramp ended below breakaway"
         )
     first, last = sliding
     sign = float(np.sign(np.nanmean(seen[first:last])))

@@ -31,7 +31,7 @@ UNPHYSICAL = Cause("unphysical", "it is negative, which no rig has: {cause}")
 OPPOSITE_SIGNS = Cause(
     "opposite signs",
     "inertia and friction both are, so force and motion have opposite signs (`sign = -1` in the "
-    "mapping turns one round)",
+    "mapping reverses one)",
 )
 COMPENSATED = Cause(
     "friction compensated",

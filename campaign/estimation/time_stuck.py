@@ -17,6 +17,7 @@ from campaign.arrays import Array
 from campaign.estimate import Estimate, Systematic
 from campaign.estimation.intervals import of_repeats
 from campaign.reason import Cause
+from campaign.units import rate_text
 
 NAME = "time_stuck"
 THRESHOLD = 0.001
@@ -27,8 +28,8 @@ SIGMAS = 2.0
 """of the noise that stay below the threshold."""
 UNRESOLVED = Cause(
     "rate not resolved",
-    "no sensor resolves it: with one count, or twice the noise, below 0.1 % of the hull's largest "
-    "rate, the smoothing is longer than 1 % of a half cycle",
+    "no sensor resolves 0.1 % of the hull's largest rate within 1 % of a half cycle, by one count "
+    "and by twice its noise",
 )
 
 
@@ -67,7 +68,7 @@ def time_stuck(
         told = of_repeats(NAME, shares, "", "half cycles")
         # Each end of a time stuck is uncertain by the smoothing, rectangularly; it has two.
         blur = rate.span * parts / len(base_rate) / math.sqrt(6.0)
-        how = f"relative rate below {threshold:.3g} rad/s by {rate.sensor}"
+        how = f"relative rate below {rate_text(threshold)} by {rate.sensor}"
         method = f"{how}, smoothed over {rate.span * step:.3g} s; {told.method}"
         blurred = (Systematic("smoothing of the rate", blur),)
         return replace(_share(told), method=method, systematic=blurred)

@@ -72,7 +72,7 @@ def ramp_of(time: Array, rate: Array, torque: Array, start: float, top: float) -
     end = begin + int(np.searchsorted(np.cumsum(torque[begin:]) / length, 0.5 * top))
     end = min(end, len(time))
     if end - begin < FEWEST_BINS:
-        raise ValueError(f"only {end - begin} samples lie below {top:.3g} N·m")
+        raise ValueError(f"only {end - begin} samples lie below the end of the ramp")
     slope, level = np.polyfit(time[begin:end], torque[begin:end], 1)
     if slope <= 0:
         raise ValueError("the drive torque does not rise: it is no ramp")

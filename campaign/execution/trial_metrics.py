@@ -16,7 +16,7 @@ from functools import partial
 import campaign
 from campaign.archive.reading.archived_metrics import ArchivedMetrics
 from campaign.archive.reading.archived_trial import ArchivedTrial
-from campaign.axis_kind import axis_terms, in_axis_terms, sides_in
+from campaign.axis_kind import in_axis_terms, sides_in
 from campaign.backends.calls import Call
 from campaign.entry_points import PlugIn
 from campaign.errors import UsageError
@@ -81,8 +81,8 @@ class TrialMeasurement:
                 else ArchivedMetrics()
             )
         except (ValueError, UsageError) as error:
-            with axis_terms(sides_in(data.trial.bench)):
-                return ArchivedMetrics(problem=in_axis_terms(_one_line(str(error))))
+            sides = sides_in(data.trial.bench)
+            return ArchivedMetrics(problem=in_axis_terms(_one_line(str(error)), sides))
         except BaseException as error:  # noqa: BLE001 - a plug-in must not cost the trial
             return ArchivedMetrics(problem=_one_line(f"measuring failed: {describe(error)}"))
 

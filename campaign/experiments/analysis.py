@@ -11,10 +11,7 @@ from campaign.channels import missing
 from campaign.errors import ArchiveError, UsageError
 from campaign.estimate import Estimate
 from campaign.experiments.interface import Experiment, TestData, TrialData
-from campaign.experiments.post_processing.axis_units import (
-    estimate_in_axis_terms,
-    in_axis_units,
-)
+from campaign.experiments.post_processing.axis_units import in_axis_units
 from campaign.experiments.post_processing.draws import draws_of, merged
 from campaign.experiments.post_processing.key_numbers import key_numbers
 from campaign.experiments.post_processing.recording_checks import (
@@ -118,7 +115,7 @@ def _measured_trials(
         if item.estimates:
             continue
         try:
-            estimates = tuple(map(estimate_in_axis_terms, experiment.measure(item)))
+            estimates = tuple(map(in_axis_units, experiment.measure(item)))
             found[id(item)] = _Instead(item, item.trial.point, estimates)
         except (ArchiveError, UsageError):
             raise
@@ -169,7 +166,7 @@ def measured(experiment: Experiment, data: TrialData) -> Sequence[Estimate]:
     if experiment.measure is None:
         return ()
     with axis_terms(sides_in(data.trial.bench)):
-        return tuple(map(estimate_in_axis_terms, experiment.measure(data)))
+        return tuple(map(in_axis_units, experiment.measure(data)))
 
 
 def lost_without(experiment: Experiment, name: str) -> str:

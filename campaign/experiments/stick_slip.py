@@ -356,9 +356,9 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     return Figure(
         key="stick-slip",
         title="Where a pulled load sticks and slips",
-        caption=f"{_counts(measured)} A mark for each pull: stick-slip where the load rests for "
-        "about a fifth of a period in two or more periods in a "
-        f"row, up to the last; too short where it first slips after {SHORT:.0%} of the pull.",
+        caption=f"{_counts(measured)} A mark for each pull. Stick-slip: the load rests for about a "
+        "fifth of a period in two or more periods in a row, up to the last. Too short: it first "
+        f"slips after {SHORT:.0%} of the pull.",
         alt="Marks of stick-slip and of smooth sliding over two swept numbers.",
         panels=tuple(
             Panel(

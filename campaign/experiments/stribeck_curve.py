@@ -207,8 +207,8 @@ def _analyse(data: TestData) -> Result:
         caption=f"{' '.join(_what_shows(place, points) for place, points in found)} The points are "
         f"measured in steady sliding{bars}, each direction in its own sign "
         "and panel; the lines are the model's own curve and its two parts.",
-        alt="Friction torque over speed on a logarithmic axis: points measured in each direction "
-        "beside the curve of the model and its two parts, one panel per direction.",
+        alt="Friction torque over speed on a logarithmic axis, one panel per direction: measured "
+        "points beside the curve of the model and its two parts.",
         panels=tuple(panels),
         thesis=("2.9",),
         across=min(2, len(panels)),

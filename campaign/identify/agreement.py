@@ -46,7 +46,7 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
             f"Methods disagree about {parameter_words(name)}: {one[0]} finds "
             f"{parameter_text(*one[1:])} {pretty_unit(one[2])}, {other[0]} "
             f"{parameter_text(*other[1:])} {pretty_unit(other[2])}. "
-            "At least one model lacks something of this rig (look at what is left over), or the "
+            "At least one model lacks something of this rig: look at what is left over. Or the "
             "motion confuses place with direction: slide over the same travel in both."
         )
 

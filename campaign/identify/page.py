@@ -27,9 +27,9 @@ from campaign.result import Result
 
 CURES = {
     "window": "it depends on how far a ramp is fitted; record the angle more finely",
-    "angle": "slide over all of a turn, at several speeds in both directions",
-    "band": "half the band finds otherwise, so that either the model lacks something (look at what "
-    "is left over) or the sensor's noise is in the motion (a finer one, or faster motion)",
+    "angle": "slide over all of the travel, at several speeds in both directions",
+    "band": "half the band finds otherwise: the model lacks something (look at what is left over); "
+    "or the sensor's noise is in the motion (take a finer one, or move faster)",
     "exponent": "slide at more, and slower, speeds, or measure a velocity map",
     "what the model misses": "the model lacks something; look at what is left over",
     "friction, at this excitation": "excite with more torque, of which friction is less, "

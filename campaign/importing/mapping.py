@@ -106,10 +106,10 @@ class ChannelColumn(ColumnPlace):
     label: str = Field(default="", max_length=120)
     """What people call it; needed where the channel is one of your own."""
     repair: tuple[Literal["unwrap"], ...] = ()
-    """unwrap: make an angle continuous whose scale begins anew after each turn."""
+    """unwrap: make an angle continuous whose scale wraps around."""
     accept: tuple[str, ...] = ()
-    """Kinds of what was found in it that are as they should be, such as `clipping` of a drive that
-    was meant to be at its limit. A reader is told of them."""
+    """Kinds of defects that are as they should be, such as `clipping` of a drive that was meant to
+    be at its limit. A reader is told of them."""
 
 
 class RowCondition(Options):

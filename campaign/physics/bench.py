@@ -62,7 +62,7 @@ class AxisOptions(Options):
     kind: Literal["rotary", "linear"] = "rotary"
     """How it moves. Of a linear axis every angle is a position, every torque a force."""
     inertia: Inertia | None = Field(default=None, gt=0)
-    """J: effective moment of inertia of motor, transmission and load, seen at the load."""
+    """J: inertia of motor, transmission and load, seen at the load."""
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -209,7 +209,7 @@ class AppendageOptions(Options):
     """
 
     inertia: Inertia = Field(gt=0)
-    """Its moment of inertia, a part of the axis' inertia."""
+    """Its inertia, a part of the axis' inertia."""
     frequency: Frequency = Field(gt=0)
     """Its natural frequency when the load is held still."""
     damping_ratio: float = Field(ge=0, le=2)
@@ -217,7 +217,7 @@ class AppendageOptions(Options):
 
 
 UNLIMITED = "unlimited"
-"""Angle limit of an axis that turns for ever."""
+"""Angle limit of an endless axis."""
 
 
 class LimitsOptions(Options):
@@ -227,8 +227,8 @@ class LimitsOptions(Options):
     """
 
     angle: Angle = Field(gt=0)
-    """Largest angle of the load relative to the hull, either way from zero; "unlimited" for an axis
-    that turns for ever."""
+    """Largest angle of the load relative to the hull, either way from zero; "unlimited" for an
+    endless axis."""
     rate: AngularRate = Field(gt=0)
     """Largest rate of the load relative to the hull."""
     rate_time: Time = Field(default=0.01, gt=0, le=1.0)
@@ -355,7 +355,7 @@ class Bench(Options):
         preload = None if bench.gear is None else bench.gear.preload
         wrong = list(wrong_paths(tree, bench.friction, bench.variation, preload))
         if bench.gear is not None and bench.gear.lead is not None and not bench.is_linear:
-            message = "a lead turns revolutions into travel, and the axis is rotary (axis.kind)"
+            message = "a lead needs a linear axis, and the axis is rotary (axis.kind)"
             wrong.append((("gear", "lead"), message))
         if bench.is_linear and bench.limits and math.isinf(bench.limits.angle):
             wrong.append((("limits", "angle"), "a linear axis has ends: write how far it may go"))

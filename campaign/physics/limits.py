@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.axis_kind import axis_terms, axis_unit
+from campaign.axis_kind import axis_unit
 from campaign.physics.bench import Bench
 from campaign.physics.complete import lacking, limits_of
 from campaign.signals import MultiSine, Polyline, Signal, Sine, Zero
@@ -112,8 +112,7 @@ def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
 
 def units_of(bench: Bench) -> dict[str, str]:
     """Units (SI) of the bench's axis, by those of a rotary one."""
-    with axis_terms(bench.sides):
-        return {unit: axis_unit(unit) for unit in ("rad", "rad/s", "rad/s^2", "N m")}
+    return {unit: axis_unit(unit, bench.sides) for unit in ("rad", "rad/s", "rad/s^2", "N m")}
 
 
 def unpredicted(bench: Bench, task: Task) -> dict[Limit, tuple[str, ...]]:

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator
 
-from campaign.axis_kind import axis_unit
 from campaign.options import Options
 from campaign.physics.friction_paths import (
     INTERFACE,
@@ -22,7 +21,7 @@ from campaign.physics.friction_paths import (
     why_not,
     without,
 )
-from campaign.units import Torque
+from campaign.units import Torque, torque_text
 
 SLOWEST = 1e-9
 """rad/s; an interface without a static torque holds with its friction of sliding this slowly."""
@@ -143,10 +142,10 @@ def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) 
     def more(parameter: str, value: float) -> float:
         raised = value + added.get(parameter, 0.0)
         if raised <= 0 < value:
-            unit = axis_unit("N m")
             raise ValueError(
-                f"a preload of {torque:g} {unit} leaves friction.{name} with a {parameter} of "
-                f"{raised:.4g} {unit}; raise preload.torque or lower its share"
+                f"a preload of {torque_text(torque, 'g')} leaves friction.{name} with a "
+                f"{parameter} of {torque_text(raised, '.4g')}; raise preload.torque or lower its "
+                "share"
             )
         return raised
 

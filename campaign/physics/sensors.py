@@ -13,7 +13,7 @@ from campaign.units import Angle, AngularRate, Current, MotorAngle, Time
 
 
 class RateSensor(Options):
-    """A sensor of angular rate, read by the sampled controller."""
+    """A sensor of rate, read by the sampled controller."""
 
     noise: AngularRate = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
@@ -41,7 +41,7 @@ class _Divided(Options):
         (name,) = given
         number = tree[name]
         if isinstance(number, bool) or not isinstance(number, int | float) or not number >= 1:
-            raise invalid([((name,), "a number per revolution, 1 or more, without a unit")])
+            raise invalid([((name,), "a number of 1 or more, without a unit")])
         rest = {key: value for key, value in tree.items() if key != name}
         return {**rest, "resolution": f"{360.0 / (number * _PER_REVOLUTION[name])!r} deg"}
 
@@ -52,8 +52,8 @@ class AngleSensor(_Divided):
     noise: Angle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: Angle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation. Instead, of an encoder: `lines = 1024` per revolution,
-    which are four counts each, or `counts`."""
+    """One count; 0 for no quantisation. Instead, of a rotary encoder: `lines` or `counts` of a
+    revolution, such as `lines = 1024` of four counts each."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
@@ -64,7 +64,7 @@ class MotorAngleSensor(_Divided):
     noise: MotorAngle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: MotorAngle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation. Instead: `lines` or `counts` per revolution."""
+    """One count; 0 for no quantisation. Instead: `lines` or `counts` of a motor revolution."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 

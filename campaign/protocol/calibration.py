@@ -81,7 +81,7 @@ class CalibrationOptions(Options):
     longest_step: Time = Field(default=0.25e-3, gt=0, le=0.01)
     """Longest integration step of the simulation."""
     leave_out: str = "frequency"
-    """The condition whose values are left out in turn to see how well the others predict them."""
+    """The condition whose values are left out one by one, to see how well the others predict."""
     leave_out_evaluations: int = Field(default=5, ge=1, le=100_000)
     """Steps of each of these refits at most; they begin at the optimum."""
 

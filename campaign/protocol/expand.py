@@ -11,13 +11,12 @@ from typing import Any
 from campaign.axis_kind import axis_terms, each_in_axis_terms, in_axis_terms, sides_in
 from campaign.errors import Problem
 from campaign.physics.bench import Bench
-from campaign.physics.complete import IncompleteBenchError
 from campaign.physics.truth import digest, is_setting, settings, simulated, value_at, with_settings
 from campaign.protocol import memory
 from campaign.protocol.load import unknown_compensation
 from campaign.protocol.matrix import LARGEST_PLAN
 from campaign.protocol.operator import PlaceholderError, set_by_operator, setup_at
-from campaign.protocol.points import Point, PointError, incomplete, points_of
+from campaign.protocol.points import Point, PointError, points_of, refused
 from campaign.protocol.schema import ExperimentKind, Test
 from campaign.protocol.stages import PlannedStage, most_of, planned_stages
 from campaign.protocol.swept_value_text import point_text
@@ -146,7 +145,7 @@ def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
         with axis_terms(point.bench.sides):
             return list(planned_stages(test, point, seed))
     except (ValueError, ArithmeticError) as error:
-        raise _refused(test, point, error) from None
+        raise refused(test, point.bench, error, _at(point)) from None
 
 
 def _warnings(test: Test, point: Point) -> list[str]:
@@ -155,20 +154,13 @@ def _warnings(test: Test, point: Point) -> list[str]:
         return []
     try:
         with axis_terms(point.bench.sides):
-            warned = test.experiment.warnings(point.options, point.bench)
-            return [in_axis_terms(text) for text in warned]
+            return list(map(in_axis_terms, test.experiment.warnings(point.options, point.bench)))
     except (ValueError, ArithmeticError) as error:
-        raise _refused(test, point, error) from None
+        raise refused(test, point.bench, error, _at(point)) from None
 
 
-def _refused(test: Test, point: Point, error: Exception) -> PointError:
-    """An experiment's word against options and bench of a point."""
-    if isinstance(error, IncompleteBenchError):
-        return incomplete(test, error)
-    where = f" at {point.label}" if point.values else ""
-    with axis_terms(point.bench.sides):
-        message = f"test '{test.entry.name}'{where}: {in_axis_terms(first_line(error))}"
-    return PointError([test.origin.problem((), "value", message)])
+def _at(point: Point) -> str:
+    return f" at {point.label}" if point.values else ""
 
 
 def _requests(
@@ -185,7 +177,7 @@ def _requests(
             check_recording(request.task)
             yield request, bench, tree, truths.of(point, bench, tree)
     except (ValueError, ArithmeticError) as error:
-        raise _refused(test, point, error) from None
+        raise refused(test, point.bench, error, _at(point)) from None
 
 
 def _bench_for(
@@ -350,10 +342,3 @@ def check_recording(task: Task) -> None:
             f"a trial of {samples_of(task):.3g} samples; at most {LARGEST_RECORDING:.3g} are "
             "allowed: lower sample_rate or the duration"
         )
-
-
-def first_line(error: Exception) -> str:
-    """What went wrong, in a line."""
-    lines = str(error).strip().splitlines() or [type(error).__name__]
-    # pydantic's messages have a headline, a field and a sentence; all three are needed.
-    return " ".join(line.strip() for line in lines[:3])

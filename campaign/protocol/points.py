@@ -36,6 +36,22 @@ def incomplete(test: Test, error: IncompleteBenchError) -> PointError:
     return PointError([test.origin.problem(("bench",), "value", message)])
 
 
+def first_line(error: Exception) -> str:
+    """What went wrong, in a line."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    # pydantic's messages have a headline, a field and a sentence; all three are needed.
+    return " ".join(line.strip() for line in lines[:3])
+
+
+def refused(test: Test, bench: Bench, error: Exception, where: str = "") -> PointError:
+    """An experiment's word against options and bench of a point."""
+    if isinstance(error, IncompleteBenchError):
+        return incomplete(test, error)
+    told = in_axis_terms(first_line(error), bench.sides)
+    message = f"test '{test.entry.name}'{where}: {told}"
+    return PointError([test.origin.problem((), "value", message)])
+
+
 @dataclass(frozen=True)
 class Point:
     """One point: swept path to SI value, and what a trial there has; objects beside their trees.
@@ -126,12 +142,8 @@ class _Cache:
         try:
             with axis_terms(bench.sides):
                 chosen = fit(options, bench)
-        except IncompleteBenchError as error:
-            raise incomplete(self.test, error) from None
         except (ValueError, ArithmeticError) as error:
-            with axis_terms(bench.sides):
-                message = f"test '{self.test.entry.name}': {in_axis_terms(str(error))}"
-            raise PointError([self.test.origin.problem((), "value", message)]) from None
+            raise refused(self.test, bench, error) from None
         if not chosen:
             return options, tree, {}
         key = (id(options), canonical_json({name: c.value for name, c in chosen.items()}))
@@ -140,8 +152,9 @@ class _Cache:
             fitted = options.model_copy(update=values)
             # Who asks later which options were written must not be told of these.
             fitted.__pydantic_fields_set__.difference_update(values)
-            with axis_terms(bench.sides):
-                reasons = {name: in_axis_terms(choice.reason) for name, choice in chosen.items()}
+            reasons = {
+                name: in_axis_terms(choice.reason, bench.sides) for name, choice in chosen.items()
+            }
             self.known_fits[key] = fitted, fitted.model_dump(mode="json"), reasons
         return self.known_fits[key]
 

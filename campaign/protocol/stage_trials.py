@@ -13,11 +13,11 @@ from campaign.physics.resolution import resolution_margins
 from campaign.protocol.expand import (
     check_recording,
     fields_of,
-    first_line,
     place_hash,
     samples_of,
 )
 from campaign.protocol.limit_check import in_display_units, in_words, one_count
+from campaign.protocol.points import first_line
 from campaign.protocol.schema import ExperimentKind
 from campaign.protocol.stages import PlannedStage
 from campaign.trial import Most, Trial, TrialRequest, canonical_json

@@ -46,8 +46,8 @@ def small_multiples(rest: Sequence[TrendSeries], covariate: Covariate) -> Figure
     return Figure(
         "no-trend-shown",
         "No trend shown",
-        "Points are runs with their 95 % intervals, lines what a trend would be, and bands its "
-        f"95 % interval: as far as a horizontal line fits into them.{more}",
+        "Points: runs with their 95 % intervals. Lines and bands: what a trend would be, and its "
+        f"95 % interval, as far as a horizontal line fits into it.{more}",
         "; ".join(each.series.name for each in shown),
         tuple(_panel(each, covariate, small=True) for each in shown),
         across=2,

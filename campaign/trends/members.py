@@ -12,7 +12,7 @@ from pathlib import Path
 from campaign.api.analysis import AnalysedTest, analyse_run, damage_of, source_of
 from campaign.archive import RunReader
 from campaign.archive.reading.damage import Damage
-from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, in_axis_terms
+from campaign.axis_kind import BOTH_ROTARY, Sides, in_axis_terms
 from campaign.comparison.circumstances import Change, changes
 from campaign.comparison.draws import SIMULATION
 from campaign.comparison.run_comparison import refuse_twice
@@ -103,8 +103,7 @@ def with_exchanged(
         known = dict.fromkeys(source for member in members for source in member.constants)
         source = source_called(name, known, members[0].sides)
         if source is None:
-            with axis_terms(members[0].sides):
-                there = ", ".join(map(in_axis_terms, known)) or "nothing"
+            there = ", ".join(in_axis_terms(each, members[0].sides) for each in known) or "nothing"
             raise UsageError(f"{told}: {name!r} is none of {there}")
         first = next((each.number for each in members if each.run.path == path), None)
         if first is None:
@@ -144,8 +143,7 @@ def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
 
 def _exchanges(member: Member) -> Iterator[Change]:
     for source in member.exchanged:
-        with axis_terms(member.sides):
-            yield Change("rig", in_axis_terms(source), "one piece", "another")
+        yield Change("rig", in_axis_terms(source, member.sides), "one piece", "another")
 
 
 def _check(runs: Sequence[RunReader]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from campaign import __version__
 from campaign.api.estimates import row_of
-from campaign.axis_kind import axis_terms, in_axis_terms
+from campaign.axis_kind import in_axis_terms
 from campaign.estimation.difference import in_unit
 from campaign.estimation.family import RATE
 from campaign.estimation.trends.changes import POWER
@@ -150,8 +150,10 @@ def _how(trends: Trends) -> Iterator[str]:
         "integrated over, up to a correlation of 0.9, and not estimated and then believed. "
         "Intervals are of 95 % and hold that; of few runs they are wide."
     )
-    with axis_terms(trends.members[0].sides):
-        cancelled = {in_axis_terms(source) for each in trends.followed for source in each.cancelled}
+    sides = trends.members[0].sides
+    cancelled = {
+        in_axis_terms(source, sides) for each in trends.followed for source in each.cancelled
+    }
     if cancelled:
         yield (
             "All runs rest on the same value of these, which moves all points alike and is in no "

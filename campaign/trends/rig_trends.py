@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaign.archive import RunReader
-from campaign.axis_kind import axis_terms, in_axis_terms
+from campaign.axis_kind import in_axis_terms
 from campaign.channels import TEMPERATURE
 from campaign.comparison.circumstances import Change as Circumstance
 from campaign.errors import UsageError
@@ -47,8 +47,8 @@ TELLS_A_SHARE = 0.2
 GO_TOGETHER = 0.7
 """Correlation of time and temperature from which on nobody can tell what a number follows."""
 WITHIN = (
-    "all of this change lies within the interval of each single run: it may be an error that the "
-    "runs share and that changes with something else, as one parameter's with another's value"
+    "all of this change lies within the interval of each single run; it may be a shared error that "
+    "changes with something else, as one parameter's with another's value"
 )
 TOO_FEW_KNOWN = Cause("covariate of too few runs", "{covariate} is known of {runs} runs: too few")
 NOT_VARYING = Cause("constant covariate", "{covariate} does not vary")
@@ -225,9 +225,8 @@ def _followed(series: Series, covariate: Covariate) -> TrendSeries:
     if np.ptp(x) <= 1e-9 * np.max(np.abs(x)):
         return TrendSeries(series, x, reason=NOT_VARYING(covariate=covariate.name))
     own, cancelled, unknown = series.own()
-    with axis_terms(series.points[0].member.sides):
-        told_of = map(in_axis_terms, unknown)
-        notes = [f"not the same in all runs, with no stated uncertainty: {s}" for s in told_of]
+    told_of = (in_axis_terms(source, series.points[0].member.sides) for source in unknown)
+    notes = [f"not the same in all runs, with no stated uncertainty: {s}" for s in told_of]
     notes += [series.bare] if series.bare else []
     try:
         found = change(x, series.values, own, jumps=covariate.ordered)
@@ -312,6 +311,6 @@ def _notes(
         if abs(share) > GO_TOGETHER:
             yield (
                 f"Time and temperature go together in these runs (correlation {share:.2f}): a "
-                "number that follows the one seems to follow the other, and which of them it is "
-                "these runs do not say."
+                "number that follows the one seems to follow the other. These runs do not say "
+                "which it is."
             )

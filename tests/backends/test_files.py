@@ -279,7 +279,7 @@ def test_the_page_says_how_long_to_go_on_behind_the_rate_that_ends_a_trial(tmp_p
     trial = TRIAL.model_copy(update={"task": task})
     execute(opened(tmp_path, (trial,)), trial)
     page = (tmp_path / "trial-00003" / "index.html").read_text(encoding="utf-8")
-    assert "has passed 1.14592 deg/s, play and record on for 0.16 s (40 samples)" in page
+    assert "0.16 s (40 samples) after the rate has passed 1.14592 deg/s" in page
     told = json.loads((tmp_path / "trial-00003" / "manifest.json").read_text(encoding="utf-8"))
     assert told["record_after_stop_rate"] == 0.16
 

@@ -103,7 +103,7 @@ PUSH = task(mode="torque", command=Polyline(times=(0.0, 2.0), values=(0.0, 200.0
     [
         ("angle", "relative_angle", np.deg2rad(2.0), ("2 deg", "angle limit")),
         ("rate", "relative_rate", np.deg2rad(10.0), ("10 deg/s", "rate limit")),
-        ("torque", "drive_torque", 60.0, ("60 N m", "torque limit")),
+        ("torque", "drive_torque", 60.0, ("60 N·m", "torque limit")),
         ("current", "motor_current", 4.0, ("4 A", "current limit")),
     ],
 )

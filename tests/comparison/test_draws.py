@@ -40,7 +40,7 @@ def test_identical_trials_and_common_seeds_are_said(platform: Bench):
     bench = {**one.trials[0].trial.bench, "title": "another"}
     (told,) = said(one, reseeded(one, [1, 2, 9], bench=bench))
     assert told.startswith("2 of 3 trials have the seed in common")
-    assert "judged as independent runs: as far as the draws act alike in both, the" in told
+    assert "judged as independent runs. As far as the draws act alike in both" in told
     assert "Another seed in one of the protocols makes them independent" in told
     mixed = reseeded(one, [1, 2, 9])
     last = mixed.trials[1]

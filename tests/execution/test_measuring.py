@@ -321,5 +321,5 @@ def test_why_nothing_was_measured_is_told_in_the_words_of_the_axis() -> None:
     linear = {"name": "carriage", "axis": {"name": "x", "kind": "linear", "inertia": 9.0}}
     moved = replace(done, trial=done.trial.model_copy(update={"bench": linear}))
     measuring = TrialMeasurement(experiments())
-    assert "the rate never reached 0.005 rad/s" in measuring(done).problem
-    assert "the rate never reached 0.005 m/s" in measuring(moved).problem
+    assert "the rate never reached 0.2865 deg/s" in measuring(done).problem
+    assert "the rate never reached 5 mm/s" in measuring(moved).problem

@@ -113,7 +113,7 @@ def test_a_good_trial_passes_as_it_is() -> None:
         (0, 1.001, Outcome.LIMIT, "relative_angle reached 57.3531 deg at 0.73 s; the angle limit"),
         (0, -1.001, Outcome.LIMIT, "relative_angle reached -57.3531 deg"),
         (1, 5.0, Outcome.LIMIT, "relative_rate reached 143.239 deg/s (mean of 20 ms) at 0.73 s"),
-        (2, -11.0, Outcome.LIMIT, "drive_torque reached -11 N m at 0.73 s; the torque limit is 10"),
+        (2, -11.0, Outcome.LIMIT, "drive_torque reached -11 N·m at 0.73 s; the torque limit is 10"),
         (3, 5000.0, Outcome.LIMIT, "motor_current reached 5000 A at 0.73 s; the current limit"),
         (2, np.nan, Outcome.DIVERGED, "drive_torque is nan at 0.73 s"),
         (3, -np.inf, Outcome.DIVERGED, "motor_current is -inf at 0.73 s"),
@@ -394,7 +394,7 @@ def test_a_recording_is_judged_and_not_ended() -> None:
     judged = ending.telemetry["judged"]
     assert isinstance(judged, dict)
     assert set(judged) == {"limit", "undefined", "time", "length"}
-    assert "drive_torque reached 11 N m at 0.3 s" in str(judged["limit"])
+    assert "drive_torque reached 11 N·m at 0.3 s" in str(judged["limit"])
     assert [event.text for event in recording.events] == list(judged.values())
 
 

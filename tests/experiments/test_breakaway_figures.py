@@ -25,5 +25,5 @@ def test_a_caption_says_where_its_bars_are_others_than_the_intervals_of_the_tabl
     assert bars.low is not None
     assert bars.high is not None
     same = (bars.low[0], bars.high[0]) == own.combined
-    assert same == ("wider than the bars here" not in figure.caption)
+    assert same == ("The bar of the mean" not in figure.caption)
     assert same == (parts != (Systematic("inertia", 2.0),))

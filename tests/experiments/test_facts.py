@@ -74,7 +74,7 @@ def test_without_it_what_accelerates_the_load_stays_in_friction_and_is_told(
         assert other == rate
         assert more - torque == pytest.approx(0.35, rel=1e-6)
     (note,) = [note for note in bare.notes if "axis.inertia" in note]
-    assert "by up to 0.57 deg/s² in these windows, is not taken out of friction" in note
+    assert "by up to 0.57 deg/s² in these windows" in note
     for row in table_of_estimates(bare, "map").rows:
         parts = {part.source: part.standard_uncertainty for part in row["torque"].systematic}
         assert parts["inertia"] is None

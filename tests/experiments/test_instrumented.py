@@ -114,7 +114,7 @@ def test_what_is_biased_is_said_and_instruments_are_told(told: InverseDynamics) 
     assert told.instruments is not None
     assert told.estimates == told.instruments.estimates
     table = instruments_table(told, told.instruments)
-    assert "noise of the motion biases least squares" in table.note
+    assert "biases least squares" in table.note
     assert table.rows[0]["squares"] == told.squares["inertia"]
     assert "along the wanted motion" in table.title
 

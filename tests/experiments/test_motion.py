@@ -132,7 +132,7 @@ def test_a_load_that_drives_the_axis_costs_no_direction(tmp_path: Path):
     row = found(run, "constant_torque")
     assert row.low <= 4.0 <= row.high
     assert {"positive", "negative"} <= set(run.results.findings.direction)
-    assert "gravity or an offset" in notes(run)
+    assert "Gravity or an offset" in notes(run)
 
 
 def test_drift_that_goes_with_speed_is_told(tmp_path: Path):

@@ -91,7 +91,7 @@ def test_sizes_follow_from_where_the_bench_gives_way() -> None:
 def test_amplitudes_at_which_an_interface_slips_are_warned_of() -> None:
     assert EXPERIMENT.warnings is not None
     large = EXPERIMENT.options.model_validate({"amplitudes": ["1 N m", "5 N m"]})
-    assert any("slips at about 6.37 N m" in each for each in EXPERIMENT.warnings(large, bench()))
+    assert any("slips at about 6.37 N·m" in each for each in EXPERIMENT.warnings(large, bench()))
     small = EXPERIMENT.options.model_validate({"amplitudes": ["1 N m", "2 N m"]})
     assert not list(EXPERIMENT.warnings(small, bench()))
     one = EXPERIMENT.options.model_validate({"amplitudes": ["1 N m"]})

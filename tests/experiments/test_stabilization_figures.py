@@ -372,7 +372,7 @@ def test_a_torque_that_chatters_is_shown_as_its_mean_and_range() -> None:
     assert 9.0 < wide.min() < 10.5
     assert wide.max() < 14.0
     assert np.max(np.abs(line.y - clean.panels[0].curves[0].y)[known]) < 0.5
-    assert re.search(r"the line is its mean over [\d.]+ ms, and the shade", shown.caption)
+    assert re.search(r"its mean, and the shade its range, over [\d.]+ ms", shown.caption)
 
 
 def test_what_methods_leave_of_friction_is_shown_side_by_side() -> None:

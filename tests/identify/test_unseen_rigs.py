@@ -203,11 +203,11 @@ def test_friction_that_drives_is_told(tmp_path: Path) -> None:
     """A force on the part that rests has the other sign."""
     columns = sliding((5.0,), np.geomspace(0.02, 0.2, 5))
     right = identified(imported(tmp_path, columns, 100.0, kind="linear"), "friction_map")
-    assert "goes with the motion" not in notes(right)
+    assert "acts with the motion" not in notes(right)
     unit, force = columns["joint_torque"]
     columns["joint_torque"] = unit, -force
     results = imported(tmp_path, columns, 100.0, kind="linear", name="turned")
-    assert "goes with the motion" in notes(identified(results, "friction_map"))
+    assert "acts with the motion" in notes(identified(results, "friction_map"))
 
 
 def test_many_speeds_close_to_each_other_are_many() -> None:

@@ -129,8 +129,8 @@ def test_an_encoder_is_told_by_its_lines_or_counts(told: Tree, count: float) -> 
     [
         ({"lines": 2000, "counts": 8000}, "say the same"),
         ({"lines": 2000, "resolution": "1 deg"}, "say the same"),
-        ({"lines": "2000"}, "a number per revolution"),
-        ({"counts": 0}, "a number per revolution"),
+        ({"lines": "2000"}, "a number of 1 or more"),
+        ({"counts": 0}, "a number of 1 or more"),
     ],
 )
 def test_an_encoder_that_is_told_twice_or_not_at_all(told: Tree, message: str) -> None:

@@ -131,7 +131,7 @@ def test_a_mistake_in_a_bench_is_found_where_it_is(
 
 def test_what_a_field_means_is_said_with_its_units(benches: Draft7Validator) -> None:
     inertia = benches.schema["definitions"]["AxisOptions"]["properties"]["inertia"]
-    assert inertia["description"].startswith("J: effective moment of inertia")
+    assert inertia["description"].startswith("J: inertia of motor")
     assert "units: kg m^2" in json.dumps(inertia)
 
 

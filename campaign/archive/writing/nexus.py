@@ -18,7 +18,7 @@ import h5py
 from h5py import h5o
 
 from campaign.archive.writing import hdf5
-from campaign.axis_kind import BOTH_ROTARY, AxisKind, Sides, axis_terms, axis_unit, sides_in
+from campaign.axis_kind import BOTH_ROTARY, AxisKind, Sides, axis_unit, sides_in
 from campaign.channels import (
     COMMAND,
     DRIVE_TORQUE,
@@ -111,8 +111,7 @@ def _template(bench: InstrumentDescription) -> h5py.File:
     hdf5.put_text(motor, "physical_quantity", "torque" if turns else "force")
     for loop, proportional, integral in bench.gains:
         controller = hdf5.make_group(motor, f"{loop}_controller", "NXpid_controller")
-        with axis_terms(bench.sides):
-            unit, integral_unit = map(axis_unit, _GAIN_UNITS[loop])
+        unit, integral_unit = (axis_unit(each, bench.sides) for each in _GAIN_UNITS[loop])
         hdf5.put_number(controller, "K_p", proportional, units=unit)
         hdf5.put_number(controller, "K_i", integral, units=integral_unit)
     return file

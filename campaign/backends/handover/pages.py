@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from campaign.axis_kind import in_axis_terms, sides_in
 from campaign.backends.handover.acceptance import GO_ON
 from campaign.backends.handover.excitation import Series, axis_of, shown
 from campaign.backends.handover.handover_folder import (
@@ -19,7 +20,7 @@ from campaign.backends.handover.handover_folder import (
     Verdict,
     read_json,
 )
-from campaign.channels import COMMAND, VOCABULARY, AxisKind, explained, info
+from campaign.channels import COMMAND, VOCABULARY, explained, info
 from campaign.plain_text import on_a_page
 from campaign.trial import Role, Trial
 
@@ -161,9 +162,9 @@ def attempt_page(
     if task.stop_rate is not None:
         rate = _text(shown(trial, "relative_rate", task.stop_rate))
         body.append(
-            f"<p>It may end early: once the rate has passed {rate}, play and record on for "
-            f"{GO_ON / task.sample_rate:.4g} s ({GO_ON} samples), within the limits, and end it "
-            "then. What the load does as it breaks away is in those samples.</p>"
+            f"<p>It may end early: {GO_ON / task.sample_rate:.4g} s ({GO_ON} samples) after the "
+            f"rate has passed {rate}, within the limits. What the load does as it breaks away is "
+            "in those samples.</p>"
         )
     body += [
         "<h2>Record</h2>",
@@ -268,17 +269,14 @@ def _role(role: str) -> str:
 
 
 def _settings(trial: Trial) -> list[str]:
-    task, linear = trial.task, axis_of(trial) is AxisKind.LINEAR
+    task, sides = trial.task, sides_in(trial.bench)
     angle = shown(trial, "relative_angle", task.start_angle)
     rest = "the hull at rest" if task.base_acceleration.shape == "zero" else "the hull as played"
     loop = {
         "rate": "Close the rate loop: the command is the rate of the load.",
-        "torque": (
-            f"Open the rate loop: the command is the drive's {'force' if linear else 'torque'} "
-            "at the load."
-        ),
+        "torque": "Open the rate loop: the command is the drive's torque at the load.",
     }.get(task.mode, f"Mode {task.mode}.")
-    lines = [f"Begin at {angle}, at rest; {rest}.", loop]
+    lines = [f"Begin at {angle}, at rest; {rest}.", in_axis_terms(loop, sides)]
     method = task.compensation
     lines.append(
         "No friction compensation."
@@ -293,9 +291,8 @@ def _settings(trial: Trial) -> list[str]:
             "torque": "drive_torque",
             "current": "motor_current",
         }
-        words = {"angle": "position", "torque": "force"} if linear else {}
         told = [
-            f"{words.get(name, name)} {shown(trial, watched[name], float(value))}"
+            f"{in_axis_terms(name, sides)} {shown(trial, watched[name], float(value))}"
             for name, value in limits.items()
             if name in watched and isinstance(value, int | float)
         ]

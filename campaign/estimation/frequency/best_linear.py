@@ -197,8 +197,8 @@ def _undetermined(excitation: Excitation) -> tuple[str, ...]:
     told = []
     if excitation.periods < 2:
         told.append(
-            "Noise is not determined by a single period, nor which part of a line is distortion, "
-            "nor what a transient adds: record two periods or more of each realisation."
+            "A single period determines neither noise nor distortion nor transient: record two "
+            "periods or more of each realisation."
         )
     if excitation.realisations < 2:
         told.append(

@@ -80,7 +80,7 @@ ALL = (
          lambda m: np.cos(m.position)),
     Term("spring", "q", "N m/rad", "A cable's stiffness.", lambda m: m.position, family="place"),
     Term("square_root", "sign v √|v|", "N m s/rad",
-         "Friction that bends, as of thin films: times √(|v| · 1 rad/s).",
+         "Friction that bends, as of thin films: times √(|v| · v₁), with v₁ = 1 in SI units.",
          lambda m: np.sign(m.rate) * np.sqrt(np.abs(m.rate)), family="bend"),
     Term("quadratic", "v |v|", "N m s^2/rad^2", "Drag.", lambda m: m.rate * np.abs(m.rate),
          family="bend"),

@@ -220,9 +220,9 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
         yield f"The delay of the force is not determined: {late.reason}."
     if way := one_way(found):
         yield (
-            f"The axis moves in the {way} direction only: friction of the other is not known, and "
-            "what is called Coulomb friction holds every constant force as well, such as a weight "
-            "or a sensor's zero. Friction goes to no bench file."
+            f"The axis moves in the {way} direction only: friction of the other is not known. "
+            "Coulomb friction includes every constant force, such as a weight or a sensor's zero. "
+            "Friction goes to no bench file."
         )
     if (force := force_of(data.trials[0])) != DRIVE_TORQUE:
         yield (

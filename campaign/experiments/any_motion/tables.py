@@ -153,10 +153,10 @@ def instruments_note(found: InverseDynamics) -> str:
         return ""
     if found.biased:
         return (
-            "The two differ by more than scatter explains: noise of the motion biases least "
-            "squares (or, where that is quiet, what filters make of jumps of friction). What "
-            "instruments say is told, and goes to the bench file; predictions are of least "
-            "squares, which predict what the same loop does of the same noise."
+            "The two differ by more than scatter explains: noise of the motion, or what filters "
+            "make of jumps of friction, biases least squares. What instruments say goes to the "
+            "bench file; predictions are of least squares, which predict what the same loop does "
+            "of the same noise."
         )
     alike = "How far the two differ is a systematic part (“instruments”) of what least squares say."
     if held.of_wanted:

@@ -65,6 +65,7 @@ from campaign.units import (
     Time,
     Torque,
     TorqueRate,
+    in_words,
     rate_text,
 )
 
@@ -96,7 +97,7 @@ class BreakawayOptions(Options):
     directions: tuple[Literal["positive", "negative"], ...] = Field(
         default=("positive", "negative"), min_length=1, max_length=2
     )
-    """Ways to which the load is turned, one after the other; friction may differ by direction."""
+    """Directions of the ramps, one after the other; friction may differ by direction."""
     torque_rate: TorqueRate = Field(default=1.0, gt=0)
     """Slope of the ramp, at the load. Swept, it shows what the ramp's rate does to the results."""
     peak_torque: Torque = Field(default=60.0, gt=0)
@@ -174,7 +175,7 @@ def _found(
     yield TrialRequest(
         Task(mode="recorded", duration=stop, window=(ramp.start, stop), sample_rate=1.0),
         point=place | {"direction": "positive" if ramp.slope > 0 else "negative"},
-        note=f"a ramp of {ramp.slope:.3g} N m/s from {ramp.start:.3g} s was found{coarse}",
+        note=f"a ramp of {in_words(ramp.slope, 'N m/s')} from {ramp.start:.3g} s was found{coarse}",
         windows=windows,
         part=(0.0, stop),
         options={

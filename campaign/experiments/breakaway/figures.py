@@ -195,9 +195,9 @@ def _bars(ramps: Ramps) -> str:
     if not any(each.has_interval and each.combined != (each.low, each.high) for each in every):
         return f"{own}."
     return (
-        f"{own}: whether ramps differ shows by these. What the bench's constants may be off by is "
-        "the same in all ramps: it is in the bar of the mean on the right, and in every interval "
-        "of the table, which are therefore wider than the bars here."
+        f"{own}: whether ramps differ shows by these. The bar of the mean and the intervals of "
+        "the table are wider: they include the uncertainty of the bench's constants, which all "
+        "ramps share."
     )
 
 

@@ -11,7 +11,7 @@ from campaign.estimation.breakaway_torque import STILL_RISING
 from campaign.estimation.presliding import NOT_RESOLVED, WINDOW
 from campaign.experiments.breakaway.means import MEASURED, Ramps, option_of
 from campaign.experiments.interface import bench_of
-from campaign.units import angle_text, rate_text
+from campaign.units import angle_text, in_words, rate_text, torque_text
 
 FEW_COUNTS = 10.0
 """of the encoder in presliding: an angle of fewer shows no curve."""
@@ -29,8 +29,8 @@ def remarks(ramps: Ramps) -> Iterator[str]:
     for item, own in zip(ramps.trials, ramps.found, strict=True):
         if "bristle_stiffness" not in own:
             yield (
-                f"{item.trial.label}: its presliding is too short for a stiffness (a slower ramp "
-                "has more samples of it), or too noisy (a faster one moves more above the noise)."
+                f"{item.trial.label}: its presliding is too short or too noisy for a stiffness. A "
+                "slower ramp has more samples; a faster one moves more above the noise."
             )
     yield "σ1 is assumed from a damping ratio; a torque ramp carries no information on it."
     if any(each.value > 1 for each in ramps.values("interfaces")):
@@ -50,8 +50,8 @@ def _inertia(ramps: Ramps) -> Iterator[str]:
     found = [abs(each.value) for each in ramps.values("peak_acceleration")]
     inertia = bench_of(ramps.trials[0].trial).axis.inertia
     if found and inertia is not None:
-        size = 0.01 * float(np.mean(found)) * inertia
-        yield f"An inertia that is 1 % off moves the breakaway torque by {size:.2g} N·m."
+        moved = torque_text(0.01 * float(np.mean(found)) * inertia, ".2g")
+        yield f"An error of 1 % of the inertia moves the breakaway torque by {moved}."
 
 
 def _encoder(ramps: Ramps) -> Iterator[str]:
@@ -95,8 +95,8 @@ def _rate(ramps: Ramps) -> Iterator[str]:
     if noisy and (refused or 2 * shifted > len(stiffness)):
         rate = 0.25 * option_of(ramps, "torque_rate")
         yield (
-            "The ramp is too fast for the curve of bristles, or its sensors too coarse: choose a "
-            f"torque_rate of {rate:.2g} N·m/s, or sweep it to see what it does."
+            "The ramp is too fast for the curve of bristles, or its sensors too coarse: sweep "
+            f"torque_rate, or choose {in_words(rate, 'N m/s', form='.2g')}."
         )
 
 
@@ -108,9 +108,10 @@ def _hidden(ramps: Ramps) -> Iterator[str]:
         return
     rate = option_of(ramps, "torque_rate")
     yield (
-        f"The gyro's noise may hide a stiffer interface that slips first: of {len(found)} ramps, "
+        f"The gyro's noise may hide a stiffer interface that slips first. Of {len(found)} ramps, "
         f"stiffness at rest is a lower bound in {bounds} and σ0 an upper bound in {above}. A "
-        f"torque_rate of {4.0 * rate:.2g} N·m/s shows twice as much above the noise."
+        f"torque_rate of {in_words(4.0 * rate, 'N m/s', form='.2g')} shows twice as much above "
+        "the noise."
     )
 
 

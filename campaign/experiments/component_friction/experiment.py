@@ -47,7 +47,7 @@ from campaign.result import (
 )
 from campaign.signals import Polyline
 from campaign.trial import Task, Tree, TrialRequest
-from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate
+from campaign.units import AngularRate, Frequency, Time, Torque, TorqueRate, torque_text
 
 REACH = 2.0
 """The ramp ends at this many times the friction that the bench describes."""
@@ -61,10 +61,10 @@ class ComponentFrictionOptions(Options):
     components: tuple[str, ...] = ()
     """Interfaces of the bench's friction that are measured one by one; without any, all of them."""
     direction: Literal["alternating", "positive", "negative"] = "alternating"
-    """Which way the component is turned; friction may differ by direction."""
+    """Which way the component moves; friction may differ by direction."""
     scatter: float | None = Field(default=None, ge=0, le=0.3)
-    """Relative standard deviation of friction from one measurement to the next, of a simulated
-    bench: a part in the hand scatters more than one in its place. Absent: as the bench says."""
+    """Relative standard deviation of friction between measurements on a simulated bench. A part
+    scatters more in the hand than in its place. Absent: as the bench says."""
     measurements: int = Field(default=10, ge=1, le=1000)
     """How often each is measured."""
     sensor_resolution: Torque = Field(default=0.01, ge=0)
@@ -76,8 +76,7 @@ class ComponentFrictionOptions(Options):
     rest: Time = Field(default=0.2, ge=0)
     """Standstill before the ramp."""
     sliding_rate: AngularRate = Field(default=0.005, gt=0)
-    """Rate at which the component counts as turning; the trial ends when it is four times this
-    fast."""
+    """Rate from which on the component slides; the trial ends at four times this rate."""
     sample_rate: Frequency = Field(default=250.0, gt=0, le=100_000)
     """Rate of the recording."""
 
@@ -113,7 +112,7 @@ def _trials(options: ComponentFrictionOptions, bench: Bench) -> Iterator[TrialRe
                 ),
                 point={"component": component, "measurement": number},
                 bench=tree,
-                note=f"only {component}; ends early, once it turns",
+                note=f"only {component}; ends early, once it slides",
                 windows=(Window("ramp", options.rest, stop),),
             )
 
@@ -306,9 +305,10 @@ def _remarks(readings: list[Reading], first: TrialData) -> Iterator[str]:
     if motor and gear is not None and options.sensor_resolution > 0:
         step = options.sensor_resolution * gear.ratio
         yield (
-            f"The torque sensor shows multiples of {options.sensor_resolution:g} N·m. Behind the "
-            f"gear that is {step:.3g} N·m at the load: the readings of {' and '.join(motor)} fall "
-            "on a few steps, and their deviation is that of the sensor as much as of friction."
+            f"The torque sensor shows multiples of {torque_text(options.sensor_resolution, 'g')}. "
+            f"Behind the gear that is {torque_text(step)} at the load. Readings of "
+            f"{' and '.join(motor)} fall on a few steps: their deviation is that of the sensor as "
+            "much as of friction."
         )
     yield (
         "A single reading is one sample of a friction that scatters from trial to trial; only mean "
@@ -357,8 +357,8 @@ EXPERIMENT = Experiment(
     measure=_measure,
     needs_samples=False,
     requires={
-        DRIVE_TORQUE: "the torque at which the component turns",
-        GYRO_RATE: "the moment at which it turns",
+        DRIVE_TORQUE: "the torque at which the component slides",
+        GYRO_RATE: "the moment at which it slides",
     },
     key_numbers=(
         key("breakaway_torque", statistic="mean"),

@@ -48,13 +48,13 @@ def component_figure(
     trials: tuple[int, ...],
     suffix: str,
 ) -> Figure:
-    """The figure of one place of the sweep; sliding_rate (rad/s) counts as turning."""
+    """The figure of one place of the sweep; sliding_rate (rad/s) counts as sliding."""
     last = max(number for each in shown for number in each.numbers)
     ramps = [_ramp(each) for each in shown if not each.ramp.not_kept]
     return Figure(
         key=f"component-friction{suffix}",
         title="Breakaway torque of the components",
-        caption=f"{'One ramp of each component until it turns, then the' if ramps else 'The'} "
+        caption=f"{'One ramp of each component until it slides, then the' if ramps else 'The'} "
         "repeated readings of each component, with their 95 % intervals, and their mean, each "
         "component on its own scale. "
         f"{_what_shows(shown)}",
@@ -68,7 +68,7 @@ def component_figure(
                         Axis("Rate", "rad/s", "deg/s"),
                         ramps,
                         "One ramp of each",
-                        [Mark("counts as turning", y=sliding_rate)],
+                        [Mark("counts as sliding", y=sliding_rate)],
                     )
                 ]
                 if ramps

@@ -29,7 +29,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate
 from campaign.physics.limits import worst_friction
 from campaign.signals import Array, MultiSine, Polyline
-from campaign.units import angle_text, in_words, rate_text
+from campaign.units import angle_text, rate_text, torque_text
 
 PER_CYCLE = 16.0
 """Points of a polyline of noise per cycle of its highest frequency, at least."""
@@ -210,8 +210,8 @@ def room_of(options: ExcitationOptions, bench: Bench) -> Room:
     left = torque - worst_friction(bench, rate)
     if left <= 0:
         raise ValueError(
-            f"friction at {rate_text(rate)} asks for {in_words(torque - left, 'N m', 'N m')}, and "
-            f"{in_words(torque, 'N m', 'N m')} are allowed: lower max_rate or raise max_torque"
+            f"friction at {rate_text(rate)} asks for {torque_text(torque - left)}, and "
+            f"{torque_text(torque)} are allowed: lower max_rate or raise max_torque"
         )
     acceleration = options.max_acceleration or MOST * rig.limits.acceleration
     return Room(angle, rate, min(acceleration, rig.accelerated_by(left)))
@@ -234,7 +234,7 @@ def start_of(options: ExcitationOptions, bench: Bench, course: Course) -> float:
     swing, fastest = 0.5 * float(np.ptp(angle)), float(np.max(np.abs(rate)))
     if abs(options.position) + swing > limits.angle or fastest > limits.rate:
         raise ValueError(
-            f"{in_words(largest, 'N m', 'N m')} would swing a load without friction by "
+            f"{torque_text(largest)} would swing a load without friction by "
             f"{angle_text(swing)} at {rate_text(fastest)}, beyond the bench's limits of "
             f"{angle_text(limits.angle)} and {rate_text(limits.rate)}; lower torque or raise lowest"
         )

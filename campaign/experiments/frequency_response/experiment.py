@@ -71,6 +71,7 @@ from campaign.units import (
     Torque,
     angle_text,
     rate_text,
+    torque_text,
 )
 
 AT_HAND = Cause("describes the recording at hand", "it describes the recording at hand")
@@ -116,8 +117,8 @@ class FrequencyResponseOptions(Options):
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
     refine: bool = False
-    """Closed loop: when the sweep has ended, measure further frequencies around the crossings
-    of -3 dB and of 0 dB and, where it lies in the sweep, the phase crossover."""
+    """Closed loop: after the sweep, measure more frequencies around the crossings of -3 dB and
+    0 dB, and around a phase crossover within the sweep."""
 
     def without_effect(self) -> frozenset[str]:
         swept = {"lowest", "highest", "step"} if self.frequencies else set()
@@ -345,7 +346,7 @@ def amplitude_text(command: Sine, closed: bool) -> str:
     """Of a rate command in a closed loop, or a torque in an open one; for people."""
     if closed:
         return f"amplitude {rate_text(command.amplitude)}"
-    return f"amplitude {command.amplitude:.3g} N·m"
+    return f"amplitude {torque_text(command.amplitude)}"
 
 
 def rate_sine(
@@ -380,9 +381,9 @@ def torque_sine(
     swing = rate / omega
     if abs(position) + swing > limits.angle or rate > limits.rate:
         raise ValueError(
-            f"{torque:g} N·m at {frequency:g} Hz would swing a load without friction by "
-            f"{angle_text(swing)} at {rate_text(rate)}, beyond the bench's "
-            "limits; lower torque or raise lowest"
+            f"{torque_text(torque, 'g')} at {frequency:g} Hz would swing a load without friction "
+            f"by {angle_text(swing)} at {rate_text(rate)}, beyond the bench's limits; lower torque "
+            "or raise lowest"
         )
     return Sine(amplitude=torque, frequency=frequency, phase=0.5 * math.pi), swing
 

@@ -11,7 +11,7 @@ from campaign.estimation.continuation import DECIBEL, Continuation
 from campaign.estimation.frequency_response import Response, open_loop
 from campaign.estimation.servo import ServoCharacteristics
 from campaign.experiments.frequency_response.marks import Named, bandwidths, margins
-from campaign.experiments.responses.figures import FREQUENCY, PHASE, turned
+from campaign.experiments.responses.figures import FREQUENCY, PHASE, gain_label, turned
 from campaign.result import Array, Axis, Curve, Figure, Finding, Mark, Panel
 
 SHOWN_BEYOND = 1.2
@@ -60,8 +60,8 @@ def closed_loop_figures(
     yield _bode(
         "open-loop",
         "Open-loop response, rate error to gyro rate",
-        "The distance of the phase from -180° where the gain is 0 dB is the phase margin; how far "
-        "the gain is below 0 dB where the phase is -180° is the gain margin."
+        "Phase margin: distance of the phase from -180° where the gain is 0 dB. Gain margin: "
+        "distance of the gain below 0 dB where the phase is -180°."
         + (" Both are drawn where they were found." if kept.gain_marks or kept.phase_marks else "")
         + (
             " What lies above the sweep is extrapolated (thin), by one of the fits between which "
@@ -69,7 +69,7 @@ def closed_loop_figures(
             if beyond
             else ""
         )
-        + " Bands and bars are 95 % intervals, where they are wide enough to be seen.",
+        + " Bands and bars: 95 % intervals.",
         "Gain and phase of the open loop over frequency, one curve per compensation, with the "
         "0 dB and -180° lines and the margins.",
         Axis("Gain", "dB"),
@@ -92,10 +92,9 @@ def torque_figure(sweeps: Sequence[Named], modes: Iterable[Finding]) -> Figure:
         "Open-loop response, drive torque to gyro rate",
         "A rigid axis falls by 20 dB per decade with the phase at -90°; friction lifts the phase "
         "and flattens the gain at low frequencies. An elastic mode is a dip and a peak side by "
-        "side: in the inertia that torque over acceleration amounts to, a peak and a dip on top "
-        "of the axis' own.",
+        "side. In the apparent inertia, torque over acceleration, it is a peak and a dip.",
         "Gain and phase from drive torque to gyro rate over frequency, and the apparent inertia.",
-        Axis("Gain, dB of 1 rad/s per N·m"),
+        Axis(gain_label("Gain")),
         named,
         thesis=("4.5",),
         level_marks=tuple(Mark(f"{value:.3g} Hz", x=value) for value in found),

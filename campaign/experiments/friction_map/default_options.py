@@ -88,10 +88,10 @@ def velocity_map(options: Any, bench: Bench) -> Mapping[str, ChosenValue]:
     turned = rig.unwinding(0.0)
     told = (
         f"{SETTLED:.0f} times Ts/σ0 of {angle_text(memory, '.2g')}, once the loop's "
-        f"integral has turned round in {angle_text(turned, '.2g')}"
+        f"integral has reversed in {angle_text(turned, '.2g')}"
     )
     known = bench.friction and {told: SETTLED * memory + TURNED * turned}
-    slow = {} if own else {"half of what slow speeds turn": 0.5 * longest * SLOWEST * fastest}
+    slow = {} if own else {"half of the travel at slow speeds": 0.5 * longest * SLOWEST * fastest}
     settle = choices.least(
         "settle_angle",
         "deg",
@@ -172,7 +172,7 @@ def _slowest(
         * rig.rate_noise
         / math.sqrt(rig.sample_rate),
         "thirty counts of the encoder, or three of the gyro": rig.slowest_seen(longest),
-        "the loop turns friction round while it settles": turning,
+        "the loop reverses friction while it settles": turning,
         "it settles within a minute": (settle + 0.5 * window) / longest,
     }
     why = max(reasons, key=lambda reason: reasons[reason])

@@ -315,9 +315,8 @@ def example_figure(data: TestData) -> tuple[Figure, ...]:
             key="one-point",
             title=f"One point of the map: {speed}",
             caption=f"(a) Rate and (b) drive torque of one run at {speed}, (c) the torque of its "
-            f"shaded stretch alone.{start} The mean torque of that "
-            f"stretch{told} less inertia times what is left of acceleration is the friction torque "
-            "at this speed.",
+            f"shaded stretch alone. {start}The friction torque at this speed is the mean torque "
+            f"of that stretch{told} less inertia times acceleration.",
             alt="Rate and drive torque over time for one constant-velocity run, with the averaging "
             "window shaded.",
             panels=(
@@ -339,7 +338,7 @@ def _cut_above(torque: Array, level: float | None) -> tuple[float, float] | None
 
 
 def _cut_words(torque: Array) -> str:
-    return f" The peak of {amount(float(np.nanmax(torque)), 'N m')} at the start is cut off."
+    return f"The peak of {amount(float(np.nanmax(torque)), 'N m')} at the start is cut off. "
 
 
 def _mean(values: Array) -> float | None:

@@ -40,7 +40,7 @@ from campaign.experiments.interface import Stage, TestData, TrialData
 from campaign.experiments.shared.rig import Rig
 from campaign.physics.bench import Bench
 from campaign.trial import NONE_MORE, Most, TrialRequest
-from campaign.units import angle_text, in_words
+from campaign.units import angle_text, in_words, torque_text
 
 SPEEDS = 10
 """of a pilot: twice as many as Equation 4.6 has parameters."""
@@ -54,9 +54,8 @@ class PilotedMapOptions(VelocityMapOptions):
     """Options of a friction-velocity map, which may have a pilot."""
 
     pilot: bool = False
-    """Run 10 of the `points` first. The friction that they show decides at which speeds between
-    slowest and fastest the others tell most of it, and whether these settle and measure longer.
-    `repeat` repeats the 10, and not what follows."""
+    """Run 10 of the `points` first. Their friction decides which speeds between slowest and
+    fastest follow, and whether these settle and measure longer. `repeat` repeats the 10 only."""
 
 
 def pilot_speeds(options: VelocityMapOptions) -> tuple[float, ...]:
@@ -295,8 +294,8 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves
         for name in PARAMETERS
     }
     told = (
-        f"where a pilot shows that it determines most: Ts {found['static_torque']:.3g} N·m, "
-        f"Tc {found['coulomb_torque']:.3g} N·m, "
+        f"where a pilot shows that it determines most: Ts {torque_text(found['static_torque'])}, "
+        f"Tc {torque_text(found['coulomb_torque'])}, "
         f"vs {in_words(found['stribeck_velocity'], 'rad/s', 'deg/s')}, "
         f"δ {found['stribeck_exponent']:.2g}"
     )

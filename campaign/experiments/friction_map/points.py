@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from campaign.axis_kind import axis_unit
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE, NORMAL_LOAD, RELATIVE_ANGLE
 from campaign.estimate import Estimate, Window
 from campaign.estimation.intervals import multiplied
@@ -33,7 +32,7 @@ from campaign.physics.bench import Bench
 from campaign.reason import NONE, Cause, Reason
 from campaign.recording import Recording
 from campaign.result import Array
-from campaign.units import display_value
+from campaign.units import in_words
 
 RIPPLE = {
     "periods": "", "cosine": "N m", "sine": "N m", "error": "N m", "centre": "rad", "travel": "rad",
@@ -263,18 +262,19 @@ def _with_rule(point: Point, reason: Reason) -> Point:
 
 
 def _speeds(points: Sequence[Point]) -> str:
-    told = (f"{display_value(point.speed, 'rad/s', 'deg/s'):.3g}" for point in points)
-    return f"{', '.join(told)} {axis_unit('deg/s')}"
+    told = (in_words(point.speed, "rad/s", "deg/s").split() for point in points)
+    numbers, units = zip(*told, strict=True)
+    return f"{', '.join(numbers)} {units[0]}"
 
 
 def _unknown_inertia(points: Sequence[Point], bench: Bench) -> Iterator[str]:
     """What a map leaves in its torques, and does not find, where the bench states no inertia."""
     if bench.axis.inertia is None and points:
-        most = float(np.rad2deg(max(abs(point.acceleration) for point in points)))
+        most = max(abs(point.acceleration) for point in points)
         yield (
-            f"The bench '{bench.name}' does not say axis.inertia: the torque that accelerates the "
-            f"load, by up to {most:.2g} deg/s² in these windows, is not taken out of friction, and "
-            "no ripple over position is looked for."
+            f"The bench '{bench.name}' does not say axis.inertia. Friction includes the torque "
+            f"that accelerates the load, by up to {in_words(most, 'rad/s^2', 'deg/s^2', '.2g')} in "
+            "these windows. Ripple over position is not estimated."
         )
 
 

@@ -71,7 +71,7 @@ class VelocityMapOptions(Options):
     """After the ramp, before the window: for the loop to settle..."""
     settle_angle: Angle = Field(default=float(np.deg2rad(0.75)), ge=0)
     """...or the time to travel this, whichever takes longer: friction's own memory is an angle.
-    With Ts / sigma0 of 0.1 deg, 0.75 deg leaves a thousandth of it, also after a reversal."""
+    7.5 times Ts / sigma0 leaves a thousandth of it, also after a reversal."""
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(300.0)), gt=0)
     """Of the ramps."""
     rest: Time = Field(default=0.5, ge=0)
@@ -89,7 +89,7 @@ class VelocityMapOptions(Options):
     period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
 
     spread_starts: bool = False
-    """Whether each run begins at another angle, by the golden ratio: a ripple of friction over
+    """Whether each run begins at another angle, by the golden ratio. A ripple of friction over
     position then scatters between the points, and bends no curve."""
 
     @model_serializer(mode="wrap")
@@ -229,7 +229,7 @@ def settling_advice(rig: Rig, speed: float, settled: float) -> str:
     if settled >= needed * (1.0 - ROUNDING):
         return ""
     wanted, lag = (angle_text(angle, ".2g") for angle in (needed, turned))
-    integral = f", and the loop's integral turns round in {lag}" if turned else ""
+    integral = f", and the loop's integral reverses in {lag}" if turned else ""
     return f"settle for {wanted} or more: Ts/sigma0 is {angle_text(memory)}{integral}"
 
 

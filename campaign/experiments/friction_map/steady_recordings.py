@@ -8,6 +8,7 @@ alone where loads differ.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -36,6 +37,7 @@ from campaign.experiments.interface import TrialData
 from campaign.experiments.shared.directions import with_offset
 from campaign.parameter import Parameter, is_value
 from campaign.reason import Cause, Reason
+from campaign.units import angle_text, torque_text
 
 SHOWN = 8
 """Numbers of trials that a reason lists."""
@@ -46,8 +48,8 @@ NO_STRETCH = Cause(
 UNSTEADY = Cause("unsteady stretches", "{count} of {total} stretches are left out, for {why}")
 TOO_SLOW = Cause(
     "slow stretches",
-    "{count} steady stretches below 3 % of the fastest rate of their trial count as standstill, "
-    "and are not in the map (the option `slowest` says which rate is standstill)",
+    "{count} steady stretches below 3 % of their trial's fastest rate count as standstill (option "
+    "`slowest`), and are not in the map",
 )
 ADVICE = {
     "coulomb_torque": "slide at more speeds",
@@ -119,9 +121,9 @@ def sliding_of(trials: Sequence[TrialData], options: StretchOptions) -> SteadyRe
     notes += (note for each in maps for note in each.notes)
     if drives_motion(points):
         notes.append(
-            "Friction goes with the motion nearly everywhere, and cannot: the column of the force, "
-            "or that of the motion, has the other sign, as of a sensor on the part that rests. "
-            "In the mapping `sign = -1` turns it round."
+            "Friction acts with the motion nearly everywhere, which is impossible. Force or motion "
+            "has the wrong sign, as of a sensor on the part that rests: in the mapping "
+            "`sign = -1` reverses it."
         )
     parameters = tuple(each for one in maps for each in parameters_of(one, maps[0]))
     told = tuple(dict.fromkeys(notes))
@@ -148,14 +150,13 @@ def _left_out(
 
 def _over_a_turn(held: OverATurn) -> str:
     """Of a torque that follows from the angle, in words."""
-    times = ("once", "twice")
-    told = " and ".join(
-        f"by {amplitude:.3g} N·m {times[k]} a turn" for k, amplitude in enumerate(held.amplitudes)
-    )
+    often = zip(held.amplitudes, ("once", "twice"), strict=False)
+    told = " and ".join(f"by {torque_text(amplitude)} {times}" for amplitude, times in often)
     return (
-        f"Within steady stretches the torque changes with the angle, as gravity does: {told}, "
-        f"which is {100 * held.share:.3g} % of all that changes there. It is no friction and was "
-        "taken off; its uncertainty is the part `angle` of what was found."
+        f"Within steady stretches the torque changes with the angle, as gravity does: {told} over "
+        f"{angle_text(math.tau, '.4g')}, which is {100 * held.share:.3g} % of all that changes "
+        "there. It is no friction and was taken off; its uncertainty is the part `angle` of what "
+        "was found."
     )
 
 

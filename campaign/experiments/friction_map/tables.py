@@ -243,9 +243,9 @@ def _ripple(fits: Curves, direction: str) -> str:
         short = sum(abs(point.last - point.first) < turn for point in points)
         source = "as the bench describes it" if told else "as these runs show it"
         return (
-            f"a ripple of {ripple.periods:.4g} periods per revolution, {source}, and "
-            f"{100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} runs, was taken "
-            f"out of all points; {short} windows are shorter than its period"
+            f"a ripple of {ripple.periods:.4g} periods over {angle_text(2.0 * np.pi, '.4g')}, "
+            f"{source}, and {100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} "
+            f"runs, was taken out of all points; {short} windows are shorter than its period"
         )
     least = angle_text(
         min(abs(point.speed) * (point.stop - point.start) for point in points), ".2g"

@@ -42,8 +42,8 @@ def _too_few(runs: Sequence[Run]) -> Iterator[str]:
     if len(runs) <= len(PARAMETERS):
         yield (
             f"{len(runs)} speeds cannot determine the {len(PARAMETERS)} parameters of the Stribeck "
-            f"curve and their scatter: {len(PARAMETERS) + 1} are the fewest, some ten more give "
-            "intervals that say something"
+            f"curve and their scatter: {len(PARAMETERS) + 1} are the fewest; some ten more give "
+            "useful intervals"
         )
 
 

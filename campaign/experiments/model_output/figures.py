@@ -98,10 +98,10 @@ def sine_figure(trials: Sequence[TrialData], suffix: str) -> Figure:
         key=f"sine{suffix}",
         title="Output of the models over a sinusoidal rate",
         caption="A static model jumps where the rate changes its sign. In a dynamic one the "
-        "bristles have to turn around first, so the torque comes late and without a jump, on "
-        "another branch for rising than for falling rate." + (f" {WHAT_IS_LEFT}" if left else ""),
-        alt="Torque over rate for each model in one cycle of a sinusoidal rate, and the same near "
-        "zero rate, where the static model jumps and the dynamic one makes a loop.",
+        "bristles reverse first: the torque comes late, without a jump, on different branches for "
+        "rising and falling rate." + (f" {WHAT_IS_LEFT}" if left else ""),
+        alt="Torque over rate for each model in one cycle of a sinusoidal rate, and near zero "
+        "rate. There the static model jumps and the dynamic one makes a loop.",
         panels=(
             Panel(RATE, TORQUE, curves, "Whole cycle"),
             Panel(zoom, TORQUE, [_near(c, near) for c in curves], "Near zero rate", marks=mark),
@@ -166,7 +166,7 @@ def variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figu
             key=f"dynamic-parameters{suffix}",
             title="Output of the model for variations of its dynamic parameters",
             caption="Near zero rate only, because steady sliding does not know these parameters: "
-            "they decide how the torque turns around.",
+            "they decide how the torque reverses.",
             alt="Torque over rate near zero for lower, unchanged and higher values, one panel per "
             "dynamic parameter.",
             panels=tuple(_variation(name, items, plain, True) for name, items in dynamic.items()),

@@ -71,7 +71,7 @@ RULES = (
     ),
     Rule(
         "friction lag", "lag_share", 0.05,
-        "width of the loop around a positive rate, over Ts − Tc: at least 0.05, and at a tenth of "
+        "width of the loop around a positive rate, over Ts − Tc: at least 0.05; at a tenth of "
         "the frequency at most half of it",
         positive="lugre", negative="stribeck", sign="lag_vanishes",
     ),
@@ -84,13 +84,13 @@ RULES = (
     Rule(
         "stick-slip", "rests", 10.0,
         "the load, pulled through a soft spring, rests for about a fifth of a period in ten "
-        "successive periods, and through a stiff one in none",
+        "successive periods; through a stiff one in none",
         positive="stribeck", negative="coulomb", sign="smooth_when_stiff",
     ),
     Rule(
         "presliding", "reversible_share", REVERSIBLE,
         "share of a displacement of s(0) / 2 σ0 that comes back as the torque goes to zero: at "
-        "least 0.5, with a loop that loses energy and an inner loop that closes to 1 %",
+        "least 0.5; the loop loses energy, and an inner loop closes to 1 %",
         positive="gms", negative="stribeck", sign="hysteresis_with_memory",
     ),
     Rule(
@@ -101,8 +101,8 @@ RULES = (
     ),
     Rule(
         "no drift", "drift_margin", 1.0,
-        "0.1 % of Tc / σ0 over the drift in a cycle, cycles 10 to 100, under a torque of 0.4 Tc "
-        "with a vibration of 0.2 Tc: at least 1",
+        "0.1 % of Tc / σ0 over the drift in a cycle: at least 1; in cycles 10 to 100, under a "
+        "torque of 0.4 Tc with a vibration of 0.2 Tc",
         positive="stribeck", negative="lugre",
     ),
     Rule(

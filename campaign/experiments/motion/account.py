@@ -66,9 +66,8 @@ def account_of(
     large = constant is not None and abs(constant.value) > OFFSET * abs(float(np.mean(dry)))
     if constant is not None and large and is_surely_something(constant):
         notes.append(
-            f"{label}: Coulomb friction of the two directions differs so much that something else "
-            "acts on the axis as well, such as gravity or an offset of the sensor: it is in both "
-            "with opposite signs."
+            f"{label}: Coulomb friction of the two directions differs too much for friction alone. "
+            "Gravity or an offset of the sensor, for example, is in both with opposite signs."
         )
     return Motion(data, conditions(data), found, sliding, constant, _mean_coefficient(sliding))
 
@@ -118,8 +117,8 @@ def _doubts(label: str, found: Mapping[str, Estimate], sliding: SteadyResult) ->
     pressed = (p for p in sliding.points if np.isfinite(p.normal_load) and p.normal_load)
     if any(not np.isfinite(point.load) for point in pressed):
         yield (
-            f"{label}: friction over normal load needs the `radius` at which the load rubs, as the "
-            "axis turns."
+            f"{label}: friction over normal load on a rotary axis needs the `radius` at which the "
+            "load rubs."
         )
 
 

@@ -61,7 +61,7 @@ from campaign.recording import Outcome
 from campaign.result import Cell, Column, Figure, Finding, Result, Table, Value
 from campaign.signals import Sine
 from campaign.trial import Task, Tree, TrialRequest
-from campaign.units import Frequency, Time, Torque
+from campaign.units import Frequency, Time, Torque, in_words
 
 ALL_STABLE = Cause("stable at every gain", "stable at every gain that was tried")
 CORNERS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0)
@@ -261,8 +261,9 @@ def _notes(
     )
     if first is not None:
         yield (
-            f"Unstable from K0 = {first.gain:.4g} N·m·s/rad at the load (corner "
-            f"{first.corner:.4g} Hz): {first.unstable}. A result, not a failure; {expected}."
+            f"Unstable from K0 = {in_words(first.gain, 'N m s/rad', form='.4g')} at the "
+            f"load (corner {first.corner:.4g} Hz): {first.unstable}. A result, not a failure; "
+            f"{expected}."
         )
     else:
         yield f"Stable at every gain that was tried: {expected}."

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from campaign.axis_kind import axis_unit, in_axis_terms, is_linear
 from campaign.estimate import Estimate
@@ -28,19 +28,14 @@ PARTS = frozenset(
     }
 )  # fmt: skip
 """... and fields that have parts of their own."""
+Part = TypeVar("Part", Result, Estimate)
 NAMES = ("name", "quantity", "label")
 """Fields that tell a phase from an angle of the axis."""
 
 
-def in_axis_units(result: Result) -> Result:
-    """The same result, told of the axis that is meant (`axis_kind.axis_terms`)."""
-    told: Result = _told(result) if is_linear() else result
-    return told
-
-
-def estimate_in_axis_terms(estimate: Estimate) -> Estimate:
-    """An estimate with the unit and in the words of the axis that is meant."""
-    told: Estimate = _told(estimate) if is_linear() else estimate
+def in_axis_units(part: Part) -> Part:
+    """The same result, or estimate, told of the axis that is meant (`axis_kind.axis_terms`)."""
+    told: Part = _told(part) if is_linear() else part
     return told
 
 
@@ -83,7 +78,7 @@ def _row(table: Table, row: Mapping[str, Cell]) -> dict[str, Cell]:
 
 def _cell(name: str, cell: Cell, row: Mapping[str, Cell], phase: bool) -> Cell:
     if isinstance(cell, Estimate):
-        return cell if phase else estimate_in_axis_terms(cell)
+        return cell if phase else in_axis_units(cell)
     if not isinstance(cell, str):
         return cell
     if name == "unit":  # of the row's number

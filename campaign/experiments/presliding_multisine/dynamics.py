@@ -182,8 +182,8 @@ def _answer_figure(
     return Figure(
         key=f"answer{suffix}",
         title="Motion below breakaway, measured and simulated",
-        caption=f"A part of the trial with {amount(record.amplitude, 'N m')}: torque, the measured "
-        "and the simulated motion, with the sensor's offset and drift, and what the two differ by.",
+        caption=f"A part of the trial with {amount(record.amplitude, 'N m')}: torque, measured and "
+        "simulated motion (with the sensor's offset and drift), and their difference.",
         alt="Torque over time, measured and simulated motion over time, and their difference.",
         panels=(
             Panel(
@@ -224,9 +224,8 @@ def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]
         key=f"left-over{suffix}",
         title="What the fit leaves over",
         caption="Autocorrelation of the residuals, with the noise taken for an autoregression: "
-        "between the lines is what white noise has. Beside it the part of the simulated motion "
-        "that is left over in the residuals, by frequency: an elastic part or a second inertia "
-        "would stand out.",
+        "between the lines is what white noise has. Beside it the residuals' share of the motion "
+        "by frequency: an elastic part or a second inertia would stand out.",
         alt="Autocorrelation of residuals over lag, and share of the motion left over by "
         "frequency.",
         panels=(

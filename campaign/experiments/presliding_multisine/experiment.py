@@ -13,7 +13,6 @@ from functools import partial
 
 import numpy as np
 
-from campaign.axis_kind import is_linear
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate
 from campaign.estimation.presliding_dynamics.presliding_fit import (
@@ -53,6 +52,7 @@ from campaign.experiments.shared.systematic import with_scale
 from campaign.physics.bench import Bench
 from campaign.result import Cell, Finding, Result
 from campaign.trial import Task, TrialRequest
+from campaign.units import torque_text
 
 OWN = ("amplitude", "realisation")
 """What distinguishes the trials of one group."""
@@ -91,10 +91,9 @@ def _trials(options: PreslidingMultisineOptions, bench: Bench) -> Iterator[Trial
 def _warnings(options: PreslidingMultisineOptions, bench: Bench) -> Iterable[str]:
     slip = first_slip(bench)
     if slip is not None and max(options.amplitudes) > FASTEST * slip[0]:
-        torque = f"{slip[0]:.3g} {'N' if is_linear() else 'N m'}"
         yield (
-            f"an interface slips at about {torque}: with amplitudes above half of that friction is "
-            "no single bristle's, and no interval can be given; lower amplitudes"
+            f"an interface slips at about {torque_text(slip[0])}: with amplitudes above half of "
+            "that friction is no single bristle's, and no interval can be given; lower amplitudes"
         )
     if len(options.amplitudes) < 2:
         yield (

@@ -173,9 +173,8 @@ def _missed_table(
 def _notes(bench: Bench, found: PreslidingDynamics, planned: bool) -> Iterator[str]:
     if not planned:
         yield (
-            "These were not planned as small motions. The torque is taken as it was recorded: "
-            "noise in it makes everything stiffer, more damped and heavier by about its share of "
-            "the torque's power."
+            "These were not planned as small motions. Noise of the recorded torque raises "
+            "stiffness, damping and inertia by about its share of the torque's power."
         )
     if not planned and not _gives_way(found):
         yield (

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from campaign.arrays import Array, ComplexArray
+from campaign.axis_kind import axis_unit
 from campaign.estimation.continuation import DECIBEL
 from campaign.estimation.frequency.best_linear import BestLinear
 from campaign.estimation.frequency.distortion import Distortion, Level
@@ -15,10 +16,10 @@ from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.two_mass_model import Side
 from campaign.experiments.responses.sources import Source
 from campaign.result import Axis, Curve, Figure, Mark, Panel
+from campaign.text import pretty_unit
 
 FREQUENCY = Axis("Frequency", "Hz", "Hz", scale="log")
 PHASE = Axis("Phase", "rad", "deg")
-TORQUE = "Gain, dB of 1 rad/s per N·m"
 FITTED = (
     " A model's line begins where it was fitted from on. What a fit leaves should be no larger "
     "than the line of its scatter; where it is, the function is no model of the drive."
@@ -60,7 +61,7 @@ def response_figures(
 def _bode(
     key: str, source: Source, side: Side, measured: MeasuredResponse, fitted: FittedResponse
 ) -> Figure:
-    gain, phase = panels(measured, fitted.lines, TORQUE)
+    gain, phase = panels(measured, fitted.lines)
     gain = replace(gain, marks=fitted.marks)
     value = fitted.value
     left = [] if value is None else [_left(measured, value(measured.frequency))]
@@ -76,7 +77,7 @@ def _bode(
 
 
 def panels(
-    measured: MeasuredResponse, lines: Sequence[tuple[str, Array, ComplexArray]], label: str
+    measured: MeasuredResponse, lines: Sequence[tuple[str, Array, ComplexArray]]
 ) -> tuple[Panel, Panel]:
     """Gain and phase of a response with 95 % bars, and lines (name, frequency, response)."""
     size = np.maximum(np.abs(measured.values), 1e-300)
@@ -100,7 +101,12 @@ def panels(
         there = np.interp(np.log(x), np.log(at), own)
         own = own + 2.0 * np.pi * np.round(np.median(phase - there) / (2.0 * np.pi))
         phases.append(Curve(at, own, name, name))
-    return Panel(FREQUENCY, Axis(label), gains), Panel(FREQUENCY, PHASE, phases)
+    return Panel(FREQUENCY, Axis(gain_label("Gain")), gains), Panel(FREQUENCY, PHASE, phases)
+
+
+def gain_label(what: str) -> str:
+    """Label of a gain from torque to rate."""
+    return f"{what}, dB of 1 {pretty_unit(axis_unit('rad/s/(N m)'))}"
 
 
 def turned(phase: Array) -> Array:
@@ -115,7 +121,7 @@ def _left(measured: MeasuredResponse, model: ComplexArray) -> Panel:
     scatter = np.maximum(np.sqrt(measured.variance + measured.bias**2), 1e-300)
     return Panel(
         FREQUENCY,
-        Axis("Left over, dB of 1 rad/s per N·m"),
+        Axis(gain_label("Left over")),
         [
             Curve(x, DECIBEL * np.log(left), "left over by the function", "residual", "points"),
             Curve(x, DECIBEL * np.log(scatter), "scatter (1 sigma)", "scatter"),

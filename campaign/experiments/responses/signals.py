@@ -26,7 +26,7 @@ from campaign.experiments.interface import TrialData
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Polyline, Sine
 from campaign.trial import Recording, Task
-from campaign.units import rate_text
+from campaign.units import rate_text, torque_text
 
 SENSORS: Mapping[Side, tuple[str, ...]] = {
     "load": (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE),
@@ -256,4 +256,4 @@ def size_of(told: Sequence[Recorded], period: float) -> str:
     trial, first = told[0]
     mode = trial.trial.task.mode
     rms = _rms(first.torque if mode == "recorded" else first.leading, first, period)
-    return f"rms {rate_text(rms) if mode == 'rate' else f'{rms:.3g} N·m'}"
+    return f"rms {rate_text(rms) if mode == 'rate' else torque_text(rms)}"

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from campaign.arrays import Array
+from campaign.axis_kind import axis_unit
 from campaign.estimate import Window
 from campaign.estimation.frequency.best_linear import BestLinear, best_linear
 from campaign.estimation.frequency.measured_response import MeasuredResponse, closed_from_open
@@ -35,7 +36,8 @@ from campaign.experiments.responses.signals import (
 )
 from campaign.physics.bench import Bench
 from campaign.signals import MultiSine, Sine
-from campaign.units import rate_text
+from campaign.text import pretty_unit
+from campaign.units import rate_text, torque_text
 
 STEADY = "steady"
 FEWEST_SINES = 6
@@ -237,7 +239,7 @@ def _of_sines(name: str, told: Sequence[Recorded], _: Reading) -> Source:
         closed = make_response(loop)
     amplitude = max(abs(t.trial.task.command.amplitude) for t, _ in told)  # type: ignore[union-attr]
     in_rate = told[0][0].trial.task.mode == "rate"
-    largest = rate_text(amplitude) if in_rate else f"{amplitude:.4g} N·m"
+    largest = rate_text(amplitude) if in_rate else torque_text(amplitude, ".4g")
     excitation = (
         f"{len(first)} single sines from {first[0]:.4g} to {first[-1]:.4g} Hz, "
         f"amplitude up to {largest}"
@@ -311,7 +313,7 @@ def _of_multisine(name: str, told: Sequence[Recorded], how: Reading) -> Source:
 
 def _named(best: BestLinear, trial: TrialData) -> str:
     """The excitation in words; of a loop what came into it, too."""
-    torque = str(replace(best.excitation, unit="N·m"))
+    torque = str(replace(best.excitation, unit=pretty_unit(axis_unit("N m"))))
     command = trial.trial.task.command
     if trial.trial.task.mode != "rate" or not isinstance(command, MultiSine):
         return torque

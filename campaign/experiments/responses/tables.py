@@ -82,9 +82,9 @@ def distortion_tables(found: Sequence[Source]) -> Iterator[Table]:
             EXCITATION,
         ),
         tuple(rows),
-        note="Rms over the whole band over that of the output there, from lines that the "
-        "excitation left out, less the noise and the input's own part there; of odd distortion "
-        "also what scatters over realisations at the excited lines. Coulomb friction and "
+        note="Rms over the whole band over that of the output, from lines without excitation, less "
+        "noise and the input's own part there. Odd distortion includes what scatters over "
+        "realisations at the excited lines. Coulomb friction and "
         "a bristle are odd; what differs by direction is even. Levels of other benches compare "
         "only at a like excitation: its rms, band and lines stand beside them.",
     )

@@ -235,7 +235,7 @@ def thresholds_figure(
         f"{_milliradians(limit.value)}, with its 95 % interval where there is one; the most "
         f"important parameter first.{beyond}",
         alt="A dot for each parameter at the change at which the error passes the threshold, with "
-        "its interval, or at the largest change tried where it does not.",
+        "its interval; else at the largest change tried.",
         panels=(Panel(parameter, change, curves),),
     )
 
@@ -266,7 +266,7 @@ def sensitivity_figure(
         "shaded change the 95 % interval of where it is passed, the band that of the mean. All "
         "panels have one scale.",
         alt="Stabilization error over the relative change of each model parameter, one panel per "
-        "parameter, with a dot for every trial and a line at the threshold.",
+        "parameter: a dot for each trial, a line at the threshold.",
         panels=tuple(panels),
         thesis=("5.14",),
         across=2,

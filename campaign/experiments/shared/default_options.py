@@ -22,7 +22,7 @@ from campaign.physics.bench import Bench
 from campaign.physics.complete import control_rate, inertia_of, limits_of
 from campaign.physics.limits import worst_friction
 from campaign.physics.steady_friction import steady_friction
-from campaign.units import angle_text, rate_text
+from campaign.units import angle_text, rate_text, torque_text
 
 DEG = math.pi / 180.0
 """rad"""
@@ -53,10 +53,11 @@ def torque_above_friction(choices: Choices, rig: Rig, name: str) -> float:
 
 def overcome_friction(rig: Rig) -> None:
     """ValueError where the drive cannot move the load at all."""
-    if (rig.static_torque or 0.0) >= MOST * rig.torque:
+    static = rig.static_torque or 0.0
+    if static >= MOST * rig.torque:
         raise ValueError(
-            f"the limits of torque and current leave {rig.torque:.3g} N·m, and friction holds "
-            f"{rig.static_torque:.3g} N·m: nothing would move; raise them"
+            f"the limits of torque and current leave {torque_text(rig.torque)}, and friction holds "
+            f"{torque_text(static)}: nothing would move; raise them"
         )
 
 
@@ -68,8 +69,8 @@ def stands_still(rig: Rig) -> None:
     asked = per_ampere * controller.rate.proportional * rig.rate_step
     if asked >= rig.torque:
         raise ValueError(
-            f"its loop answers one count of the rate's sensor with {asked:.3g} N·m, and the limits "
-            f"leave {rig.torque:.3g} N·m: lower controller.rate.proportional, or raise "
+            f"its loop answers one count of the rate's sensor with {torque_text(asked)}, and the "
+            f"limits leave {torque_text(rig.torque)}: lower controller.rate.proportional, or raise "
             "controller.relative_rate_filter"
         )
 
@@ -300,9 +301,9 @@ def _sliding(rig: Rig, options: Any) -> Reasons:
     least = max(noise, count, stop_rate(0.0, rig.rate_step) / STOP_FACTOR)
     if allowed[why] < least:
         raise ValueError(
-            f"within its limits a load slides at {rate_text(allowed[why], '.2g')} at most, and "
-            f"the sensors resolve {rate_text(least, '.2g')} (six deviations of the gyro's noise, "
-            "or counts): raise the limits of angle or rate, or write sliding_rate"
+            f"within its limits a load slides at {rate_text(allowed[why], '.2g')} at most; the "
+            f"sensors resolve {rate_text(least, '.2g')} (six deviations of the gyro's noise, or "
+            "counts): raise the limits of angle or rate, or write sliding_rate"
         )
     return wanted if max(wanted.values()) <= allowed[why] else {why: allowed[why]}
 

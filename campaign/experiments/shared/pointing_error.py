@@ -43,7 +43,7 @@ class SineMotionOptions(Options):
     frequency: Frequency = Field(default=0.24, gt=0)
     """Frequency of the base motion."""
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
-    """Amplitude of the base's angular acceleration."""
+    """Amplitude of the base's acceleration."""
     cycles: int = Field(default=3, ge=1, le=10_000)
     """Whole cycles of the base motion that are measured."""
     settle_cycles: int = Field(default=1, ge=0, le=1_000)

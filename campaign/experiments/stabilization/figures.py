@@ -166,13 +166,13 @@ def _rate_figure(place: Condition) -> Iterator[Figure]:
     yield Figure(
         key="relative-rate",
         title="Rate of the load relative to the hull",
-        caption="Where the relative rate passes zero, friction that is left carries the load along "
-        "with the hull and bends its curve away from the dotted line of a load held still in "
-        "space; too strong a compensation drives it ahead. Titles say how far off it gets at most"
+        caption="Dotted: a load held still in space. Where the relative rate passes zero, friction "
+        "that is left carries the load along with the hull; too strong a compensation drives it "
+        "ahead. Titles say how far off it gets at most"
         f"{', and the last panel how far off each is' if len(cuts) > 1 else ''}. "
         f"{found.words}{place.words}",
-        alt="Relative rate over time: the whole motion, a zoom on one reversal for each "
-        "compensation method beside the line of a load held still, and what each is off it.",
+        alt="Relative rate over time: the whole motion, one reversal for each compensation method "
+        "beside the line of a load held still, and the difference.",
         panels=found.panels,
         thesis=place.numbers.get("rate", ()),
         across=2,
@@ -194,7 +194,7 @@ def _error_figure(place: Condition) -> Figure:
             title += f": {amount(own, 'rad', 'mrad')}"
             largest = max(largest, own)
         marks = [
-            Mark("" if k else "hull turns", x=time)
+            Mark("" if k else "hull reverses", x=time)
             for k, time in enumerate(_reversals(item, window))
         ]
         turned = turned or bool(marks)
@@ -209,7 +209,7 @@ def _error_figure(place: Condition) -> Figure:
         ]
     shared = "All panels have one scale"
     shared += ", except those of errors that would be a line on it." if any(small) else "."
-    lines = " Dashed lines: where the hull is to turn around." if turned else ""
+    lines = " Dashed lines: where the hull is to reverse." if turned else ""
     return Figure(
         key="position-error",
         title="Position error by compensation method",
@@ -281,8 +281,8 @@ def _chatter_words(windows: Sequence[float]) -> str:
     if not windows:
         return ""
     return (
-        " Where a torque jumps with every count of the encoder, the line is its mean over "
-        f"{1e3 * max(windows):.3g} ms, and the shade what it ranges over in that time."
+        " Where a torque jumps with every count of the encoder, the line is its mean, and the "
+        f"shade its range, over {1e3 * max(windows):.3g} ms."
     )
 
 

@@ -285,6 +285,5 @@ def _blind_words(first: Recording, shown: Sequence[MethodRate], zoom: Zoom) -> s
     time = (int(np.argmax(after)) + int(np.argmax(before))) / rate_of(first)
     return (
         f"For {_time(time)} around the reversal the hull moves by less than one count of the "
-        f"encoder ({angle_text(count, '.2g')}): whether the load sticks in that time cannot be "
-        "seen."
+        f"encoder ({angle_text(count, '.2g')}). Whether the load sticks then cannot be seen."
     )

@@ -53,10 +53,10 @@ def models_table(found: Whole) -> Table:
             row |= {"validation": each.validation, "gain": each.gain}
         rows_.append(row)
     note = (
-        "The arrow shows the one with the lowest BIC, over the rows that those of the model are "
-        "worth that does best on blocks it was not fitted to (every third of twelve). The column "
-        "BIC counts the rows by what they are worth for each model. What each model is, and which "
-        "other to try: docs/friction-models.md#which-model-to-try."
+        "The arrow shows the lowest BIC, with the effective number of rows of the model that "
+        "predicts held-out blocks best (every third of twelve). The column BIC takes the effective "
+        "number of each model. What each model is, and which other to try: "
+        "docs/friction-models.md#which-model-to-try."
     )
     return Table("models", "Friction models", tuple(columns), tuple(rows_), note=note)
 

@@ -26,7 +26,7 @@ class Ripple(Options):
     amplitude: float = Field(default=0.0, ge=0, lt=1)
     """Share of the torque."""
     periods: float = Field(default=1.0, gt=0, le=10_000)
-    """Periods per revolution of the load; per 2 pi metres of a linear one."""
+    """Periods of the load over 2 pi: a revolution of a rotary axis, 2 pi m of a linear one."""
     phase: Phase = 0.0
     """Phase at zero angle, of the load's angle times periods."""
 
@@ -193,9 +193,9 @@ class FrictionModel:
         form = list(inspect.signature(self.step).parameters)
         if len(form) != 3 or not callable(self.state_size):
             raise TypeError(
-                f"the friction model {self.name!r} has a step function of "
-                f"({', '.join(form)}) or a fixed state size, as models had before engine 2: "
-                "see 'A friction model of before engine 2' in docs/developers/plug-ins.md"
+                f"the friction model {self.name!r} has a step function of ({', '.join(form)}) or a "
+                "fixed state size, as before engine 2; see 'A friction model of before engine 2' "
+                "in docs/developers/plug-ins.md"
             )
         if len(inspect.signature(self.state_size).parameters) != 2:
             raise TypeError(

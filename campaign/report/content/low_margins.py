@@ -19,8 +19,8 @@ from campaign.trial import Task, canonical_json
 
 COMPUTED = Cause("computed", "computed from the description of the bench, and not measured")
 NOTE = (
-    "The loop is opened at the rate error, or under a torque command at the compensation torque, "
-    "for small motions: stuck, with every interface in presliding, and in fast sliding. Below 20° "
+    "The loop is opened at the rate error, or under a torque command at the compensation torque. "
+    "Motions are small: stuck, with every interface in presliding, and in fast sliding. Below 20° "
     "or 3 dB a small change of the bench makes it unstable. Of each test, compensation and regime "
     "the trial with the least margin is shown."
 )
@@ -53,8 +53,7 @@ def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
         Column("growth", "Fastest pole (1/s)", reason=COMPUTED()),
     )
     kinds = set(sides.values())
-    with axis_terms(kinds.pop() if len(kinds) == 1 else BOTH_ROTARY):
-        note = in_axis_terms(NOTE)
+    note = in_axis_terms(NOTE, kinds.pop() if len(kinds) == 1 else BOTH_ROTARY)
     table = Table("low-margins", "Loops with little margin", columns, tuple(rows), note=note)
     return table, problems
 

@@ -58,7 +58,7 @@ def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
     yield "window", f"{start} to {stop} s"
     yield "sample rate", _amount(task.sample_rate, ("Hz", "Hz"))
     if task.start_angle:
-        yield in_axis_terms("start angle"), _amount(task.start_angle, angle)
+        yield _words("start angle"), _amount(task.start_angle, angle)
     if task.stop_rate is not None:
         yield "stops at a rate of", _amount(task.stop_rate, rate)
     if task.spring_stiffness:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from campaign.axis_kind import BOTH_ROTARY, Sides, axis_terms, axis_unit, in_axis_terms
+from campaign.axis_kind import BOTH_ROTARY, Sides, axis_unit, in_axis_terms
 from campaign.text import pretty_unit
 from campaign.units import OBSERVER_GAIN
 
@@ -101,8 +101,7 @@ def _own(symbol: Symbol, sides: Sides) -> Sides:
 
 
 def _meaning(symbol: Symbol, sides: Sides) -> str:
-    with axis_terms(_own(symbol, sides)):
-        return in_axis_terms(symbol.meaning)
+    return in_axis_terms(symbol.meaning, _own(symbol, sides))
 
 
 def _unit(symbol: Symbol, sides: Sides) -> str:
@@ -110,5 +109,4 @@ def _unit(symbol: Symbol, sides: Sides) -> str:
         return OBSERVER_GAIN.of(sides).si
     if symbol.field == "gear.ratio" and sides.load is not sides.motor:
         return "rad/m"
-    with axis_terms(_own(symbol, sides)):
-        return axis_unit(symbol.unit)
+    return axis_unit(symbol.unit, _own(symbol, sides))

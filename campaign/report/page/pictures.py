@@ -57,8 +57,8 @@ def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
     return folder.picture(
         DrawingFiles.of(svg),
         "Published values among the draws of a random bench",
-        "Each tick is the bench with another seed of its scatter, the dot their median, the band"
-        " where 95 % of further draws lie, systematic parts included. The line at 0 is the"
+        "Tick: the bench with another seed of its scatter. Dot: their median. Band: where 95 % of"
+        " further draws lie, systematic parts included. The line at 0 is the"
         " published value, one draw itself; the share of draws below it stands on the right.",
         "One strip of ticks per published number, around a line at the published value.",
         "draws",

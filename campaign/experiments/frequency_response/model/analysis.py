@@ -276,11 +276,10 @@ def _early(found: Sequence[FrequencyFit]) -> Iterator[str]:
                 continue
             yield (
                 f"{each.source.name}, {side}: the rate answers {-1e6 * fit.delay:.0f} us before "
-                "the torque. Either friction turns its phase (a second amplitude shows which), or "
-                "the torque is recorded late, or a controller holds it and it is sampled at "
-                "points: then gain and inertia are off by up to a few percent at the highest "
-                "frequencies, and no scatter shows that. A lower highest line, or a faster "
-                "controller, makes it small."
+                "the torque. Friction shifts its phase (a second amplitude shows it), the torque "
+                "is recorded late, or a controller holds it between samples. Then gain and inertia "
+                "may be off by a few percent at the highest frequencies, which no scatter shows. "
+                "A lower highest line, or a faster controller, makes it small."
             )
 
 

@@ -32,8 +32,8 @@ TOLD_APART = 10.0
 """Schwarz' criterion by which one place of the sensor must fit better than the other."""
 AMBIGUOUS = Cause(
     "place of the sensor not known",
-    "the response is that of a sensor at the driven inertia as well as behind the spring: say "
-    "which (place), or excite up to above the antiresonance",
+    "the sensor may be at the driven inertia or behind the spring: say which (place), or excite "
+    "up to above the antiresonance",
 )
 TOO_FEW = Cause(
     "too few realisations",

@@ -31,6 +31,7 @@ from campaign.experiments.responses.sources import (
 from campaign.physics.bench import Bench
 from campaign.reason import Reason
 from campaign.signals import MultiSine
+from campaign.units import torque_text
 
 FUNCTION = "rational function"
 FEWEST_LINES = 3
@@ -176,8 +177,8 @@ def _same_course(fitted: Sequence[TrialData], unseen: Sequence[TrialData]) -> li
         return []
     told = (
         f"{len(again)} of its {len(unseen)} trials have a multisine that the model was fitted to, "
-        "phases and all: what friction adds to it repeats itself, and differences look smaller "
-        "than they are. Other phases (another seed) would show them."
+        "with the same phases. What friction adds repeats itself, so that differences look too "
+        "small. Other phases (another seed) would show them."
     )
     return [told]
 
@@ -206,8 +207,8 @@ def size_difference(one: Source, other: Source) -> float:
 def _other_size(source: Source, fitted: Source) -> Iterator[str]:
     if math.log(OTHER_SIZE) < size_difference(source, fitted) < math.inf:
         yield (
-            f"{source.name}: its torque has an rms of {source.rms:.3g} N·m, that of what was "
-            f"fitted ({fitted.name}) {fitted.rms:.3g} N·m: with friction the response differs."
+            f"{source.name}: its torque has an rms of {torque_text(source.rms)}, that of what was "
+            f"fitted ({fitted.name}) {torque_text(fitted.rms)}: with friction the response differs."
         )
 
 

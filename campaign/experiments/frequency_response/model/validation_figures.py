@@ -15,7 +15,7 @@ from campaign.experiments.frequency_response.model.validation import (
     Prediction,
     Validation,
 )
-from campaign.experiments.responses.figures import FREQUENCY, TORQUE, decibel, panels
+from campaign.experiments.responses.figures import FREQUENCY, decibel, gain_label, panels
 from campaign.experiments.responses.sources import fitted_part
 from campaign.experiments.responses.tables import NAME, SENSOR
 from campaign.reason import Cause
@@ -108,14 +108,14 @@ def _lines(predictions: Sequence[Prediction]) -> Table:
             SENSOR,
             MODEL,
             Column("frequency", "Frequency", "Hz", "Hz", exact=True),
-            Column("measured", "Measured, dB of 1 rad/s per N·m", reason=reason),
-            Column("predicted", "Predicted, dB of 1 rad/s per N·m", reason=reason),
+            Column("measured", gain_label("Measured"), reason=reason),
+            Column("predicted", gain_label("Predicted"), reason=reason),
             Column("phase", "Phase, measured less predicted", "rad", "deg", reason=reason),
             Column("deviations", "Difference over its deviation", exact=True),
         ),
         tuple(rows),
-        note="Differences as complex numbers over what scatter of the measurement and of the fit "
-        f"lets expect: 1 in the mean square, above {SELDOM:.2f} at one line of twenty.",
+        note="Complex differences over the deviation expected by scatter of measurement and fit. "
+        f"Expected: 1 in the mean square, above {SELDOM:.2f} at one line of twenty.",
     )
 
 
@@ -174,7 +174,7 @@ def _response(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fig
     for each in some:
         fine = np.geomspace(each.model.lowest, each.model.highest, FINE)
         lines.append((each.model.name, fine, each.model.value(fine)))
-    gain, phase = panels(measured, lines, TORQUE)
+    gain, phase = panels(measured, lines)
     own = [
         Curve(
             each.against.measured.frequency, each.against.in_deviations,
