@@ -80,7 +80,7 @@ def recorded(rig: BlindRig) -> Any:
     recording = Recording(rig.time, channels)
     axis = {"name": "axis", "kind": "linear"} if rig.is_linear else {"name": "axis"}
     bench = {"name": "blind", "axis": axis}
-    task = SimpleNamespace(sample_rate=RATE, duration=len(rig.time) / RATE)
+    task = SimpleNamespace(mode="recorded", sample_rate=RATE, duration=len(rig.time) / RATE)
     trial = SimpleNamespace(
         number=1,
         kind="motion",
@@ -92,6 +92,8 @@ def recorded(rig: BlindRig) -> Any:
     )
     return SimpleNamespace(
         trial=trial,
+        ending=SimpleNamespace(outcome="completed"),
+        not_kept="",
         estimates=(),
         recording=lambda: recording,
         channel_names=lambda: frozenset(channels),
