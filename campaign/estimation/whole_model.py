@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaign.arrays import Array, Flags
+from campaign.axis_kind import axis_unit
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import USELESS
 from campaign.estimation.intervals import LEVEL
@@ -196,7 +197,7 @@ def _estimate(
     low, high = value, value
     if not left_open and half < 1.0:
         low, high = sorted((unknown.value(share - half), unknown.value(share + half)))
-        reason = LEFT_WIDE(low=low, high=high, in_unit=f" {unit}".rstrip())
+        reason = LEFT_WIDE(low=low, high=high, in_unit=f" {axis_unit(unit)}".rstrip())
     if not low < high or high - low > 2.0 * USELESS * abs(value):
         return Estimate.without_interval(
             name, value, unit, reason, method=METHOD, origin=Origin.NOT_DETERMINED

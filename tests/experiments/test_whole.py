@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.model_choice import FITTED, INERTIA, TRUTHS, identified
+from campaign.axis_kind import AxisKind, Sides, axis_terms
 from campaign.estimate import Estimate, Origin, Systematic
 from campaign.estimation.inverse.motion import FilterSettings, Motion, motion_of_position
 from campaign.estimation.unknowns import Unknown
@@ -18,9 +19,11 @@ from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.whole_model.residuals import models
 from campaign.experiments.whole_model.whole_model_fit import (
     BASE_UNKNOWN,
+    OTHER_EXPONENT,
     derived,
     find,
     resolved,
+    shifted,
     with_bases,
 )
 from campaign.physics.friction import friction_models
@@ -190,6 +193,46 @@ def test_what_is_a_share_of_a_friction_at_its_bound_is_not_told() -> None:
     assert {name for name, one in found.items() if one.has_interval} == {
         "viscous_positive", "viscous_negative",
     }  # fmt: skip
+
+
+SLOW_FALL = {"stribeck_velocity": 0.3}  # which reversals take longer to pass than rows show
+TRUE = {"coulomb_positive": 2.0, "static_over_coulomb_positive": 1.5} | SLOW_FALL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("exponent", [0.7, 2.0, 3.0])
+def test_an_exponent_unlike_the_usual_one_is_found_or_leaves_its_curve_open(
+    monkeypatch: pytest.MonkeyPatch, exponent: float
+) -> None:
+    """Held at 2, static friction and Stribeck velocity of another curve are wrong by far."""
+    truth = {**TRUTHS["stribeck"], **SLOW_FALL, "stribeck_exponent": exponent}
+    monkeypatch.setitem(TRUTHS, "stribeck", truth)
+    found = identified("stribeck", 1, ("stribeck",))
+    held, free = found.fits[1:]
+    usual = exponent == 2.0
+    assert found.fits[found.best] is (held if usual else free)
+    assert (free.model.name in found.as_good) is usual
+    for name, value in TRUE.items():
+        for fit in (held, free):
+            one = fit.fit.estimates[name]
+            assert holds(one, value) if one.origin is Origin.MEASURED else not usual
+    if not usual:
+        assert holds(free.fit.estimates["stribeck_exponent"], exponent)
+
+
+def test_another_exponent_is_told_in_the_units_of_the_axis() -> None:
+    fit = fit_of(told("stribeck_velocity", 0.01, 1e-4))
+    fit.estimates["stribeck_velocity"] = replace(fit.estimates["stribeck_velocity"], unit="rad/s")
+    with axis_terms(Sides(AxisKind.LINEAR, AxisKind.LINEAR)):
+        left = shifted(
+            ModelFit(None, fit.estimates, (), (), None, np.zeros(0, bool)),
+            {"stribeck_velocity": 0.02},
+            "exponent",
+            OTHER_EXPONENT,
+        )
+    [one] = left.estimates.values()
+    assert one.origin is Origin.NOT_DETERMINED
+    assert one.reason.text == "with another exponent it is 20 mm/s"
 
 
 STATIC_TORQUE = DerivedOption("static", "static_torque", "N m", "", "", product("ratio", "coulomb"))

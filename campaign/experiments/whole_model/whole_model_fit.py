@@ -41,6 +41,7 @@ from campaign.experiments.whole_model.residuals import (
 from campaign.physics.friction.unknowns import EXPONENT, DerivedOption, Sizes
 from campaign.reason import Cause, Reason
 from campaign.text import words
+from campaign.units import in_words
 
 DELAYS = 5.0
 """Samples to either side between which the force's delay is looked for."""
@@ -65,6 +66,8 @@ UNRESOLVED = Cause(
 FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
 STRONG = 10.0
 """Difference of BIC from which on one model is told from another."""
+SHOWN = {"rad/s": "deg/s"}
+"""Units in which a sentence has a number, by those of estimates."""
 SMALL = 1e-6
 """Relative change of an unknown for the slope of what is derived from it."""
 WIDE = 5.0
@@ -255,7 +258,7 @@ def _fitted(
     other = refitted(unknowns, left_in(filtering.half_band), fit.found.shares)
     again = dict(zip(names, other, strict=True))
     doubt = _doubt(fit.estimates["delay"], again["delay"], 1.0 / rate, known)
-    fit = _without_loop(_shifted(fit, again, "band", HALF_BAND))
+    fit = _without_loop(shifted(fit, again, "band", HALF_BAND))
     free = model.with_exponent_free(dict(zip(names, fit.values, strict=True)))
     if free is not None:
         say("another exponent")
@@ -265,7 +268,7 @@ def _fitted(
         exponent = free.unknowns[-1]
         begin = np.append(fit.found.shares, exponent.share(EXPONENT.start))
         other = refitted((*unknowns, exponent), more, begin)
-        fit = _shifted(fit, dict(zip(names, other, strict=False)), "exponent", OTHER_EXPONENT)
+        fit = shifted(fit, dict(zip(names, other, strict=False)), "exponent", OTHER_EXPONENT)
     fit = _with_delay(fit, doubt)
     fit = with_bases(resolved(fit, model, motions, filtering), model)
     say("blocks left out")
@@ -328,13 +331,13 @@ def _open(one: Estimate, reason: Reason) -> Estimate:
     )
 
 
-def _shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -> ModelFit:
+def shifted(fit: ModelFit, other: dict[str, float], source: str, cause: Cause) -> ModelFit:
     """With what another fit finds otherwise as a systematic part; too much of it leaves open."""
     found = {}
     for name, one in fit.estimates.items():
         told = shifted_by(one, source, abs(other[name] - one.value)) if one.has_interval else one
         if told.half_width > USELESS * abs(told.value):
-            shown = f"{other[name]:.3g} {one.unit}".rstrip()
+            shown = in_words(other[name], one.unit, SHOWN.get(one.unit, "")).rstrip()
             told = _open(one, cause(shown=shown, value=other[name]))
         found[name] = told
     return replace(fit, estimates=found)
