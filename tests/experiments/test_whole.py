@@ -19,8 +19,10 @@ from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
 from campaign.experiments.whole_model.residuals import models
 from campaign.experiments.whole_model.whole_model_fit import (
     BASE_UNKNOWN,
+    CORRELATED,
     OTHER_EXPONENT,
     derived,
+    described,
     find,
     resolved,
     shifted,
@@ -218,6 +220,27 @@ def test_an_exponent_unlike_the_usual_one_is_found_or_leaves_its_curve_open(
             assert holds(one, value) if one.origin is Origin.MEASURED else not usual
     if not usual:
         assert holds(free.fit.estimates["stribeck_exponent"], exponent)
+
+
+def test_what_happens_in_reversals_is_open_where_what_is_left_over_is_correlated() -> None:
+    """Of a right model 95 % of the rows count; of one that lacks something a fifth."""
+    model = models(Sizes((2.0, 2.5), (0.5, 0.8), 1.0, 0.5), ("lugre",))[1]
+    estimates = {each.name: told(each.name, 2.0) for each in model.numbers}
+    lost = {each.name for each in model.numbers if each.lasts is not None}
+    assert {"stribeck_velocity", "bristle_stiffness", *RATIOS} <= lost
+    for worth, refused in ((950.0, set()), (200.0, lost)):
+        regression: Any = SimpleNamespace(effective=worth)
+        fit = ModelFit(None, estimates, (), (np.zeros(1000),), regression, np.zeros(0, bool))  # type: ignore[arg-type]
+        found = described(fit, model).estimates
+        assert {name for name, one in found.items() if not one.has_interval} == refused
+
+
+@pytest.mark.slow
+def test_bristles_of_another_model_are_not_told() -> None:
+    """Friction with hysteresis of its own, fitted as LuGre friction."""
+    fit = identified("leuven", 1, ("lugre",)).fits[1].fit
+    for name in ("bristle_stiffness", "bristle_damping"):
+        assert fit.estimates[name].reason in CORRELATED
 
 
 def test_another_exponent_is_told_in_the_units_of_the_axis() -> None:

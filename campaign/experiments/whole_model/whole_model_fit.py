@@ -63,6 +63,12 @@ BASE_UNKNOWN = Cause("base unknown", "without a known {base} it means nothing")
 UNRESOLVED = Cause(
     "faster than rows", "{what} takes {milliseconds:.2g} ms, and rows show {resolved:.2g} ms"
 )
+CORRELATED = Cause(
+    "residuals correlated",
+    "the model lacks something: what it leaves over is correlated ({rows} rows are worth {worth})",
+)
+WORTH = 0.5
+"""of the rows, below which residuals are worth too little for what happens in reversals."""
 FACTOR_UNKNOWN = Cause("factor unknown", "{factor}: {reason}")
 STRONG = 10.0
 """Difference of BIC from which on one model is told from another."""
@@ -270,7 +276,7 @@ def _fitted(
         other = refitted((*unknowns, exponent), more, begin)
         fit = shifted(fit, dict(zip(names, other, strict=False)), "exponent", OTHER_EXPONENT)
     fit = _with_delay(fit, doubt)
-    fit = with_bases(resolved(fit, model, motions, filtering), model)
+    fit = with_bases(described(resolved(fit, model, motions, filtering), model), model)
     say("blocks left out")
     forces = [
         late_force(motion, filtering).at(0.0) * moving(motion, filtering) for motion in motions
@@ -386,6 +392,23 @@ def resolved(
             reason = UNRESOLVED(
                 what=each.lasts.what, milliseconds=1e3 * takes, resolved=1e3 * shortest
             )
+            found[each.name] = _open(found[each.name], reason)
+    return replace(fit, estimates=found)
+
+
+def described(fit: ModelFit, model: Model) -> ModelFit:
+    """Without what happens in reversals where the model does not describe them.
+
+    Its residuals are correlated then, of a right model with noise they are not: as where several
+    interfaces are fitted as one.
+    """
+    rows = sum(map(len, fit.residuals))
+    if fit.regression is None or fit.regression.effective >= WORTH * rows:
+        return fit
+    reason = CORRELATED(rows=rows, worth=round(fit.regression.effective))
+    found = dict(fit.estimates)
+    for each in model.numbers:
+        if each.lasts is not None and found[each.name].origin is Origin.MEASURED:
             found[each.name] = _open(found[each.name], reason)
     return replace(fit, estimates=found)
 
