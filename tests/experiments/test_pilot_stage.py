@@ -407,7 +407,7 @@ def held(numbers: Iterable[int]) -> list[Pooled]:
     return pooled(found)
 
 
-@pytest.mark.slow
+@pytest.mark.statistics
 def test_intervals_of_a_sample_hold() -> None:
     groups = held((4, 8, 20))
     assert len(groups) >= 10

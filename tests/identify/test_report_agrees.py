@@ -91,9 +91,20 @@ def presliding_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(presliding_multisine, "identify_presliding_dynamics", fitted)
 
 
+LONG = ("compensator_data",)
+"""Protocols whose tests take a minute."""
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("presliding_fitted_once")
-@pytest.mark.parametrize("path", PROTOCOLS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=[pytest.mark.soak] if path.stem in LONG else [])
+        for path in PROTOCOLS
+    ],
+    ids=lambda path: path.stem,
+)
 def test_report_and_identification_agree(path: Path) -> None:
     for test, trials in planned(path).items():
         fingerprints = tuple(each.fingerprint for each in trials)

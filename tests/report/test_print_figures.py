@@ -22,7 +22,7 @@ from campaign.result import Axis, Curve, Figure, Finding, Mark, Panel
 from tests.report.print_checks import problems, told_apart
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
-USUAL = ("quickstart", "friction_behaviour")
+USUAL = ("quickstart",)
 LONG = ("compensator_data", "draws", "presliding_multisine", "stick_slip_map", "thesis")
 """They take minutes; but for two figures of multisines and one map, others draw what they draw."""
 COLUMNS: tuple[Column, ...] = ("single", "double")

@@ -184,7 +184,7 @@ def find(
     fits: list[Fit] = []
     tried = models(sizes, names)
 
-    def add(model: Model, inertia: float) -> None:
+    def add(model: Model, inertia: float, starts: int) -> None:
         done = partial(say_at, say, f"model {len(fits) + 1} of {len(tried) + 1} ({model.name})")
         alike = "alike" in model.name
         terms = (*extra, TERMS["offset"]) if alike else tuple(extra)
@@ -194,10 +194,10 @@ def find(
         fits.append(one)
 
     for model in tried:
-        add(model, inertia)
+        add(model, inertia, starts)
     held = fits[_chosen(fits, wanted.removesuffix(EXPONENT_FREE))]
     if (free := held.model.with_exponent_free(held.values)) is not None:
-        add(free, held.values["inertia"])
+        add(free, held.values["inertia"], starts=1)  # from what was found
     return Whole(tuple(fits), _chosen(fits, wanted), filtering, tuple(pieces))
 
 
