@@ -382,7 +382,7 @@ def narrowing(number: int, draws: int) -> float:
     return float(np.exp(np.mean(np.log(ratios))))
 
 
-@pytest.mark.slow
+@pytest.mark.statistics
 def test_intervals_of_a_bench_are_narrower_than_those_of_the_plain_map() -> None:
     """Of the one with the least to gain: by 4 %."""
     assert narrowing(3, 1) < 1.0

@@ -283,7 +283,7 @@ def test_a_product_keeps_what_is_systematic_in_its_factors() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [3, pytest.param(10, marks=pytest.mark.statistics)])
+@pytest.mark.parametrize("count", [2, pytest.param(10, marks=pytest.mark.statistics)])
 def test_intervals_hold_and_a_jump_of_friction_has_no_bristles(count: int) -> None:
     """Rigs without bristles: stiffness is refused, whatever a filtered jump looks like."""
     held: list[bool] = []

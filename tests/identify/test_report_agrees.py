@@ -91,8 +91,8 @@ def presliding_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(presliding_multisine, "identify_presliding_dynamics", fitted)
 
 
-LONG = ("compensator_data",)
-"""Protocols whose tests take a minute."""
+LONG = ("compensator_data", "excitation")
+"""Protocols whose tests take half a minute and more."""
 
 
 @pytest.mark.slow
