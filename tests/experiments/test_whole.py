@@ -16,18 +16,18 @@ from campaign.estimation.inverse.motion import FilterSettings, Motion, motion_of
 from campaign.estimation.unknowns import Unknown
 from campaign.estimation.whole_model import ModelFit, fit_model, moved_with
 from campaign.experiments.any_motion.motions import MotionPiece, with_slowest
-from campaign.experiments.whole_model.residuals import models
-from campaign.experiments.whole_model.whole_model_fit import (
+from campaign.experiments.whole_model.doubts import (
     BASE_UNKNOWN,
     CORRELATED,
     OTHER_EXPONENT,
     derived,
     described,
-    find,
     resolved,
     shifted,
     with_bases,
 )
+from campaign.experiments.whole_model.residuals import models
+from campaign.experiments.whole_model.whole_model_fit import find
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.stribeck import StribeckOptions, steady_state
 from campaign.physics.friction.unknowns import DerivedOption, Sizes, product
@@ -220,6 +220,26 @@ def test_an_exponent_unlike_the_usual_one_is_found_or_leaves_its_curve_open(
             assert holds(one, value) if one.origin is Origin.MEASURED else not usual
     if not usual:
         assert holds(free.fit.estimates["stribeck_exponent"], exponent)
+
+
+def test_a_model_can_be_wanted_with_its_exponent_held_or_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By its name, as another recording is compared with; whatever the BIC says."""
+    monkeypatch.setattr(
+        "campaign.experiments.whole_model.whole_model_fit._fitted",
+        lambda model, *told: SimpleNamespace(
+            model=model, values={"inertia": 1.0} | {each.name: 1.0 for each in model.numbers}
+        ),
+    )
+    piece = MotionPiece(1, swinging(), None)
+    filtering = with_slowest(FilterSettings.for_rate(1000.0), [piece], None)
+    for wanted in ("stribeck, by direction", "stribeck, by direction, exponent free"):
+        found = find([piece], [], filtering, names=("stribeck",), wanted=wanted)
+        assert found.fits[found.best].model.name == wanted
+        assert found.fits[-1].model.name == "stribeck, by direction, exponent free"
+    with pytest.raises(ValueError, match="there is no model 'dahl'"):
+        find([piece], [], filtering, names=("stribeck",), wanted="dahl")
 
 
 def test_what_happens_in_reversals_is_open_where_what_is_left_over_is_correlated() -> None:

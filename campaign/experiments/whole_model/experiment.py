@@ -25,10 +25,11 @@ from campaign.experiments.any_motion.motions import (
 )
 from campaign.experiments.interface import TestData
 from campaign.experiments.shared.recorded_motion import of_any_motion
+from campaign.experiments.whole_model.doubts import derived
 from campaign.experiments.whole_model.parts import telling_parts
 from campaign.experiments.whole_model.residuals import USUAL
 from campaign.experiments.whole_model.tables_and_figures import figures, models_table, values_table
-from campaign.experiments.whole_model.whole_model_fit import Fit, derived, find
+from campaign.experiments.whole_model.whole_model_fit import Fit, find
 from campaign.options import Options
 from campaign.parameter import IdentifiedRig, Parameter, Unseen
 from campaign.reason import Cause, Reason
