@@ -222,6 +222,18 @@ def test_an_exponent_unlike_the_usual_one_is_found_or_leaves_its_curve_open(
         assert holds(free.fit.estimates["stribeck_exponent"], exponent)
 
 
+def test_static_friction_rests_on_a_stribeck_velocity_that_the_motion_passes() -> None:
+    """At three times it a twentieth of the fall is left (exponent 1)."""
+    model = models(Sizes((2.0, 2.5), (0.5, 0.8), 1.2, 0.5), ("stribeck",))[1]
+    [slow] = [each for each in model.unknowns if each.name == "stribeck_velocity"]
+    assert np.exp(-1.2 / slow.upper) < 0.05
+    estimates = {each.name: told(each.name, 2.0) for each in model.numbers}
+    estimates["stribeck_velocity"] = replace(BOUND, name="stribeck_velocity")
+    fit = ModelFit(None, estimates, (), (), None, np.zeros(0, bool))  # type: ignore[arg-type]
+    for name in RATIOS:
+        assert with_bases(fit, model).estimates[name].reason in BASE_UNKNOWN
+
+
 def test_a_model_can_be_wanted_with_its_exponent_held_or_free(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
