@@ -180,12 +180,15 @@ def test_every_broken_limit_is_named_with_value_and_bound(desk) -> None:
 
 
 def test_each_repeat_that_breaks_a_limit_is_named(desk) -> None:
-    """Of trials with one bench and task the plan keeps margins once, but every broken limit."""
+    """Of trials with one bench and task the plan keeps margins once, but every broken limit.
+
+    Each repeat has a warm-up and six speeds.
+    """
     fast = SPEEDS.replace('"6 deg/s"', '"95 deg/s"')
     plan = make_plan(desk.load(fast + "repeat = 3\n"))
-    assert [use.trial for use in plan.breaches if use.margin.limit == "rate"] == [6, 12, 18]
+    assert [use.trial for use in plan.breaches if use.margin.limit == "rate"] == [7, 14, 21]
     (test,) = plan.tests
-    assert [use.trial for use in test.closest if use.margin.limit == "rate"] == [6]
+    assert [use.trial for use in test.closest if use.margin.limit == "rate"] == [7]
 
 
 # The shipped protocols.
