@@ -77,7 +77,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
 def _skipped(run: RunReader) -> Iterator[int]:
     """Numbers of the trials whose last attempt was followed by the decision to skip them."""
     skipped: dict[int, bool] = {}
-    for entry in parse_journal(run.path, run.journal.encode()).entries:
+    for entry in parse_journal(run.path, run.story.content).entries:
         if isinstance(entry, TrialFinished):
             skipped[entry.trial] = False
         elif isinstance(entry, Decision) and entry.trial is not None and entry.decision == "skip":

@@ -10,6 +10,7 @@ import numpy as np
 
 from campaign.archive import ArchivedTrial, PlannedTrial, RunHeader, RunReader, RunStatus
 from campaign.archive.layout.full_plan import FullPlan
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.errors import ArchiveError
 from campaign.experiments.interface import Experiment, TestData
 from campaign.options import Options
@@ -296,6 +297,6 @@ def made_up_run(
         ended="2026-11-21T09:37:58+00:00",
         plan=tuple(PlannedTrial.of(t.trial) for t in trials),
         trials=tuple(trials),
-        journal="",
+        story=read_lines(b""),
         full_plan=FullPlan(archive, lambda: ("", "")),
     )

@@ -16,6 +16,7 @@ from campaign.archive.layout.journal import (
     TrialRefused,
     TrialsFollowed,
 )
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.errors import ArchiveError
 from campaign.recording import Channel, Ending, Fault, Outcome, Recording, SafeState
 from campaign.report.build import render
@@ -68,7 +69,9 @@ def test_the_journal_and_the_faults(made_up: ModuleType, tmp_path: object) -> No
     ]
     hot = Ending(Outcome.FAULT, "hot", fault=Fault.DRIVE, telemetry={"ring": {"fill_max": 7}})
     journal = "".join(line.model_dump_json() + "\n" for line in lines)
-    run = replace(run, journal=journal, trials=(of(run, 9, Role.MEASUREMENT, hot),))
+    run = replace(
+        run, story=read_lines(journal.encode()), trials=(of(run, 9, Role.MEASUREMENT, hot),)
+    )
     found = incidents(run)
     titles = [table.title for table in found.tables]
     assert titles == ["What the run decided", "What was done by hand", titles[2]]
@@ -87,7 +90,7 @@ def test_stages_are_told_with_what_was_refused_and_why(made_up: ModuleType, tmp_
         TrialsFollowed(at=at, test="sea", stage=3, name="again", reason="ValueError: no slope"),
     ]
     journal = "".join(line.model_dump_json() + "\n" for line in lines)
-    found = incidents(replace(run, journal=run.journal + journal))
+    found = incidents(replace(run, story=read_lines((run.journal + journal).encode())))
     _, first, second = lines_of(found, "stages")
     assert "sea at compensation = none, stage 2 (more)" in first
     assert "sea [speed=9]: too fast" in first
@@ -185,7 +188,7 @@ def test_every_number_of_an_incident_has_an_interval_or_says_why_not(
     lines += [OperatorStep(at="2026-11-21T10:01:00Z", trial=4, step="Preload it", answer="done")]
     journal = "".join(line.model_dump_json() + "\n" for line in (*lines, *attempts))
     trials = (*run.trials, *checks, of(run, 9, Role.MEASUREMENT, hot))
-    tables = incidents(replace(run, journal=journal, trials=trials)).tables
+    tables = incidents(replace(run, story=read_lines(journal.encode()), trials=trials)).tables
     assert {table.key.partition("-")[0] for table in tables} == {
         "decisions",
         "operator",

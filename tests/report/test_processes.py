@@ -153,7 +153,7 @@ def test_the_journal_is_parsed_once_for_a_report(
         monkeypatch.setattr(module, "read_lines", counted)
     run = open_run(archive)
     document_of(run, experiments())
-    assert parsed == [run.journal.encode()]
+    assert parsed == [run.story.content]
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ import pytest
 from campaign.api.analysis import analyse_run, published_of
 from campaign.archive import RunReader
 from campaign.archive.layout.journal import RunResumed, TrialFinished
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.estimate import OF_ONE_TRIAL, Estimate
 from campaign.experiments.interface import Experiment
 from campaign.published.provenance import OF_A_TRUTH
@@ -125,7 +126,9 @@ def test_a_run_that_was_gone_on_with_on_a_changed_bench(
     for number, change in enumerate(resumes):
         lines.append(RunResumed(at="", changes=(change,) if change else ()).model_dump_json())
         lines += [finished(2)] if number == 0 else []
-    run = dataclasses.replace(run, journal="".join(f"{line}\n" for line in lines))
+    run = dataclasses.replace(
+        run, story=read_lines("".join(f"{line}\n" for line in lines).encode())
+    )
     kind = dataclasses.replace(made_up.EXPERIMENTS["stabilization"], perturbs_bench=perturbs)
     (test,) = analyse_run(run, {"stabilization": kind})
     assert test.provenance.why_altered({"compensation": "none"}) == why

@@ -14,6 +14,7 @@ import pytest
 
 from campaign.archive import RunHeader, RunReader, RunStatus, RunWriter, open_run
 from campaign.archive.layout.journal import Decision, TrialFinished
+from campaign.archive.layout.journal_summary import read_lines
 from campaign.cli.report import report_run
 from campaign.errors import ExitCode, UsageError
 from campaign.estimate import Estimate, Window
@@ -351,7 +352,7 @@ def test_metrics_attempts_and_decisions_are_told(made_up: ModuleType, tmp_path: 
     ]
     decided = Decision(at=AT, trial=1, decision="retry", reason="a fault may be once")
     journal = "".join(f"{each.model_dump_json()}\n" for each in (*lines, decided))
-    run = replace(run, trials=(first, *run.trials[1:]), journal=journal)
+    run = replace(run, trials=(first, *run.trials[1:]), story=read_lines(journal.encode()))
     words = page(build(made_up, run, tmp_path / "out", "1,2"), 1).text
     assert "largest error 0.480 ± 0.080 mrad" in words
     assert "coulomb torque 30 N·m read once" in words or "30.00 N·m read once" in words

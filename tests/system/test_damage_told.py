@@ -18,7 +18,6 @@ import pytest
 import campaign
 from campaign.archive import ArchivedTrial, RunWriter, find_run, open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.reading.damage import Damage
 from campaign.archive.reading.damage_words import in_one_line
 from campaign.archive.reading.sound_samples import readable, without_damaged
@@ -331,7 +330,7 @@ def test_a_report_names_a_record_that_nothing_else_needs(archive: Path, tmp_path
 
 
 def decisions(run: campaign.archive.RunReader) -> list[str]:
-    entries = read_lines(run.journal.encode()).all(Decision)
+    entries = run.story.all(Decision)
     return [entry.reason for entry in entries if entry.decision == "source damaged"]
 
 

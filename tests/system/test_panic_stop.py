@@ -22,7 +22,6 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.journal_summary import read_lines
 from campaign.cli.stop import stop_bench
 from campaign.errors import ExitCode
 from campaign.wire.codes import Kind
@@ -107,7 +106,7 @@ class Bench:
         assert run.reason.startswith("panic stop by ")
         assert "campaign stop" in run.reason  # by whom
         assert run.safe_state == "confirmed"
-        decisions = read_lines(run.journal.encode()).all(Decision)
+        decisions = run.story.all(Decision)
         assert [d for d in decisions if d.decision == "panic stop"]
 
 
@@ -301,7 +300,7 @@ def test_nobody_but_a_person_clears_it(tmp_path: Path) -> None:
         done = campaign(tmp_path, "run", "protocol.toml", *right)
         run = open_run(tmp_path / done.last_line)
         assert run.status == "complete"
-        (told,) = read_lines(run.journal.encode()).all(Decision)[:1]
+        (told,) = run.story.all(Decision)[:1]
         assert told.decision == "stop cleared"
         assert "campaign stop" in told.reason  # whose stop it was
         assert "by --clear-stop 1" in told.reason

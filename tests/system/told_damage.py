@@ -20,7 +20,6 @@ from typer.testing import CliRunner
 import campaign
 from campaign.archive import RunReader, find_run, open_run
 from campaign.archive.layout.journal import Decision
-from campaign.archive.layout.journal_summary import read_lines
 from campaign.archive.layout.results import results_path
 from campaign.archive.reading.results_file import read_results
 from campaign.cli.bench_commands import app
@@ -254,7 +253,7 @@ def _new_run(results: Path, *arguments: object) -> Said:
 
 
 def _decisions(run: RunReader) -> set[str]:
-    return {entry.decision for entry in read_lines(run.journal.encode()).all(Decision)}
+    return {entry.decision for entry in run.story.all(Decision)}
 
 
 def _content(recording: Recording) -> tuple[object, ...]:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
@@ -37,7 +38,7 @@ class Lines:
         entries: the lines that can be understood, in order.
         damaged: numbers, from 1, of those that cannot.
         torn: whether a last line was begun and never reported, which is no damage.
-        text: the lines that were reported, damaged ones included.
+        content: the lines that were reported, damaged ones included.
         measured: lines that tell what was measured, by the digest of the trial's record, as far as
             they were asked to be kept so; `entries` is without them.
     """
@@ -45,7 +46,7 @@ class Lines:
     entries: tuple[Entry, ...]
     damaged: tuple[int, ...]
     torn: bool
-    text: str
+    content: bytes = field(repr=False)
     measured: Mapping[str, bytes] = field(default_factory=dict, repr=False)
 
     @property
@@ -55,6 +56,11 @@ class Lines:
         return begins and not self.damaged and not self.torn
 
     @property
+    def text(self) -> str:
+        """Of `content`; what is no text in it is replaced."""
+        return self.content.decode("utf-8", "replace")
+
+    @cached_property
     def finished(self) -> dict[int, TrialFinished]:
         """By trial, in the order of their numbers; of several attempts the last one counts."""
         return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
@@ -64,7 +70,7 @@ class Lines:
         """How many trials somebody stopped, which have not failed."""
         return sum(each.outcome is Outcome.INTERRUPTED for each in self.finished.values())
 
-    @property
+    @cached_property
     def attempts(self) -> list[TrialFinished]:
         """Every finished attempt, in the order they finished; a line that was repeated once."""
         return list({(e.trial, e.attempt): e for e in self.all(TrialFinished)}.values())
@@ -110,7 +116,7 @@ def read_lines(content: bytes, *, lean: bool = False) -> Lines:
         entries=tuple(entries),
         damaged=tuple(damaged),
         torn=torn,
-        text=b"".join(line + b"\n" for line in lines).decode("utf-8", "replace"),
+        content=b"".join(line + b"\n" for line in lines),
         measured=left,
     )
 

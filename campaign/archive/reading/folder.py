@@ -58,7 +58,7 @@ def open_folder(folder: Path) -> RunReader:
         ended=ended.at if ended else "",
         plan=planned + planned_in(stages),
         trials=tuple(trials),
-        journal=story.text,
+        story=story,
         full_plan=FullPlan(folder, partial(_plan_texts, folder), stages),
         damaged=tuple(damaged.found),
         earlier_attempts={number: tuple(found) for number, found in earlier.items()},

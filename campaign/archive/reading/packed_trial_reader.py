@@ -99,7 +99,7 @@ def _trees(text: str) -> Trees:
     return parse_trees(text)
 
 
-def parse_record(path: Path, place: str, text: str) -> TrialRecord:
+def parse_record(path: Path, place: str, text: str | bytes) -> TrialRecord:
     """A record from its text. Raises ArchiveError."""
     try:
         return TrialRecord.model_validate_json(text)

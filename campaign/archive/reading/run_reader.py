@@ -36,13 +36,13 @@ class Glance:
     interrupted: int
 
 
-def interrupted_trials(status: RunStatus, journal: Callable[[], str]) -> int:
+def interrupted_trials(status: RunStatus, journal: Callable[[], bytes]) -> int:
     """How many trials of a sealed run somebody stopped; only where there may be some its journal
     is read.
     """
     if status not in (RunStatus.INTERRUPTED, RunStatus.FAULT):
         return 0  # the plan was worked through
-    return read_lines(journal().encode()).interrupted
+    return read_lines(journal()).interrupted
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class RunReader:
         plan: every planned trial, executed or not; those that followed come last.
         trials: the executed ones, in plan order, failed ones included. Of a sealed run each is
             parsed when it is asked for; `outlines` tells of all of them without that.
-        journal: verbatim.
+        story: what the journal says, line by line; of a sealed run what was measured is not parsed.
         full_plan: every planned trial, whole.
         damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a
             trial from `trials`, a line from `plan`, a field of the header is as if it had not been
@@ -69,7 +69,6 @@ class RunReader:
             there were stages. The header counts the trials of the plan without them.
         root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
             is in progress.
-        read_story: `story`, where whoever opened the run has read it.
     """
 
     path: Path
@@ -80,13 +79,12 @@ class RunReader:
     ended: str
     plan: tuple[PlannedTrial, ...]
     trials: Sequence[ArchivedTrial]
-    journal: str = field(repr=False)
+    story: Lines = field(repr=False)
     full_plan: FullPlan = field(repr=False)
     damaged: tuple[Damage, ...] = ()
     earlier_attempts: Mapping[int, tuple[ArchivedTrial, ...]] = field(default_factory=dict)
     root: str = ""
     stages: tuple[TrialsFollowed, ...] = ()
-    read_story: Lines | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
@@ -124,10 +122,10 @@ class RunReader:
     def sealed(self) -> bool:
         return self.path.is_file()
 
-    @cached_property
-    def story(self) -> Lines:
-        """What the journal says, line by line; of a sealed run without what was measured."""
-        return self.read_story or read_lines(self.journal.encode())
+    @property
+    def journal(self) -> str:
+        """Verbatim."""
+        return self.story.text
 
     @cached_property
     def sha256(self) -> str:

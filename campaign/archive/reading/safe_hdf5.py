@@ -144,9 +144,14 @@ def names(group: h5py.Group) -> list[str]:
 
 def text_at(parent: h5py.Group, name: str, digest: str | None = None) -> str:
     """A text, held against `digest`; where there is none, against its own attribute."""
+    return raw_text_at(parent, name, digest).decode("utf-8")
+
+
+def raw_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> bytes:
+    """As `text_at`, in UTF-8."""
     dataset, raw = _raw_text(parent, name)
     _check(dataset, raw, digest)
-    return raw.decode("utf-8")
+    return raw
 
 
 def check_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> None:

@@ -84,10 +84,15 @@ class SealedTexts:
         return sorted(name for name in names if name.startswith(prefix))
 
     def text(self, place: str) -> str:
-        """A text of `/run`, e.g. `journal/data`. Raises ArchiveError when it is damaged."""
+        """A text of `/run`, e.g. `title`. Raises ArchiveError when it is damaged."""
+        with safe_hdf5.guarded(self._path, f"/run/{place}"):
+            return self.raw(place).decode("utf-8")
+
+    def raw(self, place: str) -> bytes:
+        """A text of `/run` in UTF-8, e.g. `journal/data`. Raises ArchiveError when damaged."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
-            return safe_hdf5.text_at(parent, name, self._digest(place))
+            return safe_hdf5.raw_text_at(parent, name, self._digest(place))
 
     def unchecked(self, place: str) -> str:
         """A text of `/run` as it stands there; it may be damaged. Raises ArchiveError."""

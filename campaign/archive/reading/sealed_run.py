@@ -6,11 +6,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 
 import h5py
 
-from campaign.archive.layout.checksums import text_digest
 from campaign.archive.layout.entries import entry_name, entry_names, file_name
 from campaign.archive.layout.followup_trials import planned_in, stages_in
 from campaign.archive.layout.full_plan import FullPlan
@@ -51,8 +51,7 @@ def read_sealed(path: Path) -> RunReader:
         header = _header(texts, damaged)
         if texts.seal is not None and texts.seal.run != header.name:
             damaged.add(f"/run/{SEAL}", f"is of the run {texts.seal.run!r}, not of {header.name!r}")
-        journal = damaged.read(lambda: texts.text("journal/data"), "").encode()
-        story = read_lines(journal, lean=True)
+        story = read_lines(damaged.read(lambda: texts.raw("journal/data"), b""), lean=True)
         note_journal(story, damaged)
         planned: tuple[PlannedTrial, ...] = damaged.read(
             lambda: parse_plan(path, texts.text("plan/data")), ()
@@ -71,8 +70,7 @@ def read_sealed(path: Path) -> RunReader:
             ended=damaged.read(lambda: texts.text("end_time"), ""),
             plan=plan,
             trials=trials,
-            journal=story.text,
-            read_story=story,
+            story=story,
             full_plan=FullPlan(path, partial(_plan_texts, path), stages),
             damaged=tuple(damaged.found),
             earlier_attempts=earlier,
@@ -88,7 +86,7 @@ def read_glance(path: Path) -> Glance:
         texts = SealedTexts(path, file, damaged)
         header = _header(texts, damaged)
         status = RunStatus(texts.text("outcome/status"))
-        interrupted = interrupted_trials(status, lambda: texts.text("journal/data"))
+        interrupted = interrupted_trials(status, lambda: texts.raw("journal/data"))
         return Glance(
             header=header,
             planned=header.trials + _followed(texts, header),
@@ -104,7 +102,7 @@ def _followed(texts: SealedTexts, header: RunHeader) -> int:
     """How many trials followed; the journal is looked into only where some may have."""
     if not any(test.get("stages") for test in header.tests):
         return 0
-    story = read_lines(texts.text("journal/data").encode())
+    story = read_lines(texts.raw("journal/data"))
     return len(planned_in(stages_in(story.entries)))
 
 
@@ -188,7 +186,7 @@ class _Trials:
     path: Path
     story: Lines
     groups: frozenset[str]
-    lines: Mapping[str, str]
+    lines: Mapping[str, bytes]
     whole: bool
     trees: Trees
     not_kept: Mapping[str, str]
@@ -199,12 +197,12 @@ class _Trials:
     ) -> _Trials:
         index, whole = _text_or_rest(texts, "index/data", damaged)
         trees, _ = _text_or_rest(texts, "trees/data", damaged)
-        lines = {text_digest(line): line for line in index.splitlines()}
+        lines = {sha256(line).hexdigest(): line for line in index.splitlines()}
         not_kept: dict[str, str] = {}
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, story, groups, lines, whole, _good_trees(trees), not_kept)
+        return cls(path, story, groups, lines, whole, _good_trees(trees.decode()), not_kept)
 
     def archived(
         self, plan: Sequence[PlannedTrial], damaged: DamageList
@@ -332,13 +330,13 @@ def _good_trees(text: str) -> Trees:
     return trees
 
 
-def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[str, bool]:
+def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[bytes, bool]:
     """A text and whether it is as it was sealed; where it is not, that is noted."""
     try:
-        return texts.text(place), True
+        return texts.raw(place), True
     except ArchiveError as error:
         damaged.note(error)
     try:
-        return texts.unchecked(place), False
+        return texts.unchecked(place).encode(), False
     except ArchiveError:
-        return "", False
+        return b"", False

@@ -102,7 +102,7 @@ class _Check(EntryCheck):
     def _content(self) -> None:
         run = read_sealed(self.path)
         self.root = run.root
-        story = read_lines(run.journal.encode())
+        story = read_lines(run.story.content)
         with safe_hdf5.open_file(self.path) as file:
             texts = SealedTexts(self.path, file, DamageList(self.path))
             self._texts(file, texts)

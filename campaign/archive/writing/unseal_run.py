@@ -91,7 +91,7 @@ def _fill(sealed: Path, folder: Path) -> None:
         for name, note in notes.items():
             write_atomically(folder / name, texts.text(f"{note}/data"))
         write_atomically(folder / HEADER, header_document(run.header))
-        story = parse_journal(sealed, run.journal.encode())
+        story = parse_journal(sealed, run.story.content)
         lines = {text_digest(line): line for line in texts.text("index/data").splitlines()}
         trees = parse_trees(texts.text("trees/data"))
         not_kept = read_not_kept(texts)
