@@ -58,9 +58,9 @@ def time_stuck(
         parts: into which the record is cut: its half cycles.
     """
     threshold = THRESHOLD * float(np.max(np.abs(base_rate), initial=0.0))
-    longest = SMOOTHED * len(base_rate) / max(parts, 1)
-    for rate in _rates(base_rate, relative_angle, gyro_rate, step, threshold):
-        if not rate.span <= max(longest, 1.0) or not np.all(np.isfinite(rate.values)):
+    longest = max(SMOOTHED * len(base_rate) / max(parts, 1), 1.0)
+    for rate in _rates(base_rate, relative_angle, gyro_rate, step, threshold, longest):
+        if not np.all(np.isfinite(rate.values)):
             continue
         stuck = np.abs(rate.values) < threshold
         cut = np.round(np.linspace(0, len(stuck), parts + 1)).astype(int)
@@ -96,19 +96,23 @@ def _share(told: Estimate) -> Estimate:
 
 
 def _rates(
-    base_rate: Array, angle: Array, gyro: Array, step: float, threshold: float
+    base_rate: Array, angle: Array, gyro: Array, step: float, threshold: float, longest: float
 ) -> Iterator[_Rate]:
-    """Relative rates, each smoothed as much as its sensor needs."""
+    """Relative rates, each smoothed as its sensor needs: over `longest` samples at most.
+
+    Noise is looked at before counts, which take a sorted copy.
+    """
     if not threshold > 0:
         return
-    if np.all(np.isfinite(angle)) and (count := count_of(angle)) > 0:
-        unsure = max(count, SIGMAS * math.sqrt(2.0) * noise_of(angle))
-        span = max(1, math.ceil(unsure / (threshold * step)))
-        if span < len(angle):
-            yield _Rate((angle[span:] - angle[:-span]) / (span * step), span, "the encoder")
-    if np.all(np.isfinite(gyro)) and count_of(gyro) <= threshold:
+    if np.all(np.isfinite(angle)):
+        span = math.ceil(SIGMAS * math.sqrt(2.0) * noise_of(angle) / (threshold * step))
+        if span <= longest and (count := count_of(angle)) > 0:
+            span = max(1, span, math.ceil(count / (threshold * step)))
+            if span <= longest and span < len(angle):
+                yield _Rate((angle[span:] - angle[:-span]) / (span * step), span, "the encoder")
+    if np.all(np.isfinite(gyro)):
         span = max(1, math.ceil((SIGMAS * noise_of(gyro) / threshold) ** 2))
-        if span < len(gyro):
+        if span <= longest and span < len(gyro) and count_of(gyro) <= threshold:
             total = np.concatenate([[0.0], np.cumsum(gyro - base_rate)])
             yield _Rate((total[span:] - total[:-span]) / span, span, "the rates of load and hull")
 
