@@ -120,11 +120,13 @@ def fit_presliding(
     if one is None:
         raise ValueError("too little of the curve of bristles shows in the rate of this ramp")
     best = two if two is not None and _believed(two, one) else one
-    own = _stiffness(best)
-    by_window = {share: own, **_by_window(ramp, smallest, breakaway, best, share)}
+    fits = {share: best, **_by_window(ramp, smallest, breakaway, best, share)}
+    by_window = {end: _stiffness(fit) for end, fit in fits.items()}
+    sums = {end: _at_rest(fit) for end, fit in fits.items()}
     hidden = hidden_shift(one) if best is one else Shift(0.0, 0.0)
-    shifted = _shifted(own, WINDOW, _window_shift(share, by_window))
-    at_rest = _shifted(_at_rest(best), "more interfaces than two", _split_shift(best))
+    shifted = _shifted(by_window[share], WINDOW, _window_shift(share, by_window))
+    at_rest = _shifted(sums[share], WINDOW, _window_shift(share, sums))
+    at_rest = _shifted(at_rest, "more interfaces than two", _split_shift(best))
     return Presliding(
         stiffness=_beside(shifted, hidden.stiffness, "at most"),
         stiffness_at_rest=_beside(at_rest, hidden.at_rest, "at least"),
@@ -175,8 +177,8 @@ def _of_logarithm(fit: BristleFit, name: str, value: float, row: Array) -> Estim
 
 def _by_window(
     ramp: Ramp, smallest: float, breakaway: float, best: BristleFit, share: float
-) -> dict[float, Estimate]:
-    """The stiffness by windows that end elsewhere, with as many interfaces as were found.
+) -> dict[float, BristleFit]:
+    """The fits to windows that end elsewhere, with as many interfaces as were found.
 
     A window that ends before the strongest interface bends says nothing of it.
     """
@@ -189,7 +191,7 @@ def _by_window(
             continue
         fit = fit_bristles(part, smallest, best.again(part, breakaway, smallest))
         if fit is not None and other != share:
-            found[other] = _stiffness(fit)
+            found[other] = fit
     return found
 
 

@@ -43,6 +43,8 @@ SHORT_BLOCK = Cause(
     "blocks too short",
     "a block is only {times:.2g} times as long as what the error remembers",
 )
+SHORTFALL = 1.5 + 1e-3
+"""Samples that a window of whole cycles may lack, and what the rounding of its times adds."""
 BLOCKS = 6
 """of an irregular record; with ten, 37 periods of narrow-band noise are covered in 90 % only."""
 MEMORY = 4.0
@@ -70,11 +72,12 @@ def over_cycles(samples: Array, per_cycle: float) -> Estimate:
 
 
 def whole_cycles(samples: int, per_cycle: float) -> int:
-    """Cycles in so many samples, one sample short of a whole one allowed.
+    """Cycles in so many samples, up to one and a half samples short of a whole one.
 
-    A window of whole cycles seldom is of whole samples: 2 cycles of 0.24 Hz are 8333.3 at 1 kHz.
+    A window of whole cycles seldom is of whole samples: 2 cycles of 0.24 Hz are 8333.3 at 1 kHz. It
+    begins within half a sample, and a recording ends up to one sample early.
     """
-    return int((samples + 1) / per_cycle)
+    return int((samples + SHORTFALL) / per_cycle)
 
 
 def over_blocks(samples: Array, name: str = NAME, unit: str = UNIT) -> Estimate:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from campaign.physics.bench import Bench
+from campaign.physics.friction import friction_models
 from campaign.physics.friction.stribeck import in_direction
 from campaign.physics.loop import at_load
 
@@ -110,12 +111,13 @@ def _bristles(bench: Bench) -> list[tuple[float, float]]:
     """
     found = []
     for options in bench.friction.values():
-        stiffness = getattr(options, "bristle_stiffness", None)
+        small_signal = friction_models()[options.model].small_signal
+        stuck = None if small_signal is None else small_signal(options).stuck
         static = getattr(options, "static_torque", None)
-        if stiffness is None or static is None:
+        if stuck is None or static is None:
             return []
         torque, rate = at_load(options, bench)
-        found.append((torque * static, torque * rate * stiffness))
+        found.append((torque * static, torque * rate * stuck.stiffness))
     return found
 
 

@@ -149,6 +149,20 @@ def test_what_is_no_curve_of_bristles_has_no_interval() -> None:
     assert found.stiffness.reason in OFF_THE_CURVE
 
 
+def test_the_stiffness_at_rest_depends_on_the_window_as_the_stiffness_does() -> None:
+    """Bristles that are straight at first: the longer the window, the stiffer they look."""
+    time = np.arange(35_000) / 1000.0
+    torque = np.maximum(time - REST, 0.0)
+    bent = 10.0 - 22.0 * np.log1p(-np.clip(torque - 10.0, 0.0, 21.0) / 22.0)
+    rate = np.gradient(np.where(torque < 10.0, torque, bent) / LOAD.stiffness, time)
+    rate += 1e-4 * np.random.default_rng(2).standard_normal(len(time))
+    found = fit_presliding(time, rate, torque, REST, 32.0)
+    assert len(found.interfaces) == 1
+    window = [part for part in found.stiffness.systematic if part.source == "window"]
+    assert window[0].standard_uncertainty
+    assert window[0] in found.stiffness_at_rest.systematic
+
+
 def test_a_window_without_samples_is_refused() -> None:
     time, rate, torque = bending(LOAD)
     with pytest.raises(ValueError, match="samples lie below"):

@@ -23,6 +23,7 @@ from campaign.estimation.stabilization_error import (
     over_cycles,
     over_trials,
     quotient,
+    whole_cycles,
 )
 from tests.estimation.coverage import autoregressive, draws, holds, rejected
 
@@ -44,6 +45,18 @@ def test_two_cycles_that_are_not_of_whole_samples_are_two() -> None:
     noise = 1e-2 * np.random.default_rng(3).standard_normal(8333)
     assert over_cycles(np.sin(angle) + noise, 1000 / 0.24).freedom == 3
     assert over_cycles((np.sin(angle) + noise)[:8320], 1000 / 0.24).freedom == 1
+
+
+@pytest.mark.parametrize("sample_rate", [200.0, 1000.0])
+def test_a_window_of_whole_cycles_has_all_of_them(sample_rate: float) -> None:
+    """As a recording has it: up to the last sample before its end, from half a sample early on."""
+    for frequency in np.arange(0.05, 3.0, 0.01):
+        for cycles in (1, 6):
+            start, stop = 2.0 / frequency, 2.0 / frequency + cycles / frequency
+            time = np.arange(np.floor(stop * sample_rate + 1e-9)) / sample_rate
+            inside = time[time >= start - 0.5 / sample_rate]
+            found_rate = (len(inside) - 1) / np.ptp(inside)
+            assert whole_cycles(len(inside), found_rate / frequency) == cycles
 
 
 def test_the_interval_of_half_cycles_of_known_size() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from campaign.physics.bench import Bench
 from campaign.physics.steady_friction import steady_friction
 from campaign.physics.true_values import DIRECTIONS, stribeck_parameters, true_of, true_value
 from campaign.physics.variation import of_its_day
@@ -60,6 +61,18 @@ def test_stiffness_of_one_interface_and_of_all() -> None:
     assert true_value(PLATFORM, "stiffness_at_rest", {"statistic": "mean"}) == pytest.approx(
         15284.0 + 2 * RATIO * 1000.0 + 141176.0
     )
+
+
+def test_the_slow_part_of_bliman_and_sorine_takes_from_the_stiffness_at_rest() -> None:
+    own = {
+        "model": "bliman-sorine", "coulomb_torque": 10.0, "static_torque": 20.0,
+        "bristle_stiffness": 9000.0, "slow_stiffness": 3000.0,
+    }  # fmt: skip
+    rig = Bench.model_validate(
+        {**bench().model_dump(mode="json"), "friction": {"load": own}}, context={"si": True}
+    )
+    assert true_value(rig, "bristle_stiffness", {}) == pytest.approx(6000.0)
+    assert true_value(rig, "stiffness_at_rest", {}) == pytest.approx(6000.0)
 
 
 def test_what_is_no_parameter_has_no_true_value() -> None:
