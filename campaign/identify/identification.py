@@ -11,6 +11,7 @@ from campaign.axis_kind import axis_terms
 from campaign.entry_points import one_line
 from campaign.errors import Problem, ProtocolError, UsageError, explain_in_debug
 from campaign.estimate import Estimate, Origin
+from campaign.estimation.gate import TOO_WIDE
 from campaign.experiments.analysis import result_of, suitable
 from campaign.experiments.interface import (
     Experiment,
@@ -328,12 +329,14 @@ def _judged(sections: Sequence[Section]) -> Iterator[Section]:
 def widest(parameters: Sequence[Parameter]) -> Parameter | None:
     """The parameter whose interval is widest as a share of it; None where none has any.
 
-    One whose interval holds zero is not known to be there at all, and is not asked for.
+    One whose interval holds zero is not known to be there at all, and is not asked for; nor is one
+    that is not determined for another reason than its interval.
     """
     shares: Mapping[int, float] = {
         index: share
         for index, each in enumerate(parameters)
         if each.estimate.value != 0.0
+        and (each.estimate.origin is Origin.MEASURED or each.estimate.reason in TOO_WIDE)
         and (share := abs(each.estimate.half_width / each.estimate.value)) < 1.0
     }
     return parameters[max(shares, key=lambda index: shares[index])] if shares else None

@@ -10,7 +10,14 @@ import pytest
 
 from campaign.estimate import Estimate, Origin
 from campaign.estimation.gate import TOO_WIDE, UNPHYSICAL
-from campaign.experiments.any_motion.inverse_result import BENCH, NO_BASE, _settings, _with_base
+from campaign.experiments.any_motion.inverse_result import (
+    BENCH,
+    NO_BASE,
+    NO_SLOPE,
+    _settings,
+    _with_base,
+    _with_slope,
+)
 from campaign.experiments.frequency_response.model import analysis as frequency_response
 from campaign.experiments.friction_map import map_result as friction_map
 from campaign.experiments.presliding_multisine import parameters as presliding
@@ -59,21 +66,36 @@ def test_nothing_is_said_where_they_do_not_differ_or_one_is_no_number(
 
 
 def test_a_bench_gets_nothing_beside_a_measured_number_that_contradicts_it() -> None:
-    """No static friction was looked for, and none is told; a refused number is as fitted."""
-    refused = number("viscous_negative", 80.0, 60.0, origin=Origin.NOT_DETERMINED)
+    """No static friction was looked for, and none is told; of a bound the lower end."""
     bound = Estimate("viscous_positive", 4.0, "N m s/rad", level=0.95, kind="at most")
     found = [
         number("coulomb_positive", 2.95, 0.3),
         number("coulomb_negative", 3.76, 0.3),
         bound,
-        refused,
+        number("viscous_negative", 80.0, 6.0),
     ]
     parameters = [Parameter(one, "", bench=BENCH[one.name]) for one in found]
     told = _settings(parameters, data_of([SimpleNamespace(trial=SimpleNamespace(bench=RIG))]))
     assert told["friction.load.model"][0] == "coulomb"
     assert not any("static" in path or "stribeck" in path for path in told)
     assert told["friction.load.viscous_friction"][0] == 0.0
-    assert told["friction.load.negative.viscous_friction"][0] == 80.0
+    assert "friction.load.negative.viscous_friction" not in told  # it is a parameter
+
+
+def test_dry_friction_is_told_where_its_slope_over_the_rate_is_or_does_not_matter() -> None:
+    """Rates that do not show friction rise may lie where it is static friction."""
+    open_ = {"origin": Origin.NOT_DETERMINED}
+    bound = Estimate("viscous_negative", 4.0, "N m s/rad", level=0.95, kind="at most")
+    found = {
+        "coulomb_positive": number("coulomb_positive", 5.0, 0.1),
+        "viscous_positive": number("viscous_positive", -0.3, 0.2, **open_),
+        "coulomb_negative": number("coulomb_negative", 5.0, 0.1),
+        "viscous_negative": bound,
+    }
+    told = _with_slope(found)
+    assert told["coulomb_positive"].reason in NO_SLOPE
+    assert told["coulomb_negative"] == found["coulomb_negative"]
+    assert _with_slope(told) == told
 
 
 def test_what_else_is_in_a_force_is_not_told_where_neither_inertia_nor_friction_is() -> None:

@@ -51,6 +51,10 @@ PLAIN = frozenset(BENCH) | {"offset"}
 NO_BASE = Cause(
     "no base", "neither inertia nor dry friction is determined, so that nothing beside them is"
 )
+NO_SLOPE = Cause(
+    "no slope",
+    "viscous friction beside it is not determined: at rates as low, it may be static friction",
+)
 SEARCHED = Cause(
     "searched", "it is the best of a search, an eighth of a period apart over the travel"
 )
@@ -131,13 +135,15 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
         for name, other in ((one, two), (two, one))
     }
     scaled = {name: with_constants(one, data) for name, one in found.estimates.items()}
-    told = with_offset(_with_base(admitted_together(scaled, found.matters)), "coulomb")
+    admitted = _with_slope(admitted_together(scaled, found.matters))
+    told = with_offset(_with_base(admitted), "coulomb")
     dry = [one for name, one in told.items() if name.startswith("coulomb") and name in BENCH]
     slides = _is_plain(found) and not one_way(found) and all(map(is_value, dry))
     for term in found.best.structure.terms:
         one = told[term.name]
         bench = BENCH.get(term.name, "") if slides or term.name == "inertia" else ""
-        advice = next((text for key, text in ADVICE.items() if term.name.startswith(key)), "")
+        needs = "viscous" if one.reason in NO_SLOPE else term.name
+        advice = next((text for key, text in ADVICE.items() if needs.startswith(key)), "")
         if term.name in together:
             other, share = together[term.name]
             advice = (
@@ -157,6 +163,23 @@ def _parameters(found: InverseDynamics, data: TestData) -> Iterator[Parameter]:
             display="ms",
             advice="record faster, or with sharper reversals",
         )
+
+
+def _with_slope(told: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Dry friction is the intercept of a line over rates that go beyond a Stribeck curve.
+
+    Where such a line need not rise, rates as after a breakaway tell static friction.
+    """
+    level = {
+        name.replace("viscous", "coulomb")
+        for name, one in told.items()
+        if name.startswith("viscous") and one.origin is Origin.NOT_DETERMINED
+    }
+    return told | {
+        name: refused(told[name], NO_SLOPE())
+        for name in level & told.keys()
+        if told[name].origin is Origin.MEASURED
+    }
 
 
 def _with_base(told: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -269,8 +292,6 @@ def _settings(
         f"{FRICTION}.model": ("coulomb", "", "the plain friction of steady sliding"),
     }
     for name, each in by_name.items():
-        one = each.estimate
         if name in BENCH and name.startswith("viscous") and not each.bench:
-            fitted = 0.0 if one.kind == "at most" else max(one.value, 0.0)
-            told[BENCH[name]] = (fitted, "N m s/rad", "as fitted, and not determined")
+            told[BENCH[name]] = (0.0, "N m s/rad", "of it only an upper bound is known")
     return told
