@@ -7,6 +7,12 @@ An elastic part hung on the load multiplies the smooth response of the rigid axi
 with its own frequency as antiresonance wz, and the resonance wp of part and load together. Their
 intervals follow from what the fit leaves over, be it noise or friction: Student's t, with the
 freedom of as many residuals as neighbours do not know of each other.
+
+Friction in phase with the rate, D times the reaction of the inertia, divides the part's share of
+the inertia by 1 - iD: the distance of resonance and antiresonance falls by 1 / (1 + D^2), and the
+resonance is damped by D times what is left of it. The smooth response leads that of an inertia by
+the angle of this D, a delay apart. Viscous friction leads by up to twice that: therefore both are
+systematic parts and no corrections.
 """
 
 from __future__ import annotations
@@ -18,7 +24,8 @@ import numpy as np
 from campaign.arrays import Array, ComplexArray, Flags
 from campaign.estimate import Estimate
 from campaign.estimation.frequency_response import Response
-from campaign.estimation.intervals import with_error
+from campaign.estimation.gate import admitted
+from campaign.estimation.intervals import shifted_by, with_error
 
 SPAN = 2.0
 """The response is smooth, but for the mode, from the candidate over this to the candidate times
@@ -129,11 +136,26 @@ def _refine(frequency: Array, values: ComplexArray, centre: float) -> ElasticMod
     peak = float(np.max(np.abs(np.exp(_mode(np.linspace(f[0], f[-1], 2000), fit.x)) - 1.0)))
     if explained < EVIDENCE or peak < SMALLEST_PEAK or abs(fit.x[2]) > NEARLY * APART:
         return None
-    return _mode_found(fit.x, fit.jac, fit.fun, explained)
+    drag = float(np.tan(_lead(f, (y - _mode(f, fit.x)).imag)))
+    return _mode_found(fit.x, fit.jac, fit.fun, explained, drag)
 
 
-def _mode_found(p: Array, jacobian: Array, left: Array, explained: float) -> ElasticMode:
+def _lead(frequency: Array, phase: Array) -> float:
+    """Angle (rad) by which a smooth response of this phase (rad) leads that of an inertia.
+
+    A delay is a part in proportion to the frequency (Hz). Both have shape (n,).
+    """
+    basis = np.column_stack([np.ones_like(frequency), frequency])
+    constant, _ = np.linalg.lstsq(basis, phase, rcond=None)[0]
+    return float(constant) + np.pi / 2.0
+
+
+def _mode_found(
+    p: Array, jacobian: Array, left: Array, explained: float, drag: float
+) -> ElasticMode:
     """The mode of the parameters `p` of `_mode`, with intervals.
+
+    drag: friction over the reaction of the inertia, D above.
 
     The smooth part is linear and projected out of residuals and Jacobian alike, so that J^T J is
     the information on the mode alone.
@@ -149,9 +171,11 @@ def _mode_found(p: Array, jacobian: Array, left: Array, explained: float) -> Ela
         error = float(np.sqrt(gradient @ covariance @ gradient))
         return with_error(name, value, unit, error, freedom, "mode on top of a smooth response")
 
+    resonance = estimate("elastic_mode_frequency", pole, "Hz", np.eye(4)[0])
+    ratio = estimate("damping_ratio", damping, "", np.eye(4)[1])
     return ElasticMode(
-        estimate("elastic_mode_frequency", pole, "Hz", np.eye(4)[0]),
-        estimate("damping_ratio", damping, "", np.eye(4)[1]),
+        admitted(shifted_by(resonance, "friction", abs((pole - zero) * drag**2))),
+        admitted(shifted_by(ratio, "friction", abs(shift * drag))),
         estimate("antiresonance", zero, "Hz", by_zero),
         explained,
     )

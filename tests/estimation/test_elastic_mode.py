@@ -76,6 +76,23 @@ def test_intervals_of_a_mode_hold_its_truth(draws: int, seed: int) -> None:
     assert rejected(held(draws, seed)) == {}
 
 
+@pytest.mark.parametrize("power", [0.0, 1.0])  # of the rate: as of bristles, of dry friction
+def test_friction_that_holds_the_axis_widens_the_interval_of_its_mode(power: float) -> None:
+    """Resonance of 20 % hung at 30 Hz, with friction of 0.8 of the inertia's reaction there."""
+    f, own, total = np.geomspace(8.0, 120.0, 80), 2 * np.pi * 30.0, 65.0
+    s = 2j * np.pi * f
+    part = 0.2 * total * s * (own**2 + 0.04 * own * s) / (s**2 + 0.04 * own * s + own**2)
+    drag = 0.8 * 0.8 * total * own * (f / 30.0) ** power
+    true = 30.0 / np.sqrt(0.8)
+    for friction, widest in ((0.0, 0.1), (drag, 60.0)):
+        found = np.exp(-3e-4 * s) / (0.8 * total * s + part + friction)
+        mode = elastic_mode(Response(f, found, 1e-4 * np.abs(found), np.ones(len(f))))
+        low, high = mode.frequency.combined
+        assert low <= true <= high
+        assert high - low < widest
+        assert holds(mode.damping_ratio, 0.02 / np.sqrt(0.8))
+
+
 def test_residuals_that_resemble_their_neighbours_count_less() -> None:
     """White ones all count; in equal pairs, of correlation one half, a third of them does."""
     white = np.tile([1.0, -1.0, -1.0, 1.0], 50)  # products of neighbours cancel

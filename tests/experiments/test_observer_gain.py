@@ -126,6 +126,15 @@ def test_an_unstable_gain_is_a_result(done) -> None:
     assert max(curve.x.max() for curve in drawn.panels[0].curves) < 8.0
 
 
+def test_a_limit_that_is_reached_without_observer_too_tells_no_instability(done) -> None:
+    """The base motion alone asks for too much torque; noise and rejection show a stable loop."""
+    ending = Ending(Outcome.LIMIT, "drive_torque reached 1200 N m at 0.1 s")
+    errors = [item.trial.point["measured"] == "error" for item in done]
+    cut = [replace(i, ending=ending) if error else i for i, error in zip(done, errors, strict=True)]
+    limit = finding(analyse("observer_gain", cut), "unstable_corner_frequency").estimate
+    assert (limit.kind, limit.value) == ("at least", 8.0)
+
+
 def test_beyond_the_predicted_limit_one_trial_is_enough() -> None:
     planned = trials("observer_gain", bench(sampled), {**SHORT, "corners": ["300 Hz"]})
     beyond = [t for t in planned if t.point["corner"] == 300.0]

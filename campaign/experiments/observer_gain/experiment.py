@@ -189,7 +189,8 @@ def _analyse(data: TestData) -> Result:
     options = ObserverGainOptions.model_validate(data.trials[0].trial.options, context={"si": True})
     bench = complete(bench_of(data.trials[0].trial), "the theory of an observer")
     own, inertia = own_observer(bench, options.observer)
-    gains = [gain_of(*each) for each in by_value(data.trials, "corner").items()]
+    groups = by_value(data.trials, "corner")
+    gains = [gain_of(*each, groups.get(0.0, ())) for each in groups.items()]
     limit = predicted_limit(bench, options.observer, max(gain.corner for gain in gains) or own)
     figures: list[Figure] = [
         *error_figure(gains, own, limit),
@@ -234,7 +235,7 @@ def _findings(
 def _limit_found(gains: list[Gain]) -> Iterator[Finding]:
     """Where the loop becomes unstable: between two gains that were tried, or beyond all of them."""
     name = "unstable_corner_frequency"
-    stable = [gain.corner for gain in gains if gain.corner and not gain.unstable]
+    stable = [gain.corner for gain in gains if gain.corner and gain.stable]
     first = _first_unstable(gains)
     if first is not None:
         below = max((corner for corner in stable if corner < first.corner), default=0.0)
@@ -265,7 +266,7 @@ def _notes(
             f"load (corner {first.corner:.4g} Hz): {first.unstable}. A result, not a failure; "
             f"{expected}."
         )
-    else:
+    elif all(gain.stable for gain in gains if gain.corner):
         yield f"Stable at every gain that was tried: {expected}."
     others = [d for d in data.trials if d.ending.outcome in (Outcome.FAULT, Outcome.INTERRUPTED)]
     if others:
@@ -280,7 +281,7 @@ def _notes(
 
 
 def _row(gain: Gain) -> dict[str, Cell]:
-    state = "unstable" if gain.unstable else "stable"
+    state = "stable" if gain.stable else "unstable" if gain.unstable else "not known"
     return {
         "corner": gain.corner,
         "gain": gain.gain,

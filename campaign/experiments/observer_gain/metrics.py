@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydantic import JsonValue
 
 from campaign.channels import FRICTION_TORQUE, GYRO_RATE, LOAD_RATE
 from campaign.estimate import Estimate
@@ -67,6 +68,11 @@ class Gain:
     rejection: tuple[Rejection, ...]
     unstable: str
 
+    @property
+    def stable(self) -> bool:
+        """Whether a trial at this gain completed, and none shows that the loop is unstable."""
+        return not self.unstable and bool(self.error or self.noise or self.rejection)
+
 
 def own_observer(bench: Bench, name: str) -> tuple[float, float | None]:
     """Corner frequency (Hz) of the bench's observer, and the inertia it assumes (kg m^2)."""
@@ -84,6 +90,11 @@ def is_noisy(bench: Bench) -> bool:
 
 def _corner(data: TrialData) -> float:
     return float(str(data.trial.point["corner"]))
+
+
+def _place(data: TrialData) -> dict[str, JsonValue]:
+    """What a trial measures, whatever the gain."""
+    return {name: value for name, value in data.trial.point.items() if name != "corner"}
 
 
 def _inertia(data: TrialData, bench: Bench) -> float | None:
@@ -116,9 +127,18 @@ def _measured(data: TrialData, cut: Recording) -> Iterator[Estimate]:
         yield amplitude(REJECTION, cut.time, per_torque, frequency, "rad/s/(N m)")
 
 
-def gain_of(corner: float, group: Sequence[TrialData]) -> Gain:
-    """What all trials at one corner frequency (Hz) say."""
-    ended = [i for i in group if i.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)]
+def ends_early(data: TrialData) -> bool:
+    """Whether a trial ran into a limit, or diverged."""
+    return data.ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED)
+
+
+def gain_of(corner: float, group: Sequence[TrialData], without: Sequence[TrialData]) -> Gain:
+    """What all trials at one corner frequency (Hz) say.
+
+    A trial that ends early also without observer, as those of `without` show, tells no instability.
+    """
+    lost = [_place(item) for item in without if ends_early(item)]
+    ended = [item for item in group if ends_early(item) and _place(item) not in lost]
     completed = [item for item in group if item.ending.outcome is Outcome.COMPLETED]
     by_kind: dict[str, list[TrialData]] = {"error": [], "noise": [], "rejection": []}
     for item in completed:
