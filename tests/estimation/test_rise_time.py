@@ -46,6 +46,20 @@ def true_rise(loop: str) -> float:
     return step_characteristics(TIME, LOOPS[loop], 0.0, 1.0).rise_time
 
 
+def test_intervals_hold_the_rise_of_a_response_that_bends() -> None:
+    """Friction lets a response rise to 80 %, and creep from there: 8 of 20 hold by noise alone."""
+    time = np.arange(-0.1, 1.0, 1e-4)
+    creep = 1.0 - 0.2 * np.exp((0.1 - time) / 0.15)
+    bent = np.where(time > 0.1, creep, np.interp(time, [0.0, 0.02, 0.1], [0.0, 0.02, 0.8]))
+    true = step_characteristics(time, bent, 0.0, 1.0).rise_time
+    held = []
+    for seed in range(20):
+        noisy = bent + 0.001 * np.random.default_rng(seed).standard_normal(len(time))
+        told = rise_interval(time, noisy, 0.0, 1.0, step_characteristics(time, noisy, 0.0, 1.0))
+        held.append(holds(told[0], true))
+    assert sum(held) >= 16
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("memory", "sizes"), [(0.0, (0.003, 0.03)), (0.7, (0.01,))])
 def test_intervals_hold_as_often_as_they_say(memory: float, sizes: tuple[float, ...]) -> None:
