@@ -7,6 +7,7 @@ that nothing is left to that.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import random
 import re
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from campaign.archive import RunStatus, open_run
@@ -480,6 +482,22 @@ def test_texts_that_contradict_each_other_are_told_though_the_seal_fits(sealed, 
         put_text(file, "run/outcome/seal", canonical(seal | {"run": name}))
     rehash(sealed)
     assert f"/run/{place}" in [damage.place for damage in open_run(sealed).damaged]
+    assert not verify_run(sealed).sound
+
+
+@pytest.mark.parametrize("note", ["trees", "journal", "index"])
+def test_bytes_that_are_no_text_cost_a_line_and_not_the_run(sealed, note):
+    """Whoever made them had the seal fit them."""
+    place = f"run/{note}/data"
+    with h5py.File(sealed, "r+") as file:
+        raw = text_of(file, place).encode().replace(b":", b"\xff", 1)
+        put_text(file, place, "x" * len(raw))
+        file[place][()] = np.bytes_(raw)
+        seal = json.loads(text_of(file, "run/outcome/seal"))
+        seal["texts"][note + "/data"] = hashlib.sha256(raw).hexdigest()
+        put_text(file, "run/outcome/seal", canonical(seal))
+    rehash(sealed)
+    assert [archived.trial.number for archived in open_run(sealed).trials] == [1, 2, 3]
     assert not verify_run(sealed).sound
 
 

@@ -202,7 +202,7 @@ class _Trials:
         with damaged.noting(), safe_hdf5.guarded(path, "/run/not_kept"):
             not_kept = read_not_kept(texts)
         groups = frozenset(safe_hdf5.names(file))
-        return cls(path, story, groups, lines, whole, _good_trees(trees.decode()), not_kept)
+        return cls(path, story, groups, lines, whole, _good_trees(trees), not_kept)
 
     def archived(
         self, plan: Sequence[PlannedTrial], damaged: DamageList
@@ -319,10 +319,10 @@ def read_not_kept(texts: SealedTexts) -> dict[str, str]:
     return {str(entry): str(reason) for entry, reason in tree.items()}
 
 
-def _good_trees(text: str) -> Trees:
+def _good_trees(raw: bytes) -> Trees:
     """The trees whose lines are good; a damaged one is missed by the trials that need it."""
     trees: dict[str, Tree] = {}
-    for line in text.splitlines():
+    for line in raw.decode("utf-8", "replace").splitlines():
         try:
             trees |= parse_trees(line)
         except ValueError:
