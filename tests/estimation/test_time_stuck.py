@@ -59,14 +59,15 @@ def test_the_sensor_that_resolves_it_finds_it(
     assert found.half_width < 0.01
 
 
-def test_one_count_above_the_threshold_is_no_standstill() -> None:
+@pytest.mark.parametrize("noise", [0.02, 1.5e-3])  # smoothed away in 40 s, in 11 % of a half cycle
+def test_one_count_above_the_threshold_is_no_standstill(noise: float) -> None:
     """A 16-bit encoder stands still between two counts for longer than the load does."""
     rate, angle = stuck_motion(0.0)
     count = 2 * np.pi / 2**16
     encoder = np.round(angle / count) * count
     per_sample = np.abs(np.diff(encoder)) / STEP < THRESHOLD * LARGEST
     assert np.mean(per_sample) > 0.1  # what counting standstill would say: true are 0.06 %
-    noisy = rate + BASE + 0.02 * np.random.default_rng(521).standard_normal(len(TIME))
+    noisy = rate + BASE + noise * np.random.default_rng(521).standard_normal(len(TIME))
     found = time_stuck(BASE, encoder, noisy, STEP, 2 * CYCLES)
     assert (found.name, found.origin, found.reason) == (NAME, "not determined", UNRESOLVED())
 

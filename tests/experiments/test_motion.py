@@ -16,7 +16,14 @@ import campaign
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode
 from campaign.estimation.gate import TOO_WIDE
+from campaign.estimation.inverse.terms import DIRECTIONAL
 from campaign.experiments.analysis import measured, result_of
+from campaign.experiments.any_motion.inverse_result import (
+    ADVICE,
+    NO_SLOPE,
+    InverseDynamicsOptions,
+    identify,
+)
 from campaign.experiments.interface import TestData
 from campaign.experiments.motion.experiment import EXPERIMENT
 from campaign.result import Result
@@ -123,6 +130,25 @@ def test_friction_of_both_directions(tmp_path: Path):
             assert row.high - row.low < 0.1
     # Of an axis whose inertia nobody knows it is said that it is in no interval.
     assert "inertia" in str(found(run, "coulomb_torque", "positive").systematic)
+
+
+def test_slow_motions_tell_no_coulomb_friction_by_regression(tmp_path: Path):
+    """Rates within a Stribeck curve: friction hardly changes over them, and is that of breakaway.
+
+    The truth is 2 N m of Coulomb and 3 N m of static friction; a line finds 3 N m.
+    """
+    rate = strokes([s * v for v in (0.018, 0.02, 0.022) * 4 for s in (1.0, -1.0)])
+    static = np.sign(rate) * np.exp(-((rate / 0.3) ** 2))
+    trials = tuple(recorded(tmp_path, rate, static + friction(rate)).archive.trials)
+    plain = InverseDynamicsOptions(terms=DIRECTIONAL)
+    identified = identify(TestData("any", "inverse_dynamics", {}, trials), plain).identified
+    told = {each.estimate.name: each for each in identified.parameters}
+    for way in ("positive", "negative"):
+        one = told[f"coulomb_{way}"]
+        assert one.estimate.reason in NO_SLOPE
+        assert one.estimate.value == pytest.approx(3.0, abs=0.1)
+        assert one.estimate.combined[0] > 2.0  # measured, it would be wrong
+        assert ADVICE["viscous"] in one.advice
 
 
 def test_a_load_that_drives_the_axis_costs_no_direction(tmp_path: Path):

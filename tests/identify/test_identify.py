@@ -15,8 +15,10 @@ import pytest
 from campaign.cli.identify import _say, identify_run
 from campaign.cli.import_command import import_recordings
 from campaign.errors import ExitCode, ProtocolError, UsageError
-from campaign.estimate import Estimate, Systematic
+from campaign.estimate import Estimate, Origin, Systematic
+from campaign.estimation.gate import TOO_WIDE
 from campaign.experiments.analysis import suitable
+from campaign.experiments.any_motion.inverse_result import NO_SLOPE
 from campaign.experiments.interface import Model
 from campaign.identify import experiments_by_model
 from campaign.identify.identification import Identification, _compared, _section, identify, widest
@@ -98,6 +100,17 @@ def test_what_to_measure_next_is_told_of_the_widest_interval(found: Identificati
     assert told in next_measurement(found)
     nothing = replace(found, sections=())
     assert next_measurement(nothing) == ""
+
+
+def test_what_is_open_for_another_reason_is_not_measured_next() -> None:
+    def parameter(half: float, **more: Any) -> Parameter:
+        return Parameter(Estimate("coulomb", 1.0, "N m", 1 - half, 1 + half, 0.95, **more), "")
+
+    known, open_ = parameter(0.1), {"origin": Origin.NOT_DETERMINED}
+    too_wide = parameter(0.6, reason=TOO_WIDE(percent=50.0), **open_)
+    level = parameter(0.3, reason=NO_SLOPE(), **open_)
+    assert widest([known, level]) is known
+    assert widest([known, level, too_wide]) is too_wide
 
 
 @pytest.mark.slow
