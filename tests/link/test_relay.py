@@ -206,8 +206,11 @@ class ControllerAtHand:
         self._decoder = FrameDecoder()
         self._answers: list[bytes] = []
         self.heard: list[Kind] = []
+        self._closed = False
 
     def read(self) -> bytes:
+        if self._closed:
+            raise OSError
         time.sleep(0.001)
         return self._answers.pop(0) if self._answers else b""
 
@@ -221,7 +224,8 @@ class ControllerAtHand:
             if isinstance(message, Safe):
                 self._answers.append(ACKNOWLEDGED + status(drive_on=False))
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        self._closed = True
 
 
 @pytest.mark.parametrize(("lapsed", "others"), [(True, 7), (True, None), (False, 7)])
@@ -232,7 +236,9 @@ def test_after_a_lapse_an_orphan_makes_sure_that_the_controller_is_not_anothers(
     port = ControllerAtHand(others)
     relay = Relay(port, io.BytesIO(), SESSION)
     relay._holds, relay._lapsed = True, lapsed
-    threading.Thread(target=relay._read, daemon=True).start()
+    reading = threading.Thread(target=relay._read, daemon=True)
+    reading.start()
     assert relay.make_safe()
-    relay._lost.set()
+    port.close()
+    reading.join()
     assert (Kind.SAFE in port.heard) == (not lapsed or others is None)
