@@ -14,7 +14,7 @@ from typing import Any
 from campaign.physics.bench import Bench
 from campaign.physics.friction import friction_models
 from campaign.physics.friction.stribeck import in_direction
-from campaign.physics.loop import at_load
+from campaign.physics.loop import at_load, viscous_at_load
 
 DIRECTIONS = {"positive": +1.0, "negative": -1.0}
 COULOMB = ("viscous_friction", "negative")
@@ -133,14 +133,18 @@ def _stiffness_at_rest(bench: Bench) -> float | None:
 
 
 def _damping_at_rest(bench: Bench) -> float | None:
-    """Damping of small motions where every interface sticks: the sum of sigma1 and sigma2."""
+    """Damping of small motions where every interface sticks: the sum of sigma1 and sigma2.
+
+    Of a sigma2 that differs by direction its mean counts: half the difference makes |v|, an even
+    function, which dampens nothing.
+    """
     found = []
     for options in bench.friction.values():
         own = getattr(options, "bristle_damping", None)
         if own is None:
             return None
         torque, rate = at_load(options, bench)
-        found.append(torque * rate * (own + getattr(options, "viscous_friction", 0.0)))
+        found.append(torque * rate * own + viscous_at_load(options, bench))
     return math.fsum(found) if found else None
 
 

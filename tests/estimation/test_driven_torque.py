@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
@@ -99,6 +100,41 @@ def test_a_torque_loses_most_of_its_noise_and_nothing_else() -> None:
     # With half the noise half of that is left: it is not what the lags cannot tell.
     for number, (torque, _) in enumerate(told(0, 0.5 * NOISE), start=1):
         assert np.std(torque - driven(number)[0]) < 0.15 * NOISE
+
+
+@cache
+def yielding(seed: int) -> tuple[Array, Array]:
+    """As `driven`, of a load whose spring bears 2 N m at most."""
+
+    def slopes(time: float, state: Array) -> list[float]:
+        angle, rate, torque = state
+        held = STIFFNESS * 1e-3 * np.tanh(angle / 1e-3)
+        asked = command(np.array(time)) - BACK_EMF * rate
+        return [rate, (torque - DAMPING * rate - held) / INERTIA, (asked - torque) / DRIVE]
+
+    command, times = Command(seed), STEP * np.arange(COUNT)
+    found = solve_ivp(slopes, (0.0, times[-1]), np.zeros(3), "DOP853", times, rtol=1e-8, atol=1e-9)
+    return found.y[2], found.y[1]
+
+
+def test_back_emf_of_a_load_that_yields_is_told_by_its_motion() -> None:
+    """The mean over many draws of the noise, which a linear answer to the command misses."""
+    highest, missed = float(LINES[-1]), []
+    for known in (False, True):
+        sums = np.zeros((2, COUNT))
+        for draw in range(20):
+            rng = np.random.default_rng(draw)
+            trials = [
+                Driven(
+                    yielding(n)[0] + NOISE * rng.standard_normal(COUNT),
+                    Command(n),
+                    yielding(n)[1] if known else None,
+                )
+                for n in (1, 2)
+            ]
+            sums += [torque for torque, _ in driven_torques(trials, STEP, highest)]
+        missed.append(np.std(sums / 20 - [yielding(1)[0], yielding(2)[0]]))
+    assert missed[1] < 0.3 * missed[0]
 
 
 @pytest.mark.slow

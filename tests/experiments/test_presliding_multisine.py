@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -137,9 +137,9 @@ TRUTHS = {
 }
 
 
-def short_runs(seed: int) -> Result:
+def short_runs(seed: int, amplitudes: Sequence[str] = ("1.2 N", "2.5 N", "5 N")) -> Result:
     """Noise of the axis' current is as large as the torque, and its loop holds the command."""
-    sizes = {"amplitudes": ["1.2 N", "2.5 N", "5 N"], "lowest": "2.4 Hz", "highest": "120 Hz"}
+    sizes = {"amplitudes": [*amplitudes], "lowest": "2.4 Hz", "highest": "120 Hz"}
     with axis_terms(AXIS.sides):
         return analyse(KIND, execute(trials(KIND, AXIS, {**sizes, "periods": 4, "seed": seed})))
 
@@ -166,6 +166,14 @@ def test_short_runs_of_a_noisy_linear_axis_hold_their_intervals() -> None:
     rows = result.tables[0].rows
     assert len(rows) == 4
     assert sum(map(held, rows)) > 9
+
+
+@pytest.mark.slow
+def test_back_emf_of_bristles_that_yield_makes_nothing_softer() -> None:
+    """At two thirds of the force at which it slips: 2 % without the motion in the torque."""
+    row = joint(short_runs(2, ("4 N", "8 N", "16 N")))
+    assert row["stiffness_at_rest"].half_width < 0.016 * TRUTHS["stiffness_at_rest"]
+    assert held(row) == 3
 
 
 @pytest.mark.statistics

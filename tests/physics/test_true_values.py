@@ -94,6 +94,14 @@ def test_small_motions_meet_the_sum_of_damping_and_the_inertia() -> None:
     assert true_value(bench(), "inertia", {}) == 35.0
 
 
+def test_of_viscous_friction_that_differs_by_direction_small_motions_meet_the_mean() -> None:
+    other = bench(
+        lambda tree: tree["friction"]["load"].update(negative={"viscous_friction": "2 N m s/rad"})
+    )
+    found = true_value(other, "damping_at_rest", {})
+    assert found == pytest.approx(803.0 + RATIO * 0.501, rel=1e-12)
+
+
 def test_it_is_told_which_part_of_the_bench_is_true() -> None:
     assert true_of(bench(), "bristle_stiffness") == "friction.load alone"  # 32 N m of 37.6
     assert true_of(bench(), "damping_at_rest") == "the sum of 2 interfaces, before any slips"

@@ -5,7 +5,9 @@ stiff, too damped and too heavy, by the noise's share of the power (Soderstrom, 
 methods in system identification", Automatica 43, 2007). But the torque is what drive and load make
 of a command that is known, and nearly linearly so: it is regressed on past commands. What is left
 to doubt of it then is no noise any more, but a few smooth directions, whose factors a joint fit of
-the motion finds together with the plant.
+the motion finds together with the plant. Friction that yields makes the load's motion, and through
+back-EMF the torque, no linear answer to the command: for that the torque is regressed on the motion
+as well, once a first fit can tell that without noise.
 """
 
 from __future__ import annotations
@@ -14,13 +16,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaign.arrays import Array
 
 PER_PERIOD = 3.0
 """Lags in a period of the highest frequency: more would tell the same."""
 FINE = 2.0
-"""Such lags up to which each sample is one of its own: a drive answers within them."""
+"""Such lags up to which each sample is one of its own: a drive answers within them, to a command
+as to the back-EMF of a motion."""
 MOST_FINE = 30
 """samples up to there at most."""
 LAGS = 60
@@ -48,10 +52,12 @@ class Driven:
     Attributes:
         torque: measured (N m), shape (n,).
         command: what was asked of it (N m), at any time (s) from 0 on.
+        motion: of the load as a fit tells it, rate or angle, shape (n,); None before any fit.
     """
 
     torque: Array
     command: Callable[[Array], Array]
+    motion: Array | None = None
 
 
 def driven_torques(
@@ -67,9 +73,11 @@ def driven_torques(
     places = np.cumsum(lengths)[:-1]
     torque = np.concatenate([each.torque for each in trials])
     offsets = np.repeat(np.eye(len(trials)) / np.sqrt(lengths), lengths, axis=0)
-    lags = _lags(min(lengths), step, highest)
-    commands = np.concatenate([_commands(each, step, lags) for each in trials])
-    moving = _directions(commands - offsets @ (offsets.T @ commands), places, step, highest)
+    fine, lags = _lags(min(lengths), step, highest)
+    columns = np.concatenate([_past(_commanded(each, step), lags) for each in trials])
+    if motions := [each.motion for each in trials if each.motion is not None]:
+        columns = np.hstack([columns, np.concatenate([_past(each, fine) for each in motions])])
+    moving = _directions(columns - offsets @ (offsets.T @ columns), places, step, highest)
     size = moving.T @ torque
     found = offsets @ (offsets.T @ torque) + moving @ size
     left = np.split(torque - found, places)
@@ -84,19 +92,23 @@ def driven_torques(
     return list(zip(np.split(found, places), np.split(noise * moving, places), strict=True))
 
 
-def _lags(shortest: int, step: float, highest: float) -> Array:
-    """In samples: all of the first ones, then as far apart as the band allows."""
+def _lags(shortest: int, step: float, highest: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """In samples: all of the first ones; and those with more, as far apart as the band allows."""
     lag = max(1, int(1.0 / (PER_PERIOD * highest * step)))
     fine = min(int(FINE * lag), MOST_FINE)
     count = min(LAGS, shortest // (PER_LAG * lag))
-    return np.array([*range(fine), *(fine + lag * np.arange(max(count, 1)))])
+    first = np.arange(fine)
+    return first, np.append(first, fine + lag * np.arange(max(count, 1)))
 
 
-def _commands(trial: Driven, step: float, lags: Array) -> Array:
+def _commanded(trial: Driven, step: float) -> Array:
+    return np.asarray(trial.command(step * np.arange(float(len(trial.torque)))), dtype=float)
+
+
+def _past(values: Array, lags: NDArray[np.intp]) -> Array:
     """At all lags, shape (n, lags): 0 before the beginning."""
-    told = np.asarray(trial.command(step * np.arange(float(len(trial.torque)))), dtype=float)
-    place = np.subtract.outer(np.arange(len(told)), lags)
-    return np.where(place < 0, 0.0, told[np.maximum(place, 0)])
+    place = np.subtract.outer(np.arange(len(values)), lags)
+    return np.where(place < 0, 0.0, values[np.maximum(place, 0)])
 
 
 def _noise(

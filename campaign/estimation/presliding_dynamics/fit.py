@@ -50,8 +50,18 @@ def fit_presliding_dynamics(
 ) -> JointFit:
     """Fit sigma0, sigma1, J and what else is free to all records at once.
 
-    The search begins at a linear fit of the spectra. Raises ValueError with the reason where there
-    is no start, and where no start leads to a minimum.
+    Raises ValueError with the reason where there is no start, and where none can be simulated.
+    """
+    best = first_fit(records, assumed)
+    for _ in range(ROUNDS):
+        best = search(_reweighted(centred(search(_reweighted(with_doubts(best))))))
+    return with_slopes(best)
+
+
+def first_fit(records: Sequence[Record], assumed: Assumptions | None = None) -> JointFit:
+    """Likewise, to torques as they are told, without slopes: enough to tell the motion.
+
+    The search begins at a linear fit of the spectra. Raises ValueError as above.
     """
     if not records:
         raise ValueError("there is no record to fit")
@@ -72,9 +82,7 @@ def fit_presliding_dynamics(
         raise ValueError(
             "no start of the fit can be simulated: the load breaks away, or is too fast"
         )
-    for _ in range(ROUNDS):
-        best = search(_reweighted(centred(search(_reweighted(with_doubts(best))))))
-    return with_slopes(best)
+    return best
 
 
 def _starts(begin: Plant) -> list[Plant]:

@@ -20,8 +20,7 @@ from campaign.experiments.presliding_multisine.held_current import between_sampl
 from campaign.experiments.shared.captions import amount
 from campaign.experiments.shared.systematic import TORQUE_CONSTANT, with_systematic
 from campaign.physics.bench import Bench
-from campaign.physics.friction import friction_models
-from campaign.physics.loop import at_load
+from campaign.physics.loop import viscous_at_load
 from campaign.result import Array, Axis, Cell, Column, Curve, Figure, Mark, Panel, Table
 from campaign.signals import MultiSine
 
@@ -61,11 +60,13 @@ def record_of(data: TrialData, period: float | None = None) -> Record:
     )  # fmt: skip
 
 
-def with_torques_known(trials: Sequence[TrialData], records: Sequence[Record]) -> list[Record]:
+def with_torques_known(
+    trials: Sequence[TrialData], records: Sequence[Record], motions: Sequence[Array | None]
+) -> list[Record]:
     """The records, with all that is known of the torque of those that a multisine shook.
 
     That is their torque without its sensor's noise and with what it is between its samples, and
-    what it may be off by. All trials are of one bench.
+    what it may be off by. All trials are of one bench. motions: as `Driven` has them.
     """
     commands = {
         number: command
@@ -75,7 +76,7 @@ def with_torques_known(trials: Sequence[TrialData], records: Sequence[Record]) -
     found, doubts = list(records), 0
     for step in sorted({records[number].step for number in commands}):
         alike = [number for number in commands if records[number].step == step]
-        driven = [Driven(records[n].torque, commands[n].sample) for n in alike]
+        driven = [Driven(records[n].torque, commands[n].sample, motions[n]) for n in alike]
         highest = max(max(commands[n].frequencies) for n in alike)
         told = driven_torques(driven, step, highest)
         for number, (torque, doubt) in zip(alike, told, strict=True):
@@ -120,11 +121,7 @@ def assumed_of(bench: Bench, span: tuple[float, float]) -> Assumptions:
 
 def viscous_of(bench: Bench) -> float:
     """sigma2 at the load that a bench states, of all interfaces (N m s/rad)."""
-    models, viscous = friction_models(), 0.0
-    for each in bench.friction.values():
-        torque, rate = at_load(each, bench)
-        viscous += torque * rate * models[each.model].viscous(each)
-    return viscous
+    return sum(viscous_at_load(each, bench) for each in bench.friction.values())
 
 
 def estimates_of(found: PreslidingDynamics, bench: Bench) -> dict[str, Estimate]:

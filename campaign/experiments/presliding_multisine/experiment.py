@@ -15,6 +15,7 @@ import numpy as np
 
 from campaign.channels import DRIVE_TORQUE, GYRO_RATE
 from campaign.estimate import Estimate
+from campaign.estimation.presliding_dynamics.fit import first_fit
 from campaign.estimation.presliding_dynamics.presliding_fit import (
     PreslidingDynamics,
     identify_presliding_dynamics,
@@ -57,6 +58,8 @@ from campaign.units import torque_text
 OWN = ("amplitude", "realisation")
 """What distinguishes the trials of one group."""
 DAMPING = "damping_at_rest"
+BETWEEN_SAMPLES = 1
+"""Columns of doubt that every commanded torque has."""
 FASTEST = 0.5
 """of the torque at which an interface slips: above it a trial hardly is one below breakaway."""
 
@@ -115,6 +118,9 @@ def _told(found: PreslidingDynamics, items: Sequence[TrialData]) -> dict[str, Es
 def _fit(items: Sequence[TrialData]) -> PreslidingDynamics:
     records = records_of(items)
     assumed = assumed_of(bench_of(items[0].trial), span_of(items, records))
+    if any(each.doubts.shape[1] > BETWEEN_SAMPLES for each in records):  # noise was regressed away
+        first = first_fit(records, assumed)
+        records = records_of(items, [first.answers(each)[0] for each in range(len(records))])
     return identify_presliding_dynamics(records, assumed)
 
 

@@ -136,9 +136,10 @@ def small_motion(data: TrialData) -> Record:
     )
 
 
-def records_of(trials: Sequence[TrialData]) -> list[Record]:
-    """Of small motions, with all that is known of their torque."""
-    return with_torques_known(trials, [small_motion(each) for each in trials])
+def records_of(trials: Sequence[TrialData], motions: Sequence[Array] | None = None) -> list[Record]:
+    """With all that is known of their torque. motions: of the load, where a fit tells them."""
+    records = [small_motion(each) for each in trials]
+    return with_torques_known(trials, records, motions or [None] * len(records))
 
 
 def span_of(trials: Sequence[TrialData], records: Sequence[Record]) -> tuple[float, float]:
