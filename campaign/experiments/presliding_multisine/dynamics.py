@@ -61,22 +61,23 @@ def record_of(data: TrialData, period: float | None = None) -> Record:
 
 
 def with_torques_known(
-    trials: Sequence[TrialData], records: Sequence[Record], motions: Sequence[Array | None]
+    trials: Sequence[TrialData], records: Sequence[Record], motions: Sequence[Array] = ()
 ) -> list[Record]:
     """The records, with all that is known of the torque of those that a multisine shook.
 
     That is their torque without its sensor's noise and with what it is between its samples, and
-    what it may be off by. All trials are of one bench. motions: as `Driven` has them.
+    what it may be off by. All trials are of one bench. motions: of the load, where a fit tells
+    them.
     """
     commands = {
         number: command
         for number, (trial, record) in enumerate(zip(trials, records, strict=True))
         if (command := _multisine(trial)) is not None and record.at_rest
     }
-    found, doubts = list(records), 0
+    found, doubts, moved = list(records), 0, dict(enumerate(motions))
     for step in sorted({records[number].step for number in commands}):
         alike = [number for number in commands if records[number].step == step]
-        driven = [Driven(records[n].torque, commands[n].sample, motions[n]) for n in alike]
+        driven = [Driven(records[n].torque, commands[n].sample, moved.get(n)) for n in alike]
         highest = max(max(commands[n].frequencies) for n in alike)
         told = driven_torques(driven, step, highest)
         for number, (torque, doubt) in zip(alike, told, strict=True):

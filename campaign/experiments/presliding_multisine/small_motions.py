@@ -136,10 +136,9 @@ def small_motion(data: TrialData) -> Record:
     )
 
 
-def records_of(trials: Sequence[TrialData], motions: Sequence[Array] | None = None) -> list[Record]:
+def records_of(trials: Sequence[TrialData], motions: Sequence[Array] = ()) -> list[Record]:
     """With all that is known of their torque. motions: of the load, where a fit tells them."""
-    records = [small_motion(each) for each in trials]
-    return with_torques_known(trials, records, motions or [None] * len(records))
+    return with_torques_known(trials, [small_motion(each) for each in trials], motions)
 
 
 def span_of(trials: Sequence[TrialData], records: Sequence[Record]) -> tuple[float, float]:
