@@ -92,9 +92,21 @@ def open_file(path: Path) -> Iterator[h5py.File]:
             raise ArchiveError(f"{path}: there is no such file")
         if not h5py.is_hdf5(path):
             raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
+        there, stated = path.stat().st_size, _stated_size(path)
+        if there < stated:
+            raise ArchiveError(
+                f"{path}: is cut off: {there} of {stated} bytes are there; copy it again"
+            )
         with h5py.File(path, "r", locking=False) as file:
             _SOUND.pop(h5f.get_name(file.id), None)
             yield file
+
+
+def _stated_size(path: Path) -> int:
+    """End of an HDF5 file by its superblock of version 2 or 3 (format specification, II.A)."""
+    with path.open("rb") as file:
+        begin = file.read(36)
+    return int.from_bytes(begin[28:36], "little") if begin[8:10] in (b"\2\x08", b"\3\x08") else 0
 
 
 def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
