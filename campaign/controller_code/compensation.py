@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from campaign.axis_kind import axis_unit
 from campaign.errors import UsageError
 from campaign.physics.blocks import (
     Controller,
@@ -71,6 +72,10 @@ class SampledCompensation:
             sample_rate=rate,
         )  # fmt: skip
         return cls(name, bench, together([Lane.of(bench, task, 1)], 1))
+
+    def unit(self, rotary: str) -> str:
+        """What stands for a unit of a rotary axis."""
+        return axis_unit(rotary, self.bench.sides)
 
     @property
     def controller(self) -> Controller:

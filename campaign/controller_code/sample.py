@@ -71,7 +71,7 @@ def _lines(made: SampledCompensation) -> Iterator[str]:
     yield from _linear(made)
     yield from _friction(made)
     limit = made.bench.limits.torque
-    yield "'N m at the load: limits.torque'"
+    yield f"'{made.unit('N m')} at the load: limits.torque'"
     yield f"limit = {float(limit)!r}"
     yield "torque = limit if torque > limit else (-limit if torque < -limit else torque)"
     yield "memory[4] = torque"

@@ -9,12 +9,14 @@ from typing import Any, get_type_hints
 import pytest
 
 from campaign.cli.bench_commands import export_compensation_command
+from campaign.controller_code.compensation import SampledCompensation
 from campaign.controller_code.syntax import INTEGER, MOTION, ROWS, Syntax, plain
 from campaign.controller_code.targets import c, matlab, structured_text, targets
 from campaign.controller_code.transpile import Program
 from campaign.errors import UsageError
 from campaign.physics.compilation import called
 from campaign.physics.elementary import bits_of, double_of, exp, where
+from campaign.protocol.bench_file import simulable
 from tests.controller_code.cases import of_an_evil_name
 
 SYNTAXES = [c.syntax(), structured_text.syntax(""), matlab.syntax()]
@@ -127,6 +129,13 @@ def test_a_target_is_a_file() -> None:
     assert list(targets()) == ["c", "c-single", "matlab", "json", "st"]
     said = get_type_hints(export_compensation_command, include_extras=True)["target"]
     assert set(said.__metadata__[0].metavar.split("|")) == set(targets())
+
+
+def test_code_for_a_linear_axis_has_its_units() -> None:
+    text = c.c_code(SampledCompensation.of(simulable("linear"), "lugre"), [])
+    assert re.search(r"\bN at the load", text)
+    assert "(m/s; m, relative; m at the load" in text
+    assert not re.search(r"\bN m\b|\brad\b", text)
 
 
 def test_names_in_code_are_no_words_of_a_language_and_not_long() -> None:

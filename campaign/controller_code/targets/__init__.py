@@ -46,11 +46,13 @@ def vectors(made: SampledCompensation, inputs: Array) -> Array:
 def about(made: SampledCompensation, head: Sequence[str]) -> list[str]:
     """Lines that stand above any code: where it comes from, and how to call it."""
     period = float(made.controller.period[0])
+    rate, angle, torque = map(made.unit, ("rad/s", "rad", "N m"))
+    limit = f"{made.bench.limits.torque!r} {torque}"
     return [
         *head,
         "",
         f"Call it every {period!r} s ({1.0 / period:.9g} Hz). Inputs: {', '.join(INPUTS)}",
-        "  (rad/s; rad, relative; rad at the load: the motor's by the gear ratio; A).",
-        "It gives the torque to add (N m at the load). A reading that is infinite or NaN keeps",
-        f"torque and states of the sample before. Limit: {made.bench.limits.torque!r} N m.",
+        f"  ({rate}; {angle}, relative; {angle} at the load: the motor's by the gear ratio; A).",
+        f"It gives the torque to add ({torque} at the load). A reading that is infinite or NaN",
+        f"keeps torque and states of the sample before. Limit: {limit}.",
     ]

@@ -150,7 +150,7 @@ def vectors_code(made: SampledCompensation, inputs: Array, *, single: bool = Fal
     told = ",\n".join("    {" + ", ".join(map(float.hex, row)) + "}" for row in rows.tolist())
     if single:
         most = SINGLE * float(np.max(np.abs(rows[:, 4])))
-        promised, begins = f"all agree to {most:.3g} N m", ""
+        promised, begins = f"all agree to {most:.3g} {made.unit('N m')}", ""
         differs = f"!(fabs(torque - rows[k][4]) <= {most.hex()})"
     else:
         promised, begins = "all bits agree", _begins(name)

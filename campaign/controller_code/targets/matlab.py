@@ -133,6 +133,7 @@ def script(made: SampledCompensation, inputs: Array) -> str:
     name, rows = made.identifier, vectors(made, inputs)
     most = BOUND * float(np.max(np.abs(rows[:, 4])))
     told = "\n".join(" ".join(map(_literal, row)) for row in rows.tolist())
+    unit = made.unit("N m")
     return f"""\
 % Test vectors of {name}.m: {", ".join(INPUTS)}, torque (SI). An error where one is off.
 rows = [
@@ -143,7 +144,7 @@ for k = 1:size(rows, 1)
     torques(k) = {name}(k == 1, rows(k, 1), rows(k, 2), rows(k, 3), rows(k, 4));
 end
 wrong = sum(~(abs(torques - rows(:, 5)) <= {most!r}));
-fprintf('%d of %d samples differ by more than {most:.3g} N m\\n', wrong, size(rows, 1));
+fprintf('%d of %d samples differ by more than {most:.3g} {unit}\\n', wrong, size(rows, 1));
 if wrong > 0
     error('the code does not give the torques of campaign');
 end
