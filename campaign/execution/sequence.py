@@ -157,8 +157,10 @@ class TrialSequence:
                 self._stop.request("the operator")
         if self._is_over():
             return ()
-        under_way = sum(trial.task.duration for trial in self._under_way.values())
-        return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
+        left = self._rests.left - sum(each.task.duration for each in self._under_way.values())
+        if self._running and left <= 0.0:
+            return ()  # the rest comes first
+        return self._batches.take(left, self._set_up.is_due)
 
     def _follow(self) -> None:
         """Ask every stage whose trials have ended which ones follow; they come next.

@@ -103,7 +103,7 @@ def test_nothing_moves_while_the_bench_rests_or_hands_are_at_it():
             assert not moving.is_set()
             return "done"
 
-    for rest, setups in (({"every": "1 s", "pause": "60 s"}, ()), (None, ("preload",))):
+    for rest, setups in (({"every": "3 s", "pause": "60 s"}, ()), (None, ("preload",))):
         disturbed.clear()
         lab = Lab(set_up((), (), setups, setups), {1: first, 2: second}, rest=rest)
         lab.operator, lab.pause = Hands(), lambda seconds: disturbed.set()
