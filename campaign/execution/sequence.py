@@ -148,7 +148,8 @@ class TrialSequence:
         trial = self._batches.first
         if trial is None or self._is_over():
             return ()
-        if self._rests.due is not None or self._set_up.is_due(trial):
+        under_way = sum(each.task.duration for each in self._under_way.values())
+        if self._rests.left <= under_way or self._set_up.is_due(trial):
             if self._running:
                 return ()  # neither a rest nor a person's hands go with a trial that moves
             self._rest()
@@ -157,10 +158,7 @@ class TrialSequence:
                 self._stop.request("the operator")
         if self._is_over():
             return ()
-        left = self._rests.left - sum(each.task.duration for each in self._under_way.values())
-        if self._running and left <= 0.0:
-            return ()  # the rest comes first
-        return self._batches.take(left, self._set_up.is_due)
+        return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
 
     def _follow(self) -> None:
         """Ask every stage whose trials have ended which ones follow; they come next.

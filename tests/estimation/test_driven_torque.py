@@ -120,7 +120,7 @@ def yielding(seed: int) -> tuple[Array, Array]:
 def test_back_emf_of_a_load_that_yields_is_told_by_its_motion() -> None:
     """The mean over many draws of the noise, which a linear answer to the command misses."""
     highest, missed = float(LINES[-1]), []
-    for known in (False, True):
+    for moved in (False, True):
         sums = np.zeros((2, COUNT))
         for draw in range(20):
             rng = np.random.default_rng(draw)
@@ -128,7 +128,7 @@ def test_back_emf_of_a_load_that_yields_is_told_by_its_motion() -> None:
                 Driven(
                     yielding(n)[0] + NOISE * rng.standard_normal(COUNT),
                     Command(n),
-                    yielding(n)[1] if known else None,
+                    yielding(n)[1] if moved else None,
                 )
                 for n in (1, 2)
             ]
