@@ -141,17 +141,32 @@ class SimBackend:
 
     def steps_together(self, trials: Sequence[Trial]) -> int:
         """Steps of all trials that would be executed together."""
-        steps: defaultdict[Hashable, list[int]] = defaultdict(list)
-        for trial in trials:
-            steps[self.group(trial)].append(self.cost(trial).steps)
-        return sum(sum(each) for each in steps.values() if len(each) >= self.fewest_together)
+        alike = self._by_group(trials)
+        many = (each for each in alike if len(each) >= self.fewest_together)
+        return sum(self.cost(trial).steps for each in many for trial in each)
 
     def make_ready(self, trials: Sequence[Trial]) -> None:
-        """Compile the friction models of these trials, for lanes as they are executed."""
+        """Compile what these trials need besides the engine of a loop, as they are executed:
+        friction models and the engine of a prescribed motion, for lanes or for one.
+        """
         from campaign.physics.lanes import together
+        from campaign.physics.machine_code import engine
 
-        for trial in {self.group(trial): trial for trial in trials}.values():
-            together([self._lane(trial)], self.most_together)
+        prescribed = {}
+        for alike in self._by_group(trials):
+            lane = self._lane(alike[0])
+            width = self.most_together if len(alike) >= self.fewest_together else 1
+            together([lane], width)
+            if lane.prescribed:
+                prescribed[width] = lane.stated
+        for width, bench in prescribed.items():
+            engine(width, bench, "prescribed").make()
+
+    def _by_group(self, trials: Sequence[Trial]) -> Iterable[Sequence[Trial]]:
+        alike: defaultdict[Hashable, list[Trial]] = defaultdict(list)
+        for trial in trials:
+            alike[self.group(trial)].append(trial)
+        return alike.values()
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from campaign.execution.first_start import FirstStart
 
 COMPILING = "compiling the engine (once per installation)"
-WORTH_A_BLOCK = 2e8
-"""Steps of trials in company that take as long, one after the other, as compiling for blocks."""
+WORTH_A_BLOCK = 2e7
+"""Steps of trials in company from which on blocks are compiled: five runs save what that costs."""
 
 
 @contextmanager

@@ -63,19 +63,20 @@ def folder() -> Path | None:
 
 def parts(width: int, benches: Sequence[CompleteBench]) -> Iterator[Part]:
     """What simulating `benches` needs, for one trial (`width` 1) or for LANES side by side."""
-    side_by_side, empty = _side_by_side(width), benches[0].with_friction({})
     yield engine(width, benches[0])
     for bench in benches:
-        name = f"friction models of the bench {bench.name}, {side_by_side}"
+        name = f"friction models of the bench {bench.name}, {_side_by_side(width)}"
         yield Part(name, partial(_make_ready, bench, width))
-    name = f"engine, prescribed motion, {side_by_side}"
-    yield Part(name, partial(_simulate, empty, "prescribed", width))
+    yield engine(width, benches[0], "prescribed")
 
 
-def engine(width: int, bench: CompleteBench) -> Part:
-    """The engine alone, which is the same for any bench."""
-    empty = bench.with_friction({})
-    return Part(f"engine, {_side_by_side(width)}", partial(_simulate, empty, "rate", width))
+def engine(width: int, bench: CompleteBench, mode: str = "rate") -> Part:
+    """The engine alone, which is the same for any bench: `mode` is that of a loop, or a prescribed
+    motion.
+    """
+    what = "engine, prescribed motion" if mode == "prescribed" else "engine"
+    make = partial(_simulate, bench.with_friction({}), mode, width)
+    return Part(f"{what}, {_side_by_side(width)}", make)
 
 
 def make(part: Part) -> CompiledPart:

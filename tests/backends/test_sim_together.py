@@ -15,9 +15,12 @@ from campaign.backends.sim import BACKEND, SimBackend, SimOptions
 from campaign.cli import compile_engine
 from campaign.cli.prepare import Request
 from campaign.cli.run import run_protocol
+from campaign.physics import lanes, machine_code
 from campaign.physics import simulate as simulate_module
 from campaign.physics.bench import Bench
 from campaign.physics.grid import Grid
+from campaign.physics.machine_code import Part
+from campaign.physics.vector import LANES
 from campaign.recording import Ending, MemoryRecorder, Outcome, Recording
 from campaign.signals import Polyline, Sine
 from campaign.trial import Trial
@@ -208,6 +211,29 @@ def test_a_run_is_the_same_together_and_alone(
         assert len(run.trials) == len(runs[0].trials)
         for one, other in zip(runs[0].trials, run.trials, strict=True):
             assert_equal(one.recording(), other.recording())
+
+
+def test_what_is_made_ready_is_what_is_executed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Widths of friction models and of the prescribed engine; else each worker compiles them."""
+    made: list[tuple[str, int]] = []
+    motion = task(mode="prescribed", command=SWING, duration=0.01)
+    loops = [trial(heavy(35.0 + k), task(base_acceleration=SWING)) for k in range(4)]
+    motions = [trial(bench(), motion, seed=k) for k in range(4)]
+    finer = trial(bench(), motion.model_copy(update={"sample_rate": 2000.0}))
+    monkeypatch.setattr(lanes, "together", lambda trials, width: made.append(("models", width)))
+    monkeypatch.setattr(
+        machine_code,
+        "engine",
+        lambda width, _, mode: Part("", lambda: made.append((mode, width))),
+    )
+    SimBackend(SimOptions()).make_ready([*loops, *motions, finer])
+    assert sorted(made) == [
+        ("models", 1),
+        ("models", LANES),
+        ("models", LANES),
+        ("prescribed", 1),
+        ("prescribed", LANES),
+    ]
 
 
 @pytest.mark.parametrize("every", [1, 8, 200, 200_000])
