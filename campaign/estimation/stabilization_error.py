@@ -34,9 +34,7 @@ HARDLY = 10 * ALIKE
 """Relative standard error up to which a number beside one that does not scatter hardly does."""
 IDENTICAL = 1e-12
 """The same for two values, which may be alike by chance, and for trials of one seed."""
-NO_SCATTER = Cause(
-    "not scattering", "it repeats to the fifth digit: nothing scatters on this bench"
-)
+NO_SCATTER = Cause("not scattering", "repeats agree to the fifth digit: the bench has no scatter")
 SHORT = Cause("record too short", "less than one cycle was recorded")
 TOO_FEW_FOR_BLOCKS = Cause("too few samples for blocks", "too few samples for {blocks} blocks")
 SHORT_BLOCK = Cause(
