@@ -145,7 +145,7 @@ def over_trials(found: Sequence[Estimate]) -> Estimate:
     back as it is. Raises ValueError for none.
     """
     if not found:
-        raise ValueError("no trial to tell it from")
+        raise ValueError("no trial to estimate it from")
     known = [one for one in found if math.isfinite(one.value)]
     if len(known) < 2:
         return known[0] if known else found[0]

@@ -262,7 +262,7 @@ def _recording_faults(entry: RecordingEntry, windows: Sequence[str]) -> Iterator
     several = [k for k in ("where", "each", "trigger") if getattr(entry, k) is not None]
     several += ["restarts"] * entry.restarts
     if len(several) > 1:
-        message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
+        message = f"'{several[0]}' and '{several[1]}' both separate trials; use one of them"
         yield (several[1],), "key", message
     if entry.trial is not None and several:
         message = f"'trial' says which trial it is, and '{several[0]}' that it may be several"

@@ -24,9 +24,9 @@ REMEDIES = {
         "controller.relative_rate_filter, raise sample_rate to the controller's, or refine "
         "sensors.encoder"
     ),
-    "angle": "the limit is narrower than the sensor can tell",
-    "torque": "the limit is narrower than the sensor can tell",
-    "current": "the limit is narrower than the sensor can tell",
+    "angle": "the limit is narrower than the sensor's resolution",
+    "torque": "the limit is narrower than the sensor's resolution",
+    "current": "the limit is narrower than the sensor's resolution",
 }
 """What to do about a limit that the resolution of a sensor alone would break."""
 
@@ -166,7 +166,7 @@ def _hints(plan: Plan, use: LoopUse) -> Iterator[str]:
     if use.mode == "rate" and isinstance(found, LoopMargins) and found.stable:
         yield (
             f"  with controller.rate.proportional 57.3 times smaller it is stable: is "
-            f"{rate.proportional:.4g} A s/rad meant, or A s/deg given as A s/rad?"
+            f"{rate.proportional:.4g} A s/rad intended, or A s/deg given as A s/rad?"
         )
 
 
