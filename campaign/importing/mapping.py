@@ -165,7 +165,7 @@ class RecordingEntry(Options):
 
     @property
     def choosing(self) -> tuple[Keys, str | int] | None:
-        """The column that tells trials apart, and where it is named."""
+        """The keys and the column that separates trials; None if the entry has none."""
         if self.each is not None:
             return ("each",), self.each
         for key, one in (("where", self.where), ("trigger", self.trigger)):
