@@ -55,7 +55,7 @@ class _EndedEarlyError(Exception):
 
 @contextmanager
 def _process(module: str, path: Path, *task: object) -> Iterator[Callable[..., bytes]]:
-    """A process that reads a file; it ends with the block, and is killed after `PATIENCE`.
+    """A process that reads a file; it ends with the block, or after `PATIENCE` without output.
 
     Yields a function that reads the given number of bytes of its output, or all; it raises
     _EndedEarlyError if there are fewer.
