@@ -132,7 +132,7 @@ def test_numbers_go_on_after_the_plans(tmp_path, kit):
     writer, _ = begun(tmp_path, kit)
     edited(writer, renumber)
     problems = [str(damage) for damage in verify_run(writer.folder).problems]
-    assert any("does not number them after the plan's" in text for text in problems)
+    assert any("otherwise than after the plan's" in text for text in problems)
     assert any("trial_00003: is not in the plan" in text for text in problems)
 
 
@@ -140,7 +140,7 @@ def test_a_stage_is_told_once(tmp_path, kit):
     writer, _ = begun(tmp_path, kit)
     writer.trials_followed(follow([kit.trial(5)]))
     (problem,) = verify_run(writer.folder).problems
-    assert "tells 2 times which trials follow" in str(problem)
+    assert "names the trials of a stage 2 times" in str(problem)
 
 
 def test_a_line_that_is_none_is_damage_and_its_trials_can_still_be_read(tmp_path, kit):

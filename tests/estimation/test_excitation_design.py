@@ -190,7 +190,7 @@ def test_gravity_is_told_around_the_middle() -> None:
         (5, ("inertia", "mass"), ROOM, "there is no term 'mass'"),
         (1, TERMS, ROOM, "two are the fewest"),
         (5, TERMS, Room(0.0, 1.0, 1.0), "no room"),
-        (5, ("coulomb", "coulomb_positive", "coulomb_negative"), ROOM, "leave one of them out"),
+        (5, ("coulomb", "coulomb_positive", "coulomb_negative"), ROOM, "leave out one of them"),
     ],
 )
 def test_no_series(harmonics: int, terms: tuple[str, ...], room: Room, said: str) -> None:

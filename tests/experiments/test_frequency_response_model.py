@@ -249,7 +249,7 @@ def test_few_realisations_tell_distortion_and_no_parameters(tmp_path: Path) -> N
         else:
             assert each.estimate.reason in TOO_FEW
     assert not any(each.bench for each in found.identified.parameters)
-    assert any("7 are the fewest" in note for note in found.notes)
+    assert any("need 7" in note for note in found.notes)
     assert all("record 7 realisations" in each.advice for each in found.identified.parameters)
     assert "distortion" in {table.key for table in found.tables}
 
