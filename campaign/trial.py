@@ -211,7 +211,7 @@ class TrialRequest:
         point: values that identify the trial within the test, e.g. {"speed": 0.0175}; SI.
         note: remark of the plan about the trial.
         bench: complete normalised bench (SI) that replaces the test's, for an experiment that
-            varies the bench; see `experiments.common.with_changes`.
+            varies the bench; see `experiments.shared.common.with_changes`.
         requires, can_use: channel names; None: all channels that the experiment declares for a
             measurement, none for other roles.
         windows: parts of the recording that the analysis uses, by name; see `Trial`.
