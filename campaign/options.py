@@ -38,7 +38,7 @@ class Options(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def without_effect(self) -> frozenset[str]:
-        """Names of options that do nothing as the others are; a report does not list them."""
+        """Names of options without effect, given the others; a report does not list them."""
         return frozenset()
 
 
@@ -128,8 +128,8 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
     """
     for name, field in options.model_fields.items():
         types = tuple(_leaf_types(field.annotation))
-        found = (*field.metadata, *types)
-        quantities = [m for m in found if isinstance(m, Quantity)]
+        candidates = (*field.metadata, *types)
+        quantities = [m for m in candidates if isinstance(m, Quantity)]
         default = field.get_default(call_default_factory=True, validated_data={})
         nested = isinstance(default, BaseModel) or default is PydanticUndefined
         yield OptionInfo(
@@ -141,7 +141,7 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
             meaning=meaning_of(options, name),
         )
         key = "NAME." if dict in tuple(_origins(field.annotation)) else ""
-        yield from _within(found, f"{prefix}{name}.{key}")
+        yield from _within(candidates, f"{prefix}{name}.{key}")
 
 
 def meaning_of(model: type[BaseModel], name: str) -> str:
@@ -241,8 +241,8 @@ def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> st
 
 def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
     """The table classes among `types`, without repetition."""
-    found = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
-    return list(dict.fromkeys(found))
+    tables = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
+    return list(dict.fromkeys(tables))
 
 
 def _alternatives(tables: list[type[BaseModel]]) -> str:

@@ -67,7 +67,7 @@ class Unseen:
     @property
     def warning(self) -> Reason:
         """Warning if the model does not predict the signal; else NONE."""
-        if self.share <= MOST_LEFT:  # NaN predicts nothing
+        if self.share <= MOST_LEFT:  # false for NaN
             return NONE
         return UNPREDICTED(percent=100.0 * self.share, what=self.what)
 

@@ -83,8 +83,8 @@ def process_pool(
 
 def _begin(handed: bytes) -> None:
     initialize_worker()
-    begin, told = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
-    begin(told)
+    begin, argument = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    begin(argument)
 
 
 def initialize_worker() -> None:

@@ -44,7 +44,7 @@ class Fault(StrEnum):
     SENSOR = "sensor"  # a sensor is stuck or out of range
     DRIVE = "drive"  # the drive reports a fault
     REFUSED = "refused"  # the bench refused to arm
-    RECORDING = "recording"  # the recorded samples violate the backend's interface
+    RECORDING = "recording"  # the recording violates a condition of the trial
     OTHER = "other"
 
 

@@ -89,7 +89,7 @@ HEARTBEAT = Heartbeat()
 
 
 def opened(kind: BackendKind, options: Options) -> Backend:
-    """Open a backend of `kind`. All functions of this module raise BackendError."""
+    """Open a backend of `kind`. This and all functions below raise BackendError."""
     backend = _blaming(lambda: kind.open(options), kind.open, "open")
     if kind.stopped_outside:
         _typed(backend, SupportsExternalStop, kind.open, "open")  # type: ignore[type-abstract]

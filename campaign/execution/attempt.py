@@ -162,7 +162,7 @@ class _Attempt:
         return replace(executed, unmeasured=self._file.measure(self._measure))
 
     def abandoned(self, safe_state: SafeState) -> AttemptEnd:
-        """The end of a trial that did not return although `make_safe` was called meantime."""
+        """The end of a trial that did not return in spite of `make_safe`."""
         ending = Ending(Outcome.FAULT, "it did not come back from the trial", safe_state)
         return AttemptEnd(self.recorder.conclude(ending, forced=True), gave_up=True)
 

@@ -308,7 +308,7 @@ class DaskExecutor:
         publish_all(written)
 
 
-# What a worker does
+# Executed by a worker
 
 _stopped: set[str] = set()
 _workers: dict[str, BatchWorker] = {}

@@ -136,7 +136,7 @@ def thread_executor(count: int, conditions: Conditions) -> Iterator[ThreadExecut
         for _ in threads:
             tasks.put(None)
     for thread in threads:
-        thread.join()  # nothing hangs: all trials have ended
+        thread.join()  # immediate: all trials have ended
 
 
 def execute(

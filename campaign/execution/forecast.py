@@ -45,7 +45,7 @@ class Forecast:
     """
 
     uneven: bool = False
-    _begin: tuple[float, float] | None = None  # wall clock, what was done by then
+    _begin: tuple[float, float] | None = None  # wall clock, cost done until then
 
     def time_left(self, now: float, done: float, left: float) -> float | None:
         """Remaining wall-clock time (s); None without sufficient data.

@@ -118,7 +118,7 @@ class Stages:
         return f"{self._failures[0]}{f', and {more} more' if more > 0 else ''}" if more >= 0 else ""
 
     def in_order(self, trials: Iterable[Trial]) -> list[Trial]:
-        """Trials in order of execution: those of earlier stages first, as without interruption."""
+        """Trials in order of execution: those of evaluated stages first, as before a resume."""
         return sorted(trials, key=lambda trial: trial.number not in self._followed)
 
     def ended(self, trial: Trial) -> None:

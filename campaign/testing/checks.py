@@ -104,7 +104,7 @@ def holds_slower_channels(under_test: BackendUnderTest) -> None:
         if own is None:
             continue
         require(0 < own <= rate, f"{name}: its own rate is {own:g} Hz of {rate:g} Hz recorded")
-        changes = int(np.count_nonzero(np.diff(channel.samples)))  # NaN differs from anything
+        changes = int(np.count_nonzero(np.diff(channel.samples)))  # NaN differs from any value
         most = own * len(recording.time) / rate + 1
         require(changes <= most, f"{name}: {changes} values at {own:g} Hz; at most {most:g} can be")
 
