@@ -422,7 +422,7 @@ def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
     """A stopped bench names the source of the stop; it moves only after that stop is cleared."""
     with under_test.open() as backend:
         if not isinstance(backend, SupportsExternalStop):
-            text = "a way to stop it is given (stop_outside), but it cannot tell of a stop"
+            text = "a way to stop it is given (stop_outside), but it cannot report a stop"
             require(under_test.stop_outside is None, text)
             return
         require(under_test.stop_outside, "it can be stopped from outside: stop_outside says how")
