@@ -1,4 +1,4 @@
-"""`campaign`, and `python -m campaign`: listens to Ctrl-C before anything heavy is imported."""
+"""`campaign` and `python -m campaign`: handles Ctrl-C before any heavy import."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def main() -> None:
     """Run the command line."""
     interrupts.listen()
     raise_gc_threshold()
-    # pydantic looks into every installed package for plug-ins of its own, and a broken one ends it.
+    # pydantic searches all installed packages for its plug-ins; a broken one would end the program.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         from campaign.cli.main import main as run
@@ -26,11 +26,11 @@ def main() -> None:
         import gc
         import threading
 
-        # The system takes everything back at once: a million objects are not searched for cycles.
+        # The process ends: do not search a million objects for cycles.
         gc.freeze()
 
-        # Python would end itself by SIGINT, had a KeyboardInterrupt passed through `exec`; and
-        # after an error it would wait for a stuck backend's thread.
+        # Python would kill itself by SIGINT after a KeyboardInterrupt has passed through `exec`.
+        # After an error it would wait for the thread of a blocked backend.
         interrupted = leaving.code == interrupts.INTERRUPTED
         if interrupted or (leaving.code and threading.active_count() > 1):
             sys.stdout.flush()

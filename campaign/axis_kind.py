@@ -1,8 +1,8 @@
 """Rotary and linear axes: their units and terms.
 
 The equations of a rotary and of a linear axis are the same in SI numbers, with m for rad, N for N m
-and kg for kg m^2. So the program is written in the words of a rotary axis; what is read from files
-and told to people passes through here. `axis_terms` says whose axis is meant.
+and kg for kg m^2. The program uses the terms of a rotary axis; this module converts input files and
+output texts. `axis_terms` sets the axis.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Item = TypeVar("Item")
 
 
 class AxisKind(StrEnum):
-    """How the axis of a bench moves."""
+    """Type of motion of an axis."""
 
     ROTARY = "rotary"
     LINEAR = "linear"
@@ -27,14 +27,14 @@ class AxisKind(StrEnum):
 
 @dataclass(frozen=True)
 class Sides:
-    """How the two sides of the gear move: a rotary motor may well drive a linear load."""
+    """Axis kinds of the two sides of the gear: a rotary motor may drive a linear load."""
 
     load: AxisKind = AxisKind.ROTARY
     motor: AxisKind = AxisKind.ROTARY
 
     @property
     def at_motor(self) -> Sides:
-        """What is written of something on the motor's side of the gear."""
+        """Sides for a component on the motor's side of the gear."""
         return Sides(self.motor, self.motor)
 
 
@@ -43,12 +43,12 @@ _SIDES: ContextVar[Sides] = ContextVar("axis", default=BOTH_ROTARY)
 
 
 def sides_in(tree: Any) -> Sides:
-    """The kinds that a bench's tree states, as written or normalised; of no tree the usual ones.
+    """Axis kinds of a bench's tree, as written or normalised; both rotary without a tree.
 
-    A gear with a lead is between a rotary motor and a linear load.
+    A gear with a lead connects a rotary motor with a linear load.
     """
     axis = tree.get("axis") if isinstance(tree, Mapping) else None
-    # So that a slip of "linear" is one mistake, and not one for each unit.
+    # A prefix suffices: a misspelled "linear" causes one error, not one for each unit.
     if not isinstance(axis, Mapping) or not str(axis.get("kind", "")).startswith("lin"):
         return BOTH_ROTARY
     gear = tree.get("gear")
@@ -58,7 +58,7 @@ def sides_in(tree: Any) -> Sides:
 
 @contextmanager
 def axis_terms(sides: Sides) -> Iterator[None]:
-    """Whatever is read and told inside is about a bench with these sides."""
+    """Set the sides of the bench for input and output inside the block."""
     token = _SIDES.set(sides)
     try:
         yield
@@ -67,7 +67,7 @@ def axis_terms(sides: Sides) -> Iterator[None]:
 
 
 def each_in_axis_terms(sides: Sides, items: Iterable[Item]) -> Iterator[Item]:
-    """What makes `items` speaks of a bench with these sides; who takes them does not."""
+    """Generate `items` in the terms of `sides`; the caller's terms are unchanged."""
     iterator = iter(items)
     while True:
         with axis_terms(sides):
@@ -79,12 +79,12 @@ def each_in_axis_terms(sides: Sides, items: Iterable[Item]) -> Iterator[Item]:
 
 
 def current_sides() -> Sides:
-    """The sides of the bench that is meant here."""
+    """Sides of the current bench."""
     return _SIDES.get()
 
 
 def is_linear() -> bool:
-    """Whether the axis that is meant here is linear."""
+    """Whether the current load axis is linear."""
     return _SIDES.get().load is AxisKind.LINEAR
 
 
@@ -120,14 +120,14 @@ _UNITS = {
     "deg/s^2": "mm/s^2",
     "mrad/s/(N m)": "um/s/N",
 }
-"""Units of a rotary axis and those of a linear one: SI for SI, with equal numbers, and what a
-reader is shown for what a reader is shown."""
+"""Units of a linear axis by units of a rotary axis: SI units with equal numbers, and display
+units."""
 
 
 def axis_unit(unit: str, sides: Sides | None = None) -> str:
-    """The unit that stands for one of a rotary axis, of the axis that is meant, or of these sides.
+    """Unit of the current axis, or of `sides`, that replaces a unit of a rotary axis.
 
-    What has no angle and no torque in it stays. Not for phases: those are angles of no axis.
+    Units without angle and torque are unchanged. Not for phases, which are no angles of an axis.
     """
     linear = (sides or current_sides()).load is AxisKind.LINEAR
     return _UNITS.get(unit, unit) if linear else unit
@@ -146,18 +146,18 @@ _TERMS = {
     "angles": "positions",
     "an angle": "a position",
 }
-"""What a text about a rotary axis says, and one about a linear axis says in its place."""
+"""Terms of a linear axis by terms of a rotary axis."""
 _OF_MOTOR = "torque constant"
-"""Term that follows the motor."""
+"""Term that depends on the kind of the motor."""
 _LONGEST_FIRST = "|".join(sorted(_TERMS, key=len, reverse=True))
 _TERM = re.compile(rf"(?<![\w.'\"`])(?:{_LONGEST_FIRST})(?!\w|\.\w|'(?!s)|`)", re.IGNORECASE)
-"""A term in a sentence, but not in the name of an option: `limits.torque`, `torque_rate`."""
+"""A term in a sentence, not in the name of an option: `limits.torque`, `torque_rate`."""
 
 
 def in_axis_terms(text: str, sides: Sides | None = None) -> str:
-    """A text for people, in the terms of the axis that is meant, or of a bench with these sides.
+    """Output text in the terms of the current axis, or of `sides`.
 
-    Units follow their numbers, by `units.in_words`.
+    `units.in_words` converts units with their numbers.
     """
     sides = sides or current_sides()
     if sides.load is AxisKind.ROTARY:

@@ -1,17 +1,15 @@
-"""Names of channels: meaning, unit and label of each.
+"""Vocabulary of channels: meaning, unit and label by name.
 
-A backend that calls a quantity by its name here is understood by every analysis; `campaign kinds
-channels` lists them. Names that are not here stay allowed: they are archived with what their
-backend says of them, and no shipped analysis reads them.
+All analyses read channels by these names; `campaign kinds channels` lists them. Other names are
+allowed: they are archived as their backend declares them, and no shipped analysis reads them.
 
-Quantity and kind of axis decide the unit, so that a linear axis has the same names with other
-units: its `gyro_rate` is in m/s, its `drive_torque` is a force in N.
+Quantity and kind of axis determine the unit: a linear axis has the same names with other units, its
+`gyro_rate` is in m/s, its `drive_torque` is a force in N.
 
-Channels of other rates have one rule. Every channel of a trial has the time base of the trial. A
-slower one is held: each sample is the last value that was known at its time, at the beginning the
-one from before the trial; it is never interpolated and never filled with NaN, which stands for lost
-samples alone. `ChannelInfo.own_rate` says how often its value is really new (Hz). A faster one is
-not held back by that: its trial is recorded at its rate, and the others are held.
+All channels of a trial share one time base. A slower channel is held: each sample is the last value
+known at its time, at the beginning the value from before the trial. It is never interpolated and
+never filled with NaN, which means lost samples only. `ChannelInfo.own_rate` is its update rate
+(Hz). For a faster channel the trial is recorded at its rate, and the other channels are held.
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ from campaign.recording import ChannelInfo
 from campaign.units import factor
 
 MOST = 256
-"""channels of a recording."""
+"""Maximum number of channels of a recording."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,62}")
 
 COMMAND = "command"
@@ -51,10 +49,10 @@ LOAD_RATE = "load_rate"
 
 
 class Quantity(StrEnum):
-    """What a channel is a number of; the words of a rotary axis stand for both kinds."""
+    """Quantity of a channel; the terms of a rotary axis apply to both kinds."""
 
     ANGLE = "angle"
-    DEVIATION = "deviation"  # an angle, too, of which a reader is shown thousandths
+    DEVIATION = "deviation"  # also an angle, displayed in thousandths
     RATE = "rate"
     TORQUE = "torque"
     FORCE = "force"  # on either kind of axis
@@ -64,7 +62,7 @@ class Quantity(StrEnum):
 
 
 class Side(StrEnum):
-    """Which part of the bench a channel is about, and so which side of the gear."""
+    """Part of the bench that a channel describes, hence the side of the gear."""
 
     LOAD = "load"
     MOTOR = "motor"
@@ -73,21 +71,21 @@ class Side(StrEnum):
 
 
 class KnownBy(StrEnum):
-    """Who can know the values of a channel at all."""
+    """Source that can provide the values of a channel."""
 
     SENSOR = "sensor"
-    CONTROLLER = "controller"  # works them out, or was told them
-    SIMULATOR = "simulator"  # nobody else: no bench has a sensor for the truth
+    CONTROLLER = "controller"  # computes or receives them
+    SIMULATOR = "simulator"  # only a simulation: no bench has a sensor for the truth
 
 
 @dataclass(frozen=True)
 class ChannelMeaning:
-    """What a name means, whoever records it.
+    """Meaning of a channel name, the same for all backends.
 
     Attributes:
-        label: for people, on a rotary axis.
+        label: displayed label on a rotary axis.
         meaning: one sentence.
-        linear_label: on a linear axis, where `in_axis_terms` does not give it.
+        linear_label: label on a linear axis, if `in_axis_terms` does not provide it.
     """
 
     name: str
@@ -252,7 +250,7 @@ COMMANDS = {
     "prescribed": (Quantity.RATE, "Prescribed relative rate"),
     "spring": (Quantity.ANGLE, "Angle of the spring's far end"),
 }
-"""What the command holds by the mode of the task: quantity, label."""
+"""(Quantity, label) of the command by mode of the task."""
 
 _ROTARY = {
     Quantity.ANGLE: ("rad", "deg"),
@@ -261,7 +259,7 @@ _ROTARY = {
     Quantity.TORQUE: ("N m", "N m"),
     Quantity.FORCE: ("N", "N"),
     Quantity.CURRENT: ("A", "A"),
-    # As every sensor has it: from K no factor leads there, and factors are all that units have.
+    # The usual unit of sensors: units convert by factors only, and no factor converts K to degC.
     Quantity.TEMPERATURE: ("degC", "degC"),
     Quantity.DEPENDS: ("", ""),
 }
@@ -272,19 +270,19 @@ UNITS = {
     }
     for kind in AxisKind
 }
-"""SI unit and the unit a reader is shown, by kind of axis and quantity."""
+"""(SI unit, display unit) by kind of axis and quantity."""
 
 
 def info(
     name: str, mode: str = "", *, axis: AxisKind = AxisKind.ROTARY, own_rate: float | None = None
 ) -> ChannelInfo:
-    """What a backend announces of a channel of the vocabulary. Raises KeyError for other names.
+    """Announcement of a channel of the vocabulary. Raises KeyError for other names.
 
     Args:
-        mode: of the task; decides what a command is, and nothing else.
-        axis: how the side of the bench moves that the channel is about: a rotary motor may well
-            drive a linear load.
-        own_rate: of a slower channel (Hz): see above.
+        mode: mode of the task; affects only the command.
+        axis: kind of axis of the channel's side of the gear: a rotary motor may drive a linear
+            load.
+        own_rate: update rate of a slower channel (Hz): see the module.
     """
     what = VOCABULARY[name]
     quantity, label = what.quantity, what.label
@@ -298,7 +296,7 @@ def info(
 
 
 def wrong_names(names: Sequence[object]) -> str:
-    """Why `names` cannot be those of the channels of a recording; empty when they can."""
+    """Why `names` are invalid as channel names of a recording; empty if they are valid."""
     if not 0 < len(names) <= MOST:
         return f"{len(names) or 'no'} channels were announced; a recording has 1 to {MOST}"
     for name in names:
@@ -309,19 +307,19 @@ def wrong_names(names: Sequence[object]) -> str:
 
 
 def axis_of(name: str, sides: Sides) -> AxisKind:
-    """How the side of a bench moves that a channel is about: the motor's own, or the axis'."""
+    """Kind of axis of a channel's side of the gear: of the motor, or of the load."""
     what = VOCABULARY.get(name)
     return sides.motor if what is not None and what.side is Side.MOTOR else sides.load
 
 
 def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[ChannelInfo, float]:
-    """A channel in the unit that the vocabulary gives its name, and how many of these its own is.
+    """Convert a channel to the unit of the vocabulary; the channel, and the factor of its samples.
 
-    Raises ValueError where no factor leads there. Channels of other names keep their unit.
+    Raises ValueError if no factor converts its unit. Channels of other names keep their unit.
     """
     known = VOCABULARY.get(channel.name)
     unit = info(channel.name, mode, axis=axis_of(channel.name, sides)).unit if known else ""
-    # What a command is depends on the loop that was closed, in a recording perhaps another one.
+    # The quantity of a command depends on the closed loop, which may differ in a recording.
     of_commands = {UNITS[sides.load][quantity][0] for quantity, _ in COMMANDS.values()}
     if (
         not unit
@@ -341,12 +339,12 @@ def in_known_unit(channel: ChannelInfo, mode: str, sides: Sides) -> tuple[Channe
 
 
 def missing(required: Iterable[str], available: Collection[str]) -> tuple[str, ...]:
-    """Which of the required names are not among the available ones, in their order."""
+    """The required names that are not available, in their order."""
     return tuple(name for name in required if name not in available)
 
 
 def explained(name: str) -> str:
-    """The name with its meaning, for messages; alone when the vocabulary does not have it."""
+    """Name with its meaning, for messages; only the name if it is not in the vocabulary."""
     what = VOCABULARY.get(name)
     if what is None:
         return name

@@ -1,7 +1,7 @@
 """An option that is one of several tables, selected by a key.
 
-Which tables there are is looked up when a file is validated, not when the class is made: the kinds
-of another package are then imported only for who names them, and can themselves be imported first.
+The tables are looked up at the validation of a file, not at the definition of the class. So the
+kinds of other packages are imported only if a file names them, and can be imported first.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MISSING = object()
 
 
 class HasOptions(Protocol):
-    """A kind, as far as its options go."""
+    """A kind with options."""
 
     @property
     def options(self) -> type[BaseModel]: ...
@@ -30,23 +30,23 @@ class HasOptions(Protocol):
 class Choice:
     """Metadata of a field: `Annotated[Any, Choice("model", friction_models)]`.
 
-    What pydantic reports is what it reports of a discriminated union, and beyond that
-    `unusable_kind` for a word whose kind cannot be imported.
+    Errors are those of pydantic's discriminated union, and `unusable_kind` for a word whose kind
+    cannot be imported.
 
     Attributes:
-        tag: the field whose word chooses.
-        kinds: the kinds there are, by word. Looking one up may raise UsageError.
+        tag: field whose word selects the table.
+        kinds: available kinds by word. A look-up may raise UsageError.
     """
 
     tag: str
     kinds: Callable[[], Mapping[str, HasOptions]]
 
     def words(self) -> tuple[str, ...]:
-        """What may be chosen."""
+        """Words that may be selected."""
         return tuple(self.kinds())
 
     def options(self, word: object) -> type[BaseModel] | None:
-        """What the table may contain; None for a word that there is nothing of."""
+        """Options class of the table; None for an unknown or unusable word."""
         try:
             return self.kinds()[word].options if isinstance(word, str) else None
         except (KeyError, UsageError):
@@ -82,5 +82,5 @@ class Choice:
 
 @cache
 def _labelled(options: type[BaseModel]) -> TypeAdapter[dict[str, BaseModel]]:
-    """Its errors lie below the word, as those of a discriminated union do."""
+    """Validator whose error locations contain the word, as in a discriminated union."""
     return TypeAdapter(dict[str, options])  # type: ignore[valid-type]

@@ -1,7 +1,6 @@
 """Names under this program's entry point groups, without importing packages.
 
-One package whose metadata cannot be read costs its own kinds and nobody else's, which is why each
-distribution is read by itself.
+Each distribution is read separately: unreadable metadata of one package costs only its own kinds.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ _VALUE = re.compile(r"=\s*(\S+)")
 
 @dataclass(frozen=True)
 class PlugIn:
-    """One name of one group, as an installed package declares it.
+    """An entry point of an installed package.
 
     Attributes:
-        group: of entry points, e.g. `campaign.friction`.
-        distribution, version: of the package, as `pip list` shows them.
-        entry_point: `module:object`, where the kind is to be imported from.
-        packages: top-level packages and modules: that of the entry point first, then all others of
-            the distribution, as far as it lists its files.
+        group: entry point group, e.g. `campaign.friction`.
+        distribution, version: name and version of the package, as in `pip list`.
+        entry_point: `module:object` of the kind.
+        packages: top-level packages and modules: first that of the entry point, then all others of
+            the distribution, if it lists its files.
     """
 
     group: str
@@ -44,17 +43,17 @@ class PlugIn:
 
     @property
     def package(self) -> str:
-        """The package alone, for what any of its code has done."""
+        """The package without the entry point, for errors in any of its code."""
         return f"the package {self.distribution} {self.version}"
 
     def load(self) -> object:
-        """Import it. Raises whatever the package raises."""
+        """Import the kind. Raises any error of the package."""
         return metadata.EntryPoint(self.name, self.entry_point, self.group).load()
 
 
 @dataclass(frozen=True)
 class InstalledPlugins:
-    """Every plug-in there is, and a line about each package that could not be read."""
+    """All plug-ins, and a line about each unreadable package."""
 
     plug_ins: tuple[PlugIn, ...]
     unreadable: tuple[str, ...]
@@ -62,7 +61,7 @@ class InstalledPlugins:
 
 @cache
 def installed() -> InstalledPlugins:
-    """All packages that this process can import are searched, once."""
+    """Plug-ins of all packages that this process can import; searched once."""
     plug_ins: dict[str, tuple[PlugIn, ...]] = {}
     unreadable = []
     for distribution in metadata.distributions():
@@ -74,42 +73,44 @@ def installed() -> InstalledPlugins:
             name = distribution.metadata["Name"] or ""
             if not name:
                 raise ValueError("its metadata has no name")
-            # The first of a name on the path is the one that is imported.
+            # Python imports the first distribution of a name on the path.
             same = re.sub(r"[-_.]+", "-", name).lower()
             plug_ins.setdefault(same, tuple(_declared(distribution, name)))
-        except Exception as error:  # noqa: BLE001 (whatever is wrong with it is its own business)
+        except Exception as error:  # noqa: BLE001 (an unreadable package must not affect others)
             which = name or f"with {', '.join(_VALUE.findall(text))}"
             where = distribution.locate_file("")
             unreadable.append(f"the package {which} in {where} cannot be read: {one_line(error)}")
-    found = (one for several in plug_ins.values() for one in several)
-    return InstalledPlugins(tuple(found), tuple(dict.fromkeys(unreadable)))
+    plug_in_iter = (one for several in plug_ins.values() for one in several)
+    return InstalledPlugins(tuple(plug_in_iter), tuple(dict.fromkeys(unreadable)))
 
 
 def packages_of(module: str) -> tuple[str, ...]:
-    """The top-level package of a module, and all others of the plug-ins that provide it."""
+    """Top-level package of a module, and all packages of the plug-ins that provide it."""
     top = module.partition(".")[0]
     beside = (each.packages for each in installed().plug_ins if top in each.packages)
     return tuple(dict.fromkeys((top, *(name for names in beside for name in names))))
 
 
 def provider(module: str) -> PlugIn | None:
-    """The plug-in whose package a module belongs to; None for this program and for libraries."""
+    """Plug-in that contains a module; None for this program and for libraries."""
     top = module.partition(".")[0]
     return next((each for each in installed().plug_ins if top in each.packages), None)
 
 
 def blamed(error: BaseException) -> PlugIn | None:
-    """The plug-in whose code was being executed when `error` was raised; None when none was."""
+    """Innermost plug-in in the traceback of `error`; None without one."""
     modules = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
-    found = (provider(module) for module in reversed(modules) if not module.startswith("campaign."))
-    return next(filter(None, found), None)
+    candidates = (
+        provider(module) for module in reversed(modules) if not module.startswith("campaign.")
+    )
+    return next(filter(None, candidates), None)
 
 
 def one_line(error: BaseException) -> str:
-    """An error without its traceback."""
+    """Type of an error and the first line of its message."""
     try:
         lines = str(error).strip().splitlines()
-    except Exception:  # noqa: BLE001 - one that cannot be told
+    except Exception:  # noqa: BLE001 - its text raises an error
         lines = []
     return f"{type(error).__name__}: {lines[0]}"[:300] if lines else type(error).__name__
 
@@ -125,7 +126,7 @@ def _declared(distribution: metadata.Distribution, name: str) -> Iterator[PlugIn
 
 
 def _top_level(distribution: metadata.Distribution) -> Iterator[str]:
-    """Importable names in the list of its files; an editable install lists none."""
+    """Importable names in a distribution's file list; an editable install lists none."""
     for file in distribution.files or ():
         path = PurePosixPath(file.as_posix())
         name = path.parts[0].partition(".")[0]

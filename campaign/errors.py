@@ -1,4 +1,4 @@
-"""Errors that a user can cause or meet, each with its exit code.
+"""Errors for the user, each with its exit code.
 
 The codes are part of the public interface (`docs/commands.md`):
 
@@ -28,7 +28,7 @@ from pathlib import Path
 
 
 class ExitCode(IntEnum):
-    """What a command's exit status says. Worst first when several apply: see `worst_exit_code`."""
+    """Exit status of a command. If several apply, the worst one: see `worst_exit_code`."""
 
     DONE = 0
     TRIALS_FAILED = 1
@@ -53,16 +53,16 @@ PRECEDENCE = (
 
 
 def worst_exit_code(codes: Sequence[ExitCode]) -> ExitCode:
-    """The first of `codes` in the documented precedence; DONE when there is none."""
+    """The first of `codes` in the documented precedence; DONE without any."""
     return next((code for code in PRECEDENCE if code in codes), ExitCode.DONE)
 
 
 DEBUG = "CAMPAIGN_DEBUG"
-"""Environment variable that asks for tracebacks."""
+"""Environment variable that enables tracebacks."""
 
 
 def explain_in_debug() -> None:
-    """Print the traceback of the error that is being handled, where `DEBUG` asks for it."""
+    """Print the traceback of the handled error if `DEBUG` is set."""
     if os.environ.get(DEBUG):
         traceback.print_exc()
 
@@ -79,7 +79,7 @@ class UsageError(CampaignError):
 
 @contextmanager
 def writing(what: object) -> Iterator[None]:
-    """Something is written in the block; UsageError names `what` where that is not possible."""
+    """Convert an OSError of writing in the block to a UsageError that names `what`."""
     try:
         yield
     except OSError as error:
@@ -87,7 +87,7 @@ def writing(what: object) -> Iterator[None]:
 
 
 class NoResultError(CampaignError):
-    """Trials completed, and nothing that was asked for could be found in them."""
+    """Trials completed, but no requested result could be determined."""
 
     exit_code = ExitCode.NO_RESULT
 
@@ -98,8 +98,8 @@ class Problem:
 
     Attributes:
         file: the file as the user named it.
-        line, column: position from 1; 0 when the mistake has no place of its own.
-        message: what stands there, what is allowed, and the nearest valid name for a typo.
+        line, column: position from 1; 0 if the mistake has no position.
+        message: the given text, what is allowed, and the nearest valid name for a typo.
     """
 
     file: Path
@@ -113,7 +113,7 @@ class Problem:
 
 
 class ProtocolError(UsageError):
-    """All the mistakes found in a protocol, its includes and its benches, at once."""
+    """All mistakes in a protocol, its includes and its benches."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -121,13 +121,13 @@ class ProtocolError(UsageError):
 
 
 class LimitError(CampaignError):
-    """A planned trial would break a limit of its bench; nothing was moved."""
+    """A planned trial would exceed a limit of its bench; nothing was moved."""
 
     exit_code = ExitCode.LIMIT_OR_FAULT
 
 
 class BackendError(CampaignError):
-    """A backend failed in a way that is not one trial's outcome."""
+    """A failure of a backend that is not the outcome of one trial."""
 
     exit_code = ExitCode.LIMIT_OR_FAULT
 
@@ -139,7 +139,7 @@ class ArchiveError(CampaignError):
 
 
 class ArchiveWarning(UserWarning):
-    """An archive of which something is damaged, missing or not as it was sealed.
+    """A part of an archive is damaged, missing, or differs from the sealed state.
 
-    What is good of it is used. With `strict=True` the same is an ArchiveError.
+    The intact parts are used. With `strict=True` an ArchiveError is raised instead.
     """

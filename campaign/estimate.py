@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from campaign.reason import NONE, Cause, Reason
 
 ROUNDING = 1e-9
-"""Share of a number by which it may lie outside of its interval: unit conversions round."""
+"""Relative tolerance for a value outside of its interval, due to rounding of unit conversions."""
 
 OF_ONE_TRIAL = Cause(
     "of one trial",
@@ -21,26 +21,26 @@ Kind = Literal["number", "share", "count", "quantile", "at least", "at most"]
 
 
 class Origin(StrEnum):
-    """Where a number comes from."""
+    """Origin of a number."""
 
     MEASURED = "measured"
-    ASSUMED = "assumed"  # a rule or a guess stands in for a measurement
-    GIVEN = "given"  # a document or a data sheet says so
-    AT_BOUND = "at its bound"  # the data would have it beyond what is physically possible
+    ASSUMED = "assumed"  # a rule or a guess replaces a measurement
+    GIVEN = "given"  # from a document or a data sheet
+    AT_BOUND = "at its bound"  # the data indicate a value beyond the physically possible range
     CONTRADICTED = "model contradicted"  # by the data: no parameter of a rig
-    NOT_DETERMINED = "not determined"  # the data say nothing, or too little to be of use
+    NOT_DETERMINED = "not determined"  # the data contain no or too little information
 
 
 @dataclass(frozen=True)
 class Systematic:
-    """One cause that shifts all repetitions alike, so that no repetition can show it.
+    """A systematic part of the uncertainty: it shifts all repetitions equally.
 
     Attributes:
-        source: a code, declared where it is raised: `torque constant`, `inertia`, `ramp rate` ...
-            It is the same for every kind of axis; a page shows it in words of the axis.
-        standard_uncertainty: what it does to the value (1 sigma, in the value's unit); None when
-            the uncertainty of the source is not known.
-        of_rig: whether it is one and the same for all recordings of a rig, as a constant is.
+        source: a code, declared by its user: `torque constant`, `inertia`, `ramp rate` ... It is
+            the same for every kind of axis; a page shows it in terms of the axis.
+        standard_uncertainty: its contribution to the value (1 sigma, in the value's unit); None if
+            the uncertainty of the source is unknown.
+        of_rig: whether it is the same for all recordings of a rig, e.g. a constant.
     """
 
     source: str
@@ -50,24 +50,22 @@ class Systematic:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and how far it can be trusted; or why that is not known.
+    """A number with its uncertainty, or the reason for none.
 
     Attributes:
         name: of the quantity, e.g. `coulomb_torque`.
-        value: SI, in `unit`; NaN only when `origin` says that it is not determined.
-        low, high: bounds of the interval that scatter leaves (SI), of whatever kind the number is:
-            they hold the value. Both None when it has none, and `reason` says why. One of them
-            None: the interval is open on that side.
-        level: the share of repetitions in which such an interval holds the truth, e.g. 0.95.
-        method: how value and interval were found, in words.
+        value: SI, in `unit`; NaN only if `origin` is not determined.
+        low, high: ends of the interval due to scatter (SI); they enclose the value. Both None: no
+            interval, and `reason` states why. One None: the interval is open on that side.
+        level: coverage probability of the interval, e.g. 0.95.
+        method: estimator of value and interval, in words.
         reason: why there is no interval, or why the value is not determined.
-        origin: where the number comes from.
-        kind: what sort of number it is; a share lies between 0 and 1, and so do its `combined`
-            ends; a bound (`at least`, `at most`) says that the truth lies
-            on that side of it and has no interval of its own.
-        standard_error: 1 sigma of the value (SI), where that is meaningful.
-        freedom: degrees of freedom behind `standard_error`, or effective size of the sample.
-        systematic: what scatter does not show; apart from `low` and `high`.
+        origin: origin of the number.
+        kind: kind of the number. A share and its `combined` ends lie between 0 and 1. A bound
+            (`at least`, `at most`) limits the true value on one side and has no interval.
+        standard_error: 1 sigma of the value (SI), if meaningful.
+        freedom: degrees of freedom of `standard_error`, or effective sample size.
+        systematic: parts of the uncertainty that scatter does not show; not in `low` and `high`.
     """
 
     name: str
@@ -85,7 +83,7 @@ class Estimate:
     systematic: tuple[Systematic, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.reason, Reason):  # of a plug-in that is not type-checked
+        if not isinstance(self.reason, Reason):  # from a plug-in without type check
             raise TypeError(
                 f"{self.name}: a reason is a `Reason`: declare a `campaign.reason.Cause`"
             )
@@ -105,7 +103,7 @@ class Estimate:
     def without_interval(
         cls, name: str, value: float, unit: str, reason: Reason, **more: Any
     ) -> Self:
-        """A number that has no interval, and why; NaN makes it `not determined`."""
+        """A number without interval, and the reason; NaN sets `not determined`."""
         if math.isnan(value):
             more = {**more, "origin": Origin.NOT_DETERMINED}
         return cls(name, value, unit, reason=reason, **more)
@@ -117,7 +115,7 @@ class Estimate:
 
     @property
     def is_determined(self) -> bool:
-        """Whether there is a number that says something."""
+        """Whether the value is finite and determined."""
         return math.isfinite(self.value) and self.origin is not Origin.NOT_DETERMINED
 
     @property
@@ -134,9 +132,9 @@ class Estimate:
     def combined(self) -> tuple[float | None, float | None]:
         """Low and high with the systematic parts: half-widths add in squares (GUM 5.1.2, 6.2).
 
-        A systematic part counts with the normal quantile of `level`: it has no scatter, and so no
-        degrees of freedom of its own. The sides stay as unequal as scatter made them. A bound gives
-        way by the one-sided quantile, and is the only end there is.
+        A systematic part counts with the normal quantile of `level`: without scatter it has no
+        degrees of freedom. The interval stays asymmetric as from scatter. A bound is shifted by the
+        one-sided quantile, and is the only end.
         """
         from scipy.special import ndtri
 
@@ -159,7 +157,7 @@ class Estimate:
 
     @property
     def half_width(self) -> float:
-        """Half of the combined interval; NaN when it is not closed."""
+        """Half of the combined interval; NaN for an open or missing interval."""
         low, high = self.combined
         return math.nan if low is None or high is None else 0.5 * (high - low)
 

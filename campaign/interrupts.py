@@ -1,9 +1,9 @@
 """Ctrl-C outside of a run: immediate exit, or orderly cleanup.
 
-An exception out of a signal handler breaks whatever it meets: an import that turns it into another
-error, a weak reference's callback that drops it. So the program is left at once wherever there is
-nothing to clean up, which is nearly everywhere; what writes files asks for KeyboardInterrupt. While
-a run executes, `campaign.execution.stop` listens in its own way.
+An exception from a signal handler is unreliable: an import converts it into another error, a weak
+reference's callback drops it. The program therefore exits immediately if it has nothing to clean
+up; code that writes files requests KeyboardInterrupt by `unwinding`. During a run,
+`campaign.execution.stop` handles the signals.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import signal
 import sys
 from contextlib import contextmanager, suppress
 
-# Imported first of all, so nothing heavy here: no `typing`.
+# The first import of the program: no heavy modules here, not even `typing`.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,7 +27,7 @@ _listens = False
 
 
 def listen() -> None:
-    """Leave at Ctrl-C, from now on. Main thread only."""
+    """Install the handler that exits at Ctrl-C. Main thread only."""
     global _listens
     _listens = True
     signal.signal(signal.SIGINT, _handle)
@@ -35,13 +35,13 @@ def listen() -> None:
 
 
 def is_program() -> bool:
-    """Whether this process is the command line, and no other program that uses its modules."""
+    """Whether this process is the command line, not another program that uses its modules."""
     return _listens
 
 
 @contextmanager
 def unwinding() -> Iterator[None]:
-    """Inside the block Ctrl-C is a KeyboardInterrupt; a second one leaves at once."""
+    """Inside the block Ctrl-C raises KeyboardInterrupt; a second one exits immediately."""
     global _unwinds
     before, _unwinds = _unwinds, True
     try:
@@ -51,13 +51,13 @@ def unwinding() -> Iterator[None]:
 
 
 def deaf() -> None:
-    """All is done but for ending: Ctrl-C changes nothing any more."""
+    """Ignore Ctrl-C from now on, while the program exits."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def leave() -> NoReturn:
-    """Say that somebody interrupted, and end."""
-    with suppress(OSError):  # nobody may be there to read it
+    """Report the interruption, and exit."""
+    with suppress(OSError):  # stderr may be closed
         os.write(2, b"campaign: interrupted\n")
     os._exit(INTERRUPTED)
 
@@ -72,5 +72,5 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 def _unraisable(unraisable: UnraisableHookArgs) -> None:
     if unraisable.exc_type is KeyboardInterrupt:
-        leave()  # dropped where nothing can be raised
+        leave()  # Python dropped it in a place that cannot raise
     sys.__unraisablehook__(unraisable)

@@ -38,12 +38,12 @@ class Options(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def without_effect(self) -> frozenset[str]:
-        """Names of options that do nothing as the others are; a report does not list them."""
+        """Names of options without effect, given the others; a report does not list them."""
         return frozenset()
 
 
 def spelled(pattern: str, words: str) -> AfterValidator:
-    """Of a text that must match `pattern` as a whole; `words` tell a user what that allows."""
+    """Validator of a text that must match the whole `pattern`; `words` describe it to a user."""
 
     def check(text: str) -> str:
         if re.fullmatch(pattern, text) is None:
@@ -55,14 +55,14 @@ def spelled(pattern: str, words: str) -> AfterValidator:
 
 @dataclass(frozen=True)
 class TextFile:
-    """An option that names a text file, such as a CSV: the path in TOML, its text when validated.
+    """An option that names a text file, such as a CSV: a path in TOML, its text after validation.
 
-    Whoever loads the protocol reads the file, relative to the protocol, and keeps its text among
-    the sources. Normalised options hold only name and digest, and read back without the text.
+    The loader of the protocol reads the file, relative to the protocol, and keeps its text among
+    the sources. Normalised options contain only name and digest, and are read without the text.
 
     Attributes:
         name: as written, among the sources of the protocol.
-        text: None when it is not at hand.
+        text: None if it is not available.
     """
 
     name: str
@@ -97,10 +97,10 @@ class OptionInfo:
 
     Attributes:
         name: dotted, for an option of a table within a table.
-        quantity: the physical quantity it takes, SI inside; None for anything else.
-        accepts: what else it takes: `text`, `true or false`, the allowed words, a table's models.
-        default: SI; None when there is none.
-        when: the word that chooses the table it belongs to, such as `form = ideal`; "" for always.
+        quantity: its physical quantity (value in SI); None without one.
+        accepts: other accepted values: `text`, `true or false`, allowed words, a table's models.
+        default: SI; None without a default.
+        when: word that selects its table, such as `form = ideal`; "" for always.
     """
 
     name: str
@@ -113,7 +113,7 @@ class OptionInfo:
 
     @property
     def unit(self) -> str:
-        """The unit a reader is shown, or the empty text; on a linear axis it may be another."""
+        """Display unit, or empty; with the alternative unit of a linear axis."""
         if self.quantity is None:
             return ""
         own, linear = self.quantity, self.quantity.linear
@@ -121,15 +121,15 @@ class OptionInfo:
 
 
 def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]:
-    """The options of a class in the order they were declared, with those of the tables in it.
+    """The options of a class in order of declaration, including those of its tables.
 
-    Where a table is one of several, each one's options follow; `NAME` stands for a key that
-    whoever writes the file may choose.
+    For a table that is one of several, the options of each follow; `NAME` stands for a key that the
+    user may choose.
     """
     for name, field in options.model_fields.items():
         types = tuple(_leaf_types(field.annotation))
-        found = (*field.metadata, *types)
-        quantities = [m for m in found if isinstance(m, Quantity)]
+        candidates = (*field.metadata, *types)
+        quantities = [m for m in candidates if isinstance(m, Quantity)]
         default = field.get_default(call_default_factory=True, validated_data={})
         nested = isinstance(default, BaseModel) or default is PydanticUndefined
         yield OptionInfo(
@@ -141,13 +141,13 @@ def describe(options: type[BaseModel], prefix: str = "") -> Iterator[OptionInfo]
             meaning=meaning_of(options, name),
         )
         key = "NAME." if dict in tuple(_origins(field.annotation)) else ""
-        yield from _within(found, f"{prefix}{name}.{key}")
+        yield from _within(candidates, f"{prefix}{name}.{key}")
 
 
 def meaning_of(model: type[BaseModel], name: str) -> str:
-    """What a field is: its description, or else the docstring below it.
+    """Meaning of a field: its description, or else the docstring below it.
 
-    pydantic would read the source of every class at each start (`use_attribute_docstrings`).
+    Not by `use_attribute_docstrings`: pydantic would read the source of every class at each start.
     """
     text = model.model_fields[name].description
     owners = (each for each in model.__mro__ if name in inspect.get_annotations(each))
@@ -156,7 +156,7 @@ def meaning_of(model: type[BaseModel], name: str) -> str:
 
 @cache
 def _docstrings(owner: type) -> Mapping[str, str]:
-    """Of a class' fields, from its source; empty where there is none at hand."""
+    """Docstrings of a class' fields by name, from its source; empty without source."""
     try:
         body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0].body  # type: ignore[attr-defined]
     except (OSError, SyntaxError):
@@ -171,24 +171,24 @@ def _docstrings(owner: type) -> Mapping[str, str]:
 
 
 def _within(found: tuple[Any, ...], prefix: str) -> Iterator[OptionInfo]:
-    """The options of the table that a field takes, or of each that it may take."""
+    """The options of all tables that a field accepts."""
     tables = {word: table for table in _tables(found) for word in [_told_by(table)]}
     for choice in found:
         if isinstance(choice, Choice):
             chosen = {f"{choice.tag} = {word}": choice.options(word) for word in choice.words()}
-            tables |= {told: table for told, table in chosen.items() if table is not None}
-    infos = {told: list(describe(table, prefix)) for told, table in tables.items()}
-    for told, of_table in infos.items():
+            tables |= {label: table for label, table in chosen.items() if table is not None}
+    infos = {label: list(describe(table, prefix)) for label, table in tables.items()}
+    for label, of_table in infos.items():
         for info in of_table:
             everywhere = all(info in others for others in infos.values())
-            if everywhere and told == next(iter(infos)):
+            if everywhere and label == next(iter(infos)):
                 yield info
-            elif not everywhere and told != f"{info.name.removeprefix(prefix)} = {info.accepts}":
-                yield replace(info, when=", ".join(filter(None, (told, info.when))))
+            elif not everywhere and label != f"{info.name.removeprefix(prefix)} = {info.accepts}":
+                yield replace(info, when=", ".join(filter(None, (label, info.when))))
 
 
 def _origins(annotation: Any) -> Iterator[Any]:
-    """The generic types that an annotation is made of."""
+    """The generic types in an annotation."""
     if (origin := get_origin(annotation)) is not None:
         yield origin
         for argument in get_args(annotation):
@@ -240,18 +240,18 @@ def _accepts(annotation: Any, types: tuple[Any, ...], *, quantified: bool) -> st
 
 
 def _tables(types: tuple[Any, ...]) -> list[type[BaseModel]]:
-    """The kinds of table among them, each once."""
-    found = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
-    return list(dict.fromkeys(found))
+    """The table classes among `types`, without repetition."""
+    tables = (t for t in types if isinstance(t, type) and issubclass(t, BaseModel))
+    return list(dict.fromkeys(tables))
 
 
 def _alternatives(tables: list[type[BaseModel]]) -> str:
-    """The words by which each kind of table is told."""
+    """The words that identify the tables."""
     return " | ".join(map(_told_by, tables))
 
 
 def _told_by(table: type[BaseModel]) -> str:
-    """The word by which a table is told from others: its first field of one allowed word."""
+    """Word that identifies a table: of its first field with exactly one allowed word."""
     for name, field in table.model_fields.items():
         allowed = get_args(field.annotation)
         if get_origin(field.annotation) is Literal and len(allowed) == 1:

@@ -10,8 +10,8 @@ from campaign.estimate import Estimate, Origin
 from campaign.reason import NONE, Cause, Reason
 
 MOST_LEFT = 1.0 / 3.0
-"""RMS of a validation's residual, over that of what was measured, up to which a model predicts it:
-a ninth of the power. What it lacks beyond that is no small correction, as friction is not."""
+"""Maximum ratio of RMS of the validation residual to RMS of the measured signal for a predictive
+model: a ninth of the power. A larger residual is no small correction, as friction is not."""
 UNPREDICTED = Cause(
     "validation residual",
     "validation residual (RMS): {percent:.2g} % of the measured {what}; the model does not predict "
@@ -20,7 +20,7 @@ UNPREDICTED = Cause(
 
 
 def is_value(estimate: Estimate) -> bool:
-    """Whether a bench file may state it: a measured number with its interval, and no bound."""
+    """Whether a bench file may state it: a measured number with interval, no bound."""
     measured = estimate.origin is Origin.MEASURED and estimate.has_interval
     return measured and estimate.kind == "number"
 
@@ -30,14 +30,14 @@ class Parameter:
     """A number of the rig.
 
     Attributes:
-        estimate: SI, of a rotary axis; what is shown follows from the bench.
+        estimate: SI, of a rotary axis; displayed terms depend on the bench.
         meaning: one sentence.
-        display: unit that a reader is shown, "" for the same.
-        bench: key of the bench file that it fills in, e.g. `axis.inertia`; "" for none, which it
-            always is of what is no measured number: not determined, or a bound.
-        lumped: key of a friction model that stands for all interfaces together, as that of a
-            compensation does, e.g. `negative.coulomb_torque`; "" for none.
-        advice: what to measure next to make its interval narrower; "" where nobody knows.
+        display: display unit, "" for the same.
+        bench: key of the bench file for this value, e.g. `axis.inertia`; "" for none. It is always
+            "" if the estimate is no measured number: not determined, or a bound.
+        lumped: key of a friction model that combines all interfaces, e.g. of a compensation:
+            `negative.coulomb_torque`; "" for none.
+        advice: next measurement to reduce its interval; "" if unknown.
     """
 
     estimate: Estimate
@@ -54,11 +54,11 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Unseen:
-    """What a model leaves over of a validation.
+    """Residual of a model in a validation.
 
     Attributes:
-        share: RMS of the residual over that of what was measured.
-        what: which was measured: `torque`, `motion`.
+        share: RMS of the residual divided by RMS of the measured signal.
+        what: the measured signal: `torque`, `motion`.
     """
 
     share: float
@@ -66,24 +66,24 @@ class Unseen:
 
     @property
     def warning(self) -> Reason:
-        """None where the model predicts it."""
-        if self.share <= MOST_LEFT:  # NaN predicts nothing
+        """Warning if the model does not predict the signal; else NONE."""
+        if self.share <= MOST_LEFT:  # false for NaN
             return NONE
         return UNPREDICTED(percent=100.0 * self.share, what=self.what)
 
 
 @dataclass(frozen=True)
 class IdentifiedRig:
-    """What an analysis identifies of a rig, beside its tables, figures and findings.
+    """Identified parameters of a rig, in addition to tables, figures and findings.
 
     Attributes:
-        parameters: of the model that it chose; empty where it identifies none.
-        correlations: of parameters, by their names; pairs that are not named go their own ways.
-        settings: further values that the bench file needs for these parameters to be of use, by
-            key: value, SI unit (rotary; "" for none) and what they rest on; nobody measured them.
+        parameters: parameters of the selected model; may be empty.
+        correlations: correlations of parameters by pair of names; missing pairs are uncorrelated.
+        settings: further values that the bench file needs to use these parameters, by key: value,
+            SI unit (rotary; "" for none) and basis; they are not measured.
         again: options that fit the same model to other data, by name.
-        unseen: how the model does on the validation; None without any.
-        left_out: of the recordings, one reason for each kind.
+        unseen: residual of the validation; None without a validation.
+        left_out: reasons for excluded recordings, one for each kind.
     """
 
     parameters: tuple[Parameter, ...] = ()
@@ -95,9 +95,9 @@ class IdentifiedRig:
 
     @property
     def warnings(self) -> tuple[Reason, ...]:
-        """What a reader has to know before any number."""
-        told = (*self.left_out, self.unseen.warning if self.unseen else NONE)
-        return tuple(each for each in told if each)
+        """Warnings that precede all numbers."""
+        reasons = (*self.left_out, self.unseen.warning if self.unseen else NONE)
+        return tuple(each for each in reasons if each)
 
 
 NOTHING_IDENTIFIED = IdentifiedRig()

@@ -1,4 +1,4 @@
-"""Untrusted text made safe for a terminal or a page."""
+"""Conversion of untrusted text for a terminal or a page."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from typing import Any
 
 REPLACEMENT = "?"
 LONGEST = 2000
-"""letters of a text that other code hands to the archive."""
+"""Maximum number of characters of a text from other code in the archive."""
 DEEPEST = 8
-"""levels of a tree, likewise."""
+"""Maximum depth of a tree from other code in the archive."""
 
 
 def printable(text: str, keep: str = "") -> str:
-    """`text` with `?` for what a terminal would obey or not show, but for the letters of `keep`.
+    """`text` with `?` for characters that a terminal obeys or cannot show, except those of `keep`.
 
-    That is control characters, those that turn the direction of writing, lone surrogates and what
-    has no meaning; a space of any width becomes a space.
+    These are control characters, changes of the writing direction, lone surrogates and unassigned
+    characters. A space of any width becomes a plain space.
     """
     if text.isprintable():
         return text
     strange = {letter for letter in set(text) if not (letter.isprintable() or letter in keep)}
-    # A long text that has nothing strange is soon through, and would not be letter by letter.
+    # Faster for long texts than a check of each character.
     return (
         text.translate({ord(letter): _instead(letter) for letter in strange}) if strange else text
     )
 
 
 def on_a_page(text: str) -> str:
-    """`text` as a file may hold it that people open: HTML, SVG, CSV. Lines and spaces stay."""
-    if text.replace("\n", "").replace("\t", "").isprintable():  # as most are, however long
+    """`text` made safe for a file such as HTML, SVG, CSV. Line breaks and spaces are kept."""
+    if text.replace("\n", "").replace("\t", "").isprintable():  # fast path of most texts
         return text
     spaces = {letter for letter in set(text) if unicodedata.category(letter) == "Zs"}
     return printable(text, keep="\n\t" + "".join(spaces))
 
 
 def storable(text: object) -> str:
-    """Text from other code as an archive keeps it: on a page, and of bounded length."""
+    """Text from other code for the archive: safe for a page, and of bounded length."""
     plain = on_a_page(text if isinstance(text, str) else f"({type(text).__name__}, no text)")
     return plain if len(plain) <= LONGEST else f"{plain[:LONGEST]}..."
 
 
 def storable_tree(value: object, depth: int = 0) -> Any:
-    """`value` as JSON: other types, and what is too deep, by the name of the type."""
+    """`value` as JSON; other types and deeper levels are replaced by the name of their type."""
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
     if value is None or (isinstance(value, int) and abs(value) < 2**63):
@@ -58,13 +58,13 @@ def storable_tree(value: object, depth: int = 0) -> Any:
 
 
 def json_text(tree: Any) -> str:
-    """Indented JSON in which every letter that is not printable is escaped: nothing is lost."""
+    """Indented JSON without loss: unprintable characters are escaped."""
     text = json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False)
     strange = {letter for letter in set(text) if not letter.isprintable() and letter != "\n"}
     return text.translate({ord(letter): json.dumps(letter)[1:-1] for letter in strange} | _DELETE)
 
 
-_DELETE = {0x7F: "\\u007f"}  # which `json.dumps` takes for a letter
+_DELETE = {0x7F: "\\u007f"}  # `json.dumps` does not escape it
 
 
 def _instead(letter: str) -> str:

@@ -1,9 +1,8 @@
 """Kinds by name, imported on first use.
 
 A new experiment, friction model, compensation method, backend or format is one file in its room,
-or one installed package that names itself under an entry point group such as
-`campaign.experiments`. A package that cannot be used is named with what is wrong with it by whoever
-asks for its kind, and harms nobody else.
+or one installed package with an entry point in a group such as `campaign.experiments`. An unusable
+package causes an error only when its kind is requested; the error names the package and the defect.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from campaign.options import Options
 
 
 class Kind(Protocol):
-    """What all kinds have in common; most have `options`, too."""
+    """Common interface of all kinds; most also have `options`."""
 
     @property
     def name(self) -> str: ...
@@ -35,10 +34,9 @@ K = TypeVar("K", bound=Kind)
 
 
 class Kinds(Mapping[str, K]):
-    """The kinds of one room. Names cost no import; `kinds[name]` imports that one kind.
+    """The kinds of one room. Names need no import; `kinds[name]` imports that kind.
 
-    Raises KeyError for a name that nobody has, and UsageError, which names the package, for one
-    that cannot be used.
+    Raises KeyError for an unknown name, and UsageError with the package's name for an unusable one.
     """
 
     def __init__(
@@ -47,11 +45,11 @@ class Kinds(Mapping[str, K]):
         """Nothing is read yet.
 
         Args:
-            room: what a kind is called, e.g. "friction model".
-            package: the room; its modules that have `attribute` are the program's own kinds, and
-                its folders with a module of that name.
-            interface: the class of a kind.
-            tag: the option that names the kind in a file, where one does.
+            room: name of a kind, e.g. "friction model".
+            package: package of the room; the program's own kinds are its modules that assign
+                `attribute`, and its folders with a module of that name.
+            interface: class of a kind.
+            tag: option that names the kind in a file, if any.
         """
         self.room = room
         self.group = GROUPS[room]
@@ -90,18 +88,18 @@ class Kinds(Mapping[str, K]):
         return name in self._own or name in self._installed or name in self._loaded
 
     def plug_in(self, name: str) -> PlugIn | None:
-        """The installed package's entry that a kind comes from; None for the program's own."""
+        """Entry of the installed package that provides a kind; None for the program's own."""
         if name in self._own or name not in self._installed:
             return None
         return self._installed[name][0]
 
     @property
     def plug_ins(self) -> tuple[str, ...]:
-        """The names of all kinds that come from installed packages."""
+        """Names of all kinds from installed packages."""
         return tuple(name for name in self if self.plug_in(name) is not None)
 
     def described(self) -> Iterator[tuple[str, K | str]]:
-        """Every name, with its kind or with why it cannot be used. Imports all of them."""
+        """Every name with its kind, or with the reason why it is unusable. Imports all kinds."""
         for name in self:
             try:
                 yield name, self[name]
@@ -113,7 +111,7 @@ class Kinds(Mapping[str, K]):
 
     @contextmanager
     def including(self, kind: K) -> Iterator[None]:
-        """For tests: within the block, `kind` is there as if a package had brought it."""
+        """For tests: register `kind` within the block, as if a package provided it."""
         before = self._loaded.get(kind.name)
         self._loaded[kind.name] = kind
         try:
@@ -125,24 +123,24 @@ class Kinds(Mapping[str, K]):
 
     @cached_property
     def _own(self) -> dict[str, str]:
-        """Module by name of the program's own kinds, as their sources say it."""
-        found = {}
+        """Modules of the program's own kinds by name, from their sources."""
+        modules = {}
         for each in pkgutil.iter_modules(importlib.import_module(self._package).__path__):
             module = f"{self._package}.{each.name}"
-            if each.ispkg:  # a folder for one kind has it in a file of its own
+            if each.ispkg:  # a folder for one kind assigns it in a file with this name
                 module = f"{module}.{self._attribute.lower()}"
             name = _declared_name(_source(module), self._attribute)
             if name:
-                found[name] = module
-        return found
+                modules[name] = module
+        return modules
 
     @cached_property
     def _installed(self) -> dict[str, list[PlugIn]]:
-        found: dict[str, list[PlugIn]] = {}
+        entries: dict[str, list[PlugIn]] = {}
         for plug_in in installed().plug_ins:
             if plug_in.group == self.group:
-                found.setdefault(plug_in.name, []).append(plug_in)
-        return found
+                entries.setdefault(plug_in.name, []).append(plug_in)
+        return entries
 
     def _load(self, name: str) -> K:
         plug_in, *others = self._installed[name]
@@ -155,7 +153,7 @@ class Kinds(Mapping[str, K]):
             kind: Any = plug_in.load()
         except KeyboardInterrupt:
             raise
-        except BaseException as error:  # a package may leave with SystemExit, too
+        except BaseException as error:  # a package may also raise SystemExit
             raise UsageError(self._is_unusable(plug_in, one_line(error))) from error
         why = self._why_not(kind, name)
         if why:
@@ -164,7 +162,7 @@ class Kinds(Mapping[str, K]):
         return usable
 
     def _why_not(self, kind: Any, name: str) -> str:
-        """What it lacks of a kind of that name; empty when it is one."""
+        """Why `kind` is no valid kind of that name; empty if it is valid."""
         wanted = self._interface.__name__
         if not isinstance(kind, self._interface):
             return f"it is {type(kind).__name__!r}, no {wanted} of this program"
@@ -199,11 +197,11 @@ ENDED = {
     "campaign.identification_methods": "what identifies is an experiment with a `model`, in the "
     "group campaign.experiments",
 }
-"""Groups that there were, and what to do instead."""
+"""Former groups, and their replacements."""
 
 
 def stray_entries() -> Iterator[str]:
-    """A line about each package that cannot be read, or that names a group there is none of."""
+    """A line about each unreadable package and each entry in an unknown group."""
     yield from installed().unreadable
     for plug_in in installed().plug_ins:
         if plug_in.group in ENDED:
@@ -214,14 +212,14 @@ def stray_entries() -> Iterator[str]:
 
 
 def _source(module: str) -> str:
-    """The text of a module that need not be imported for it."""
+    """Source text of a module, without importing it."""
     spec = importlib.util.find_spec(module)
     loader: Any = spec.loader if spec is not None else None
     return "" if loader is None else loader.get_source(module) or ""
 
 
 def _declared_name(source: str, attribute: str) -> str:
-    """The name in `ATTRIBUTE = Class("name", ...)` or `Class(name="name", ...)`; empty without."""
+    """Name in `ATTRIBUTE = Class("name", ...)` or `Class(name="name", ...)`; empty if absent."""
     start = source.find(f"\n{attribute} = ")
     if start < 0:
         return ""

@@ -1,7 +1,7 @@
 """Run policy: faults, cool-down, kept samples.
 
-The protocol writes a policy (`[faults]`, `[rest]`, `keep`), the runner follows it, the archive
-keeps every decision it led to.
+The protocol states a policy (`[faults]`, `[rest]`, `keep`), the runner applies it, and the archive
+keeps each resulting decision.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ Occasion = Literal[
     "lost-connection", "lost-samples", "heartbeat", "reset", "over-temperature", "limit-switch",
     "sensor", "drive", "refused", "recording", "other",
 ]  # fmt: skip
-"""A fault, a limit of the bench met in motion, a divergence, or `default` for all unnamed ones."""
+"""A fault, a reached limit of the bench, a divergence, or `default` for all others."""
 
 
 Keep = Literal["all", "none", "failed", "extremes"] | Annotated[int, Strict(), Field(ge=1)]
-"""Trials whose samples are archived: a word, or how many of each test, from the first."""
+"""Trials whose samples are archived: a word, or the number of first trials of each test."""
 NotKept = Callable[[Ending], str]
-"""Why the samples of a trial that ended so are not archived; empty when they are."""
+"""Returns why the samples of a trial with this ending are not archived; empty if they are."""
 
 
 class Policy(Options):
@@ -74,7 +74,7 @@ class Policy(Options):
     keep: Keep = "all"
 
     def response(self, ending: Ending) -> Response:
-        """What to do about a trial that ended so, in any way but completed or interrupted."""
+        """Response to the ending of a trial that neither completed nor was interrupted."""
         occasion = str(ending.fault or Fault.OTHER)
         if ending.outcome in (Outcome.LIMIT, Outcome.DIVERGED):
             occasion = str(ending.outcome)
@@ -86,10 +86,10 @@ class Policy(Options):
 
 @dataclass(frozen=True)
 class SampleRetention:
-    """Which attempts of a run keep their samples; of the others record and metrics are archived.
+    """Rule for archived samples; attempts without samples keep their record and metrics.
 
     Attributes:
-        first: numbers of the trials that `keep` counts, where it is a number.
+        first: numbers of the trials with samples, if `keep` is a number.
     """
 
     keep: Keep = "all"
@@ -97,7 +97,7 @@ class SampleRetention:
 
     @classmethod
     def of(cls, keep: Keep, trials: Iterable[Trial]) -> Self:
-        """For the trials of a plan."""
+        """The rule for the trials of a plan."""
         if not isinstance(keep, int):
             return cls(keep)
         counts: Counter[str] = Counter()
@@ -109,10 +109,10 @@ class SampleRetention:
         return cls(keep, frozenset(first))
 
     def rule(self, trial: Trial, attempt: int) -> NotKept | None:
-        """None where the samples are kept however the trial ends."""
-        # Extremes are known when all trials have ended: they are executed a second time.
+        """Function for the ending of an attempt; None if its samples are kept in any case."""
+        # Extremes are known after all trials: they are executed a second time.
         again = self.keep == "extremes" and attempt > 1
-        check = trial.role is Role.CHECK  # its samples say whether the bench has drifted
+        check = trial.role is Role.CHECK  # its samples show a drift of the bench
         if self.keep == "all" or again or check or trial.number in self.first:
             return None
         return self._not_kept

@@ -1,4 +1,4 @@
-"""Worker processes: their start, and their end with the parent."""
+"""Worker processes: start, and end with the parent."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_met
 
 
 def process_context(preload: Iterable[str]) -> BaseContext:
-    """The context that starts workers. `preload`: modules imported once for all of them."""
+    """Multiprocessing context of the workers. `preload`: modules imported once for all of them."""
     context = multiprocessing.get_context(START_METHOD)
     context.set_forkserver_preload(list(preload))
     return context
@@ -37,7 +37,7 @@ def start_preloading(preload: Iterable[str]) -> None:
     from multiprocessing import forkserver, resource_tracker  # not on Windows
 
     before = os.environ.get("PYTHONWARNINGS")
-    # A program that exits at once leaves semaphores. The tracker removes them; no user need know.
+    # A program that exits early leaves semaphores. The tracker removes them; suppress its warning.
     os.environ["PYTHONWARNINGS"] = "ignore:resource_tracker"
     try:
         resource_tracker.ensure_running()
@@ -51,10 +51,10 @@ def start_preloading(preload: Iterable[str]) -> None:
 def new_pool(
     count: int, context: BaseContext, initializer: Callable[..., object], arguments: tuple[Any, ...]
 ) -> ProcessPoolExecutor:
-    """A pool whose processes all start with the first call.
+    """Pool whose processes all start with the first call.
 
-    One that starts while another dies upsets the pool: CPython 3.11 raises `OSError: handle is
-    closed`, or a thread of the pool ends, and its futures are never told.
+    A process start during the death of another breaks the pool: CPython 3.11 raises `OSError:
+    handle is closed`, or a thread of the pool ends and its futures never complete.
     """
     pool = ProcessPoolExecutor(count, context, initializer, arguments)
     pool._safe_to_dynamically_spawn_children = False  # type: ignore[attr-defined]  # noqa: SLF001
@@ -65,7 +65,7 @@ def new_pool(
 def process_pool(
     count: int, preload: Iterable[str], begin: Callable[[Any], object], told: object
 ) -> Iterator[ProcessPoolExecutor]:
-    """Processes that have called `begin(told)`; when the block is left early, they are ended."""
+    """Pool whose processes have called `begin(told)`; an exception in the block ends them."""
     start_preloading(preload)
     others = set(multiprocessing.active_children())
     # Pickled once for all of them.
@@ -73,7 +73,7 @@ def process_pool(
     pool = new_pool(count, process_context(preload), _begin, (handed,))
     try:
         yield pool
-    except BaseException:  # Ctrl-C: nobody waits for what nobody wants
+    except BaseException:  # e.g. Ctrl-C: do not wait for unneeded results
         for process in set(multiprocessing.active_children()) - others:
             process.terminate()
         raise
@@ -83,12 +83,12 @@ def process_pool(
 
 def _begin(handed: bytes) -> None:
     initialize_worker()
-    begin, told = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
-    begin(told)
+    begin, argument = pickle.loads(handed)  # noqa: S301 (from the process that began this one)
+    begin(argument)
 
 
 def initialize_worker() -> None:
-    """First call in a worker: it ignores Ctrl-C and exits with its parent."""
+    """Set up a worker process: it ignores Ctrl-C and exits with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise_gc_threshold()
     keep_freed_memory()
@@ -97,14 +97,14 @@ def initialize_worker() -> None:
 
 
 def keep_freed_memory() -> None:
-    """Do not return memory of arrays to the system: the next trial needs as much.
+    """Keep freed memory of arrays in the process: the next trial needs as much.
 
-    Returned and taken again, each page is zeroed: a tenth of the processor time of a trial without
-    samples. For the GNU C library; elsewhere nothing changes.
+    Otherwise the system zeroes each page again: a tenth of the processor time of a trial without
+    samples. Only for the GNU C library.
     """
     with contextlib.suppress(AttributeError, TypeError):
         mallopt = ctypes.CDLL(None).mallopt
-        mallopt(_MMAP_THRESHOLD, 1 << 25)  # no more is allowed everywhere
+        mallopt(_MMAP_THRESHOLD, 1 << 25)  # largest value allowed on all platforms
         mallopt(_TRIM_THRESHOLD, 1 << 30)
 
 
@@ -112,7 +112,7 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # malloc.h; bytes
 
 
 def _exit_with_parent() -> None:
-    """A pool's worker would otherwise wait for its next task for ever."""
+    """Exit with the parent; otherwise the worker would wait forever for its next task."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

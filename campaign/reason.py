@@ -1,6 +1,6 @@
-"""Why a number has no interval, is not determined, or was left out: codes with named values.
+"""Reasons for a missing interval, an undetermined number, or an exclusion: codes with named values.
 
-Logic compares codes; a reader is shown the text.
+Logic compares codes; the page shows the text.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ Named = tuple[tuple[str, float | int | str | bool | None], ...]
 
 @dataclass(frozen=True)
 class Reason:
-    """One reason; false where there is none.
+    """One reason; an empty reason is false.
 
     Attributes:
-        code: which one, e.g. `too few samples`; `text` for one that an older archive has in words.
-        text: the same in English, with its values.
-        values: what the text has in it, by name (SI, or a percentage called so).
+        code: e.g. `too few samples`; `text` for a reason from an older archive with a text only.
+        text: the reason in English, with its values.
+        values: values in the text by name (SI, or a percentage named `percent`).
     """
 
     code: str = ""
@@ -31,7 +31,7 @@ class Reason:
     @model_validator(mode="before")
     @classmethod
     def _of_an_older_archive(cls, given: Any) -> Any:
-        """Formerly a reason was its text."""
+        """Convert a reason of an older archive, which is a text."""
         return {"code": OLDER if given else "", "text": given} if isinstance(given, str) else given
 
     def __bool__(self) -> bool:
@@ -41,7 +41,7 @@ class Reason:
         return self.text
 
     def columns(self) -> dict[str, object]:
-        """As tables and JSON have it: the text, the code, and the values by name."""
+        """Columns of tables and JSON: the text, the code, and the values by name."""
         return {
             "reason": self.text, "reason_code": self.code, "reason_values": dict(self.values)
         }  # fmt: skip
@@ -49,15 +49,15 @@ class Reason:
 
 NONE = Reason()
 OLDER = "text"
-"""Code of a reason that an older archive has in words."""
+"""Code of a reason from an older archive with a text only."""
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A kind of reason, declared once, where it is raised.
+    """A kind of reason, declared once by the code that states it.
 
-    Called with its values it is a `Reason`: `TOO_FEW(samples=5, batches=10)`. `{names}` in `text`
-    are replaced by them, formatted as `str.format` does.
+    A call with values returns a `Reason`: `TOO_FEW(samples=5, batches=10)`. `str.format` replaces
+    `{names}` in `text` by them.
     """
 
     code: str
@@ -68,12 +68,12 @@ class Cause:
         return Reason(self.code, text, tuple((name, _plain(it)) for name, it in values.items()))
 
     def __contains__(self, reason: Reason) -> bool:
-        """Whether a reason is of this kind; one of an older archive is known by its text."""
+        """Whether a reason is of this kind; for an older archive the text is compared."""
         return reason.code == self.code or (reason.code == OLDER and reason.text == self.text)
 
 
 def _plain(value: Any) -> float | int | str | bool | None:
-    """As an archive has it: a reason within a reason by its code, no number that is not finite."""
+    """Archived form of a value: the code of a nested reason; None for infinite numbers and NaN."""
     if isinstance(value, Reason):
         return value.code
     value = getattr(value, "item", lambda: value)()

@@ -1,6 +1,6 @@
-"""What comes back from a trial: Recording, Channel, Event, Ending, and what takes samples.
+"""Data of an executed trial: Recording, Channel, Event, Ending, and recorders of samples.
 
-It knows neither what was asked (`campaign.trial`), nor how samples are made or kept.
+Independent of the requested motion (`campaign.trial`), of simulation, and of storage.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ Array = NDArray[np.float64]
 class Outcome(StrEnum):
     """How a trial ended."""
 
-    COMPLETED = "completed"  # it ran to its end; its recording is whole
+    COMPLETED = "completed"  # executed to its end; its recording is complete
     LIMIT = "limit"  # a measured limit of the bench ended it
     DIVERGED = "diverged"  # a channel became infinite or undefined
     FAULT = "fault"  # the backend or the bench failed
-    INTERRUPTED = "interrupted"  # somebody stopped it
+    INTERRUPTED = "interrupted"  # stopped on request
 
     @property
     def failed(self) -> bool:
-        """Whether the trial did not complete although nobody stopped it."""
+        """Whether the trial did not complete, without a stop request."""
         return self not in (Outcome.COMPLETED, Outcome.INTERRUPTED)
 
 
 class Fault(StrEnum):
-    """What failed, in the words by which a protocol's `[faults]` chooses what to do about it."""
+    """Kind of a fault; a protocol's `[faults]` uses these names to select the response."""
 
-    LOST_CONNECTION = "lost-connection"  # no word from the bench
-    LOST_SAMPLES = "lost-samples"  # some could not be had again; they are marked
-    HEARTBEAT = "heartbeat"  # the bench stopped because it no longer heard the host
-    RESET = "reset"  # the controller started anew in mid-trial
+    LOST_CONNECTION = "lost-connection"  # no answer from the bench
+    LOST_SAMPLES = "lost-samples"  # some samples could not be recovered; they are marked
+    HEARTBEAT = "heartbeat"  # the bench stopped because it received no sign of life from the host
+    RESET = "reset"  # the controller restarted during the trial
     OVER_TEMPERATURE = "over-temperature"
     LIMIT_SWITCH = "limit-switch"
-    SENSOR = "sensor"  # a sensor is stuck or out of its range
-    DRIVE = "drive"  # the drive reports a fault of its own
-    REFUSED = "refused"  # the bench would not arm
-    RECORDING = "recording"  # what the backend recorded is not what it promised
+    SENSOR = "sensor"  # a sensor is stuck or out of range
+    DRIVE = "drive"  # the drive reports a fault
+    REFUSED = "refused"  # the bench refused to arm
+    RECORDING = "recording"  # the recording violates a condition of the trial
     OTHER = "other"
 
 
 class SafeState(StrEnum):
-    """Whether the bench was seen at rest with its drive off after a trial."""
+    """Whether the bench is confirmed at rest with its drive off after a trial."""
 
     CONFIRMED = "confirmed"
     NOT_CONFIRMED = "not confirmed"
@@ -57,12 +57,12 @@ class SafeState(StrEnum):
 
 @dataclass(frozen=True)
 class PanicStop:
-    """Somebody switched the bench off from outside; it stays off until a person clears that.
+    """A stop of the bench from outside the program; the bench stays off until a person clears it.
 
     Attributes:
-        count: of the stop, told by the bench; who clears it says which one was seen.
-        by: who it was, as far as that was told.
-        age: time since then (s); None when the bench does not know.
+        count: number of the stop, from the bench; clearing a stop requires this number.
+        by: source of the stop, as reported.
+        age: time since the stop (s); None if unknown to the bench.
     """
 
     count: int
@@ -75,15 +75,15 @@ class PanicStop:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a trial ended and why.
+    """Outcome of a trial and its cause.
 
     Attributes:
         outcome: see `Outcome`.
-        reason: empty when completed; else what happened, with the value and the limit.
-        safe_state: whether the bench is known to be safe afterwards.
-        fault: what failed, when the outcome is a fault.
-        telemetry: what the backend measured of its own work (latency, buffer fill, resends ...),
-            JSON-like, units in the names; nothing that an analysis needs.
+        reason: empty if completed; else the cause, with the value and the limit.
+        safe_state: whether the safe state is confirmed afterwards.
+        fault: kind of the fault, if the outcome is a fault.
+        telemetry: the backend's measurements of its own work (latency, buffer fill, resends ...),
+            JSON-like, units in the names; not used by analyses.
     """
 
     outcome: Outcome
@@ -95,7 +95,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened during a trial, at its own time (s)."""
+    """An event of a trial; `time` in s from the trial's start."""
 
     time: float
     text: str
@@ -103,13 +103,13 @@ class Event:
 
 @dataclass(frozen=True)
 class Channel:
-    """One recorded quantity: `unit` is SI, `display_unit` what a reader is shown.
+    """One recorded quantity; `unit` is SI, `display_unit` is for output.
 
     Attributes:
         samples: shape (n,), float64.
-        measured: False for what only a simulator can know (the true friction torque).
-        own_rate: how often the value is new (Hz), where that is not with every sample; between,
-            it is held: `campaign.channels`.
+        measured: False for a quantity that only a simulation provides (the true friction torque).
+        own_rate: update rate of the value (Hz), if lower than the sample rate; in between the value
+            is held: `campaign.channels`.
     """
 
     name: str
@@ -122,7 +122,7 @@ class Channel:
 
     @property
     def info(self) -> ChannelInfo:
-        """All of it but the samples."""
+        """The channel without its samples."""
         return ChannelInfo(
             self.name, self.unit, self.label, self.display_unit, self.measured, self.own_rate
         )
@@ -130,9 +130,9 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelInfo:
-    """A channel before it has samples: what a backend announces when a trial starts.
+    """A channel without samples, as a backend announces it at the start of a trial.
 
-    `campaign.channels.info` makes it for the names that analyses know.
+    `campaign.channels.info` creates it for the names of the vocabulary.
     """
 
     name: str
@@ -144,7 +144,7 @@ class ChannelInfo:
 
     @property
     def long_name(self) -> str:
-        """What stands at an axis: label and unit."""
+        """Label and unit, e.g. for an axis of a figure."""
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def with_samples(self, samples: Array) -> Channel:
@@ -161,11 +161,11 @@ class ChannelInfo:
 
 @dataclass(frozen=True)
 class Recording:
-    """What came back from one trial: channels on one time base, events and how it ended.
+    """Recording of one trial: channels on one time base, events and the ending.
 
     Attributes:
         time: shape (n,), s, float64, from the trial's start.
-        channels: by name; each as long as `time`.
+        channels: channels by name; each with n samples.
     """
 
     time: Array
@@ -174,14 +174,14 @@ class Recording:
     ending: Ending = field(default_factory=lambda: Ending(Outcome.COMPLETED))
 
     def __getitem__(self, name: str) -> Array:
-        """Samples of a channel, SI, shape (n,); KeyError naming what there is."""
+        """Samples of a channel, SI, shape (n,). Raises KeyError that lists the channels."""
         try:
             return self.channels[name].samples
         except KeyError:
             raise KeyError(f"no channel {name!r}; there are {', '.join(self.channels)}") from None
 
     def window(self, start: float, stop: float) -> Recording:
-        """The part with start <= time < stop (s), half a sample tolerant."""
+        """The part with start <= time < stop (s), with a tolerance of half a sample."""
         if len(self.time) < 2:
             return self
         half = 0.5 * (self.time[1] - self.time[0])
@@ -191,7 +191,7 @@ class Recording:
 
 
 class _Cut(Mapping[str, Channel]):
-    """A part of each channel, which an archive reads when it is asked for."""
+    """A part of each channel; an archive reads it on access."""
 
     def __init__(self, whole: Mapping[str, Channel], cut: slice) -> None:
         self._whole = whole
@@ -212,7 +212,7 @@ class _Cut(Mapping[str, Channel]):
 
 
 class Recorder(Protocol):
-    """Where a backend puts samples as they come: an archive's trial file, or memory."""
+    """Receiver of a backend's samples: an archive's trial file, or memory."""
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
         """Announce the channels, once, before the first block."""
@@ -221,14 +221,14 @@ class Recorder(Protocol):
         """Add samples: `time` (n,) in s, `block` (channels, n) in the announced order and units."""
 
     def lost(self, time: Array) -> None:
-        """Add samples that could not be had: NaN in every channel at `time` (n,), and an event."""
+        """Add lost samples: NaN in every channel at `time` (n,), and an event."""
 
     def event(self, event: Event) -> None:
-        """Note something that happened."""
+        """Add an event."""
 
 
 class MemoryRecorder:
-    """A Recorder that keeps everything, for tests and for work without an archive."""
+    """Recorder that keeps everything in memory, for tests and for work without an archive."""
 
     def __init__(self) -> None:
         self._channels: tuple[ChannelInfo, ...] = ()
@@ -252,7 +252,7 @@ class MemoryRecorder:
         self._events.append(event)
 
     def recording(self, ending: Ending) -> Recording:
-        """Everything recorded, once the trial has ended."""
+        """The recording, after the end of the trial."""
         time = np.concatenate(self._times) if self._times else np.empty(0)
         samples = (
             np.concatenate(self._blocks, axis=1)
@@ -267,6 +267,6 @@ class MemoryRecorder:
 
 
 def lost_samples(first: int, time: Array) -> Event:
-    """The event that marks lost samples: number `first` of the trial, from 0, and following."""
+    """Event that marks lost samples; `first` is the number of the first one, from 0."""
     last = first + len(time) - 1
     return Event(float(time[0]), f"samples {first} to {last} were lost and are NaN")

@@ -1,7 +1,7 @@
 """Locations of shipped protocols, benches and templates.
 
-In a wheel they lie beside the code, under `campaign/_shipped`; in a checkout they are the
-top-level folders. Nothing is ever looked up in the working directory: a template is code.
+A wheel contains them under `campaign/_shipped`; in a checkout they are top-level folders. The
+working directory is never searched: a template is code.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def templates_folder() -> Path:
 
 
 def shipped_protocols() -> tuple[str, ...]:
-    """Names of the shipped protocols, sorted: what `campaign run NAME` accepts without a file."""
+    """Names of the shipped protocols for `campaign run NAME`, sorted."""
     return tuple(sorted(path.stem for path in protocols_folder().glob("*.toml")))
 
 
 def shipped_protocol(name: str) -> Path | None:
-    """The shipped protocol of that bare name (`quickstart`), or None."""
+    """Path of the shipped protocol with this bare name (`quickstart`), or None."""
     return protocols_folder() / f"{name}.toml" if name in shipped_protocols() else None
 
 
@@ -40,10 +40,10 @@ def shipped_benches() -> tuple[str, ...]:
 
 
 def copy_shipped(destination: Path) -> tuple[Path, ...]:
-    """Copy protocols, benches and templates into `destination` and return what was written.
+    """Copy protocols, benches and templates into `destination`; paths of the written files.
 
-    Raises UsageError, before anything is written, when a file would be overwritten; and when the
-    folder cannot be written.
+    Raises UsageError if a file would be overwritten (before writing any), or if the folder is not
+    writable.
     """
     copies = {
         source: destination / source.relative_to(_shipped_root())

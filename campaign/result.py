@@ -1,7 +1,7 @@
 """Results of an analysis as data: tables, figures, findings.
 
-Experiments make these; the report draws them. Values are SI with their unit beside them; `display`
-is the unit a reader is shown, and the report converts. Nothing here knows HTML or matplotlib.
+Experiments create them; the report draws them. Values are SI with their unit; the report converts
+them to the unit `display`. This module is independent of HTML and matplotlib.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ NO_INTERVAL = Cause("no interval given", "the analysis gives no interval")
 
 Value = float | int | str | bool | None
 Cell = Value | Estimate
-"""What stands in a cell of a table: an estimate where it is a number that was found."""
+"""Content of a table cell: an estimate if it is an estimated number."""
 Style = Literal["line", "points", "line+points", "band", "thin", "loop"]
 
 TOLERANCE = 1e-3
-"""How far two numbers of a condition may lie apart, as a share of the larger."""
+"""Relative tolerance for equal numbers of a condition, relative to the larger."""
 NOTHING = 1e-9
-"""What of a condition (SI) counts as 0: a position of 1e-17 rad is the position 0."""
+"""Absolute tolerance for equal numbers of a condition (SI): 1e-17 rad equals 0."""
 
 
 def same_value(one: Value, other: Value) -> bool:
-    """Whether two values of a condition are the same: numbers within `TOLERANCE`, words exactly."""
+    """Whether two values of a condition are equal: numbers within `TOLERANCE`, words exactly."""
     if isinstance(one, bool) or isinstance(other, bool):
         return one is other
     if isinstance(one, int | float) and isinstance(other, int | float):
@@ -45,17 +45,17 @@ def same_value(one: Value, other: Value) -> bool:
 
 @dataclass(frozen=True)
 class Finding:
-    """One number an analysis found, under which conditions: what the scoreboard matches.
+    """One number of an analysis, with its conditions; matched to published cells by them.
 
     Attributes:
-        quantity: what it is, e.g. `stabilization_error` (a published table names the same word).
-        value: SI, in `unit`; NaN when the analysis could not find it.
+        quantity: e.g. `stabilization_error` (a published table uses the same name).
+        value: SI, in `unit`; NaN if the analysis could not determine it.
         conditions: e.g. {"compensation": "lugre", "frequency": 0.24, "acceleration": 0.314159};
-            numbers SI. Every condition a published cell states must be met here.
+            numbers SI. They must meet every condition of a published cell.
         recomputed: derived from other published cells rather than from a recording.
-        lower_bound: the true value is at least this; it answers only a claim of "at least".
-        estimate: the same number with its interval, or with the reason why it has none; None for
-            an analysis that does not say.
+        lower_bound: the true value is at least this; comparable only to a claim of "at least".
+        estimate: the same number with its interval, or the reason for no interval; None if the
+            analysis gives none.
     """
 
     quantity: str
@@ -70,7 +70,7 @@ class Finding:
     def of(
         cls, estimate: Estimate, conditions: Mapping[str, Value], *, recomputed: bool = False
     ) -> Self:
-        """What an estimate says, under its conditions; a bound of "at least" is told as one."""
+        """Finding from an estimate and its conditions; "at least" becomes a lower bound."""
         return cls(
             estimate.name,
             estimate.value,
@@ -83,7 +83,7 @@ class Finding:
 
     @property
     def known(self) -> Estimate:
-        """The number with its interval or a reason, whatever the analysis said of it."""
+        """Estimate with an interval or a reason, also if the analysis gives none."""
         if self.estimate is not None:
             return replace(self.estimate, name=self.quantity)
         kind: Literal["at least", "number"] = "at least" if self.lower_bound else "number"
@@ -106,7 +106,7 @@ class Finding:
 
 
 def bare(cell: Cell) -> Value:
-    """The value in a cell, without its interval; None for an estimate that is not determined."""
+    """Value of a cell without interval; None for an estimate that is not determined."""
     if isinstance(cell, Estimate):
         return None if math.isnan(cell.value) else cell.value
     return cell
@@ -116,18 +116,17 @@ def bare(cell: Cell) -> Value:
 class Column:
     """A column of a table.
 
-    Its numbers are estimates, or it is `exact`, or `reason` says why they have no interval.
+    Its numbers are estimates, or it is `exact`, or `reason` states why they have no interval.
 
     Attributes:
-        unit: of its values (SI).
+        unit: SI unit of its values.
         display: unit of the page, "" for the same.
-        exact: what it holds was set, or counted: it has no interval because it is not uncertain.
+        exact: its values were set or counted: they have no uncertainty, so no interval.
         reason: why the numbers of this column have no interval.
-        quantity: which finding each number is, where it is one, under the conditions that its row
-            has by their names; published values of it then stand beside it.
-        decimals: digits after the point that the page shows at least, of numbers that were printed
-            with so many.
-        file_only: the page leaves it to the CSV file: a standard error, where it shows intervals.
+        quantity: quantity of the finding in each cell, if any; the row's columns give its
+            conditions by name. The page then shows published values beside it.
+        decimals: minimum number of decimals on the page, for numbers printed with so many.
+        file_only: whether only the CSV file has the column, e.g. a standard error.
     """
 
     name: str
@@ -148,7 +147,7 @@ class Table:
     Attributes:
         key: unique within its test, e.g. `stabilization-error`; lower case, digits and hyphens.
         rows: one mapping per row, column name to value or to estimate.
-        thesis: numbers of the published tables it stands for, e.g. ("5.2", "5.8"); may be empty.
+        thesis: numbers of the corresponding published tables, e.g. ("5.2", "5.8"); may be empty.
     """
 
     key: str
@@ -164,8 +163,8 @@ class Axis:
     """An axis: label without unit, `unit` of the data (SI), `display` unit on the page.
 
     Attributes:
-        limits: in `unit`; an end that is not finite follows from what is drawn.
-        places: names along the axis in place of numbers, each with where it stands (in `unit`).
+        limits: in `unit`; an infinite end or NaN follows from the data.
+        places: (position in `unit`, name) of tick labels that replace numbers.
     """
 
     label: str
@@ -178,25 +177,24 @@ class Axis:
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve of a panel; a `loop` is a line with arrows that show which way it runs.
+    """One curve of a panel; a `loop` is a line with arrows in its direction.
 
     Attributes:
         x, y: shape (n,), in the units of the panel's axes.
-        series: what it stands for; the same series has the same colour and dash everywhere
+        series: meaning of the curve; the same series has the same color and dash everywhere
             (`none`, `static`, `lugre`, `observer`, `measured`, `fit`, `reference`, or any text).
         y_low: for `band`: the lower edge, shape (n,); `y` is then the upper one.
-        low, high: 95 % interval of `y`, shape (n,), NaN where there is none: bars on points, a band
-            behind a line. Where an end is infinite, `y` is a bound, and an arrow goes that way.
-        quantity: which finding each `y` is, where it is one; published values of it are then drawn
+        low, high: 95 % interval of `y`, shape (n,), NaN for none: bars on points, a band behind a
+            line. At an infinite end `y` is a bound, drawn with an arrow in that direction.
+        quantity: quantity of the finding in each `y`, if any; its published values are drawn
             beside the curve, as hollow marks.
-        along: the condition of that finding that runs along x, by its name.
+        along: name of the finding's condition along x.
         conditions: the finding's other conditions (SI).
-        law: what gives a fitted `y`, a function of x (n,) and of parameters by name; a published
-            set of them is then drawn as a curve of its own. A function of a module, so that a
-            figure can go from one process to another.
-        parameters: units (SI) of the law's parameters, by the quantities that they are.
-        aside: how far to the right of `x` (in its unit) the curve is drawn, with what is published
-            of it, where it would else lie on another; a drawing alone knows it, `x` stays true.
+        law: fitted `y` as a function of x (n,) and of parameters by name; a published parameter set
+            is drawn as a separate curve. A function at module level, so that it can be pickled.
+        parameters: units (SI) of the law's parameters, by quantity.
+        aside: offset to the right (in the unit of `x`) at which the curve and its published values
+            are drawn, to separate it from another curve; `x` itself is unchanged.
     """
 
     x: Array
@@ -224,9 +222,9 @@ class Curve:
         style: Style = "points",
         **more: Any,
     ) -> Self:
-        """Estimates over `x`, shape (n,), with their intervals (systematic parts included).
+        """Curve of estimates over `x`, shape (n,), with intervals (systematic parts included).
 
-        Those that are bounds have arrows. more: further attributes.
+        Bounds have arrows. more: further attributes.
         """
         low, high = np.array([ends_of(each) for each in found], dtype=float).reshape(-1, 2).T
         y = np.array([each.value for each in found], dtype=float)
@@ -234,10 +232,7 @@ class Curve:
 
 
 def ends_of(estimate: Estimate) -> tuple[float, float]:
-    """Low and high for a curve, systematic parts included: NaN where there is none.
-
-    The open side of a bound is infinite.
-    """
+    """Low and high for a curve, systematic parts included: NaN for none, infinite for a bound."""
     low, high = (math.nan if end is None else end for end in estimate.combined)
     if estimate.kind == "at least":
         return low, math.inf
@@ -246,13 +241,13 @@ def ends_of(estimate: Estimate) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Mark:
-    """A labelled position in a panel, in axis units: a line across it, a point, or a stretch.
+    """A labelled position in a panel, in axis units: a line across it, a point, or an interval.
 
     Attributes:
-        x, y: where a vertical or a horizontal line lies; both for a point (`point`).
+        x, y: position of a vertical or a horizontal line; both for a point (`point`).
         point: a dot at (x, y) with the label beside it instead of lines.
-        until: end of a shaded stretch that begins at the one of `x` and `y` that is given.
-        series: whose colour it has; "" is nobody's.
+        until: end of a shaded interval that begins at `x` or `y`, whichever is given.
+        series: series whose color it has; "" for a neutral color.
     """
 
     label: str
@@ -280,12 +275,12 @@ class Figure:
 
     Attributes:
         key: unique within its test, lower case, digits and hyphens.
-        caption: what to see in it, in a sentence or two.
-        alt: what the figure shows, for who cannot see it.
-        thesis: numbers of the published figures it stands for, e.g. ("5.4",).
-        across: panels side by side; further ones go below.
-        trials: numbers of the trials that it shows; empty for all measurements of its test.
-        one_scale: panels whose y axes are alike share their limits, so that they can be compared.
+        caption: content of the figure in one or two sentences.
+        alt: text alternative for readers who cannot see it.
+        thesis: numbers of the corresponding published figures, e.g. ("5.4",).
+        across: number of panels side by side; further panels are below.
+        trials: numbers of the shown trials; empty for all measurements of its test.
+        one_scale: whether panels with the same y axis share their limits, for comparison.
     """
 
     key: str
@@ -301,11 +296,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class RecordingDoubt:
-    """What is wrong with the recording of a trial.
+    """A defect of a trial's recording.
 
     Attributes:
         number, label: of the trial.
-        fatal: whether the analysis does without it.
+        fatal: whether the analysis excludes the recording.
     """
 
     number: int
@@ -316,15 +311,14 @@ class RecordingDoubt:
 
 @dataclass(frozen=True)
 class Result:
-    """What one test's analysis found.
+    """Result of the analysis of one test.
 
     Attributes:
-        notes: sentences for the report: caveats, assumptions, what failed and why.
-        key_numbers: what was asked for, the most important first; `findings`, or medians of draws.
-        telling: key of the figure that tells it best; "" for the first.
-        doubts: recordings that something is wrong with; `notes` say the same. Whoever calls an
-            analysis adds them.
-        identified: parameters of the rig, and what they rest on; empty without any.
+        notes: sentences for the report: caveats, assumptions, failures and their causes.
+        key_numbers: main results, the most important first; `findings`, or medians of draws.
+        telling: key of the most informative figure; "" for the first.
+        doubts: defective recordings, added by the caller of the analysis; `notes` state the same.
+        identified: identified parameters of the rig and their basis; may be empty.
     """
 
     tables: tuple[Table, ...] = ()
@@ -338,10 +332,10 @@ class Result:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing but notes."""
+        """Whether it contains only notes."""
         return not (self.figures or self.findings or any(each.rows for each in self.tables))
 
     @property
     def left_out(self) -> tuple[RecordingDoubt, ...]:
-        """Of the trials that it does without."""
+        """Defects of the excluded recordings."""
         return tuple(each for each in self.doubts if each.fatal)

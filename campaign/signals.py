@@ -1,8 +1,8 @@
 """Commands over time as data: rate, torque ramp, base motion.
 
-A signal is a frozen description that every room can read: a protocol writes it, a plan checks its
-extremes, the simulator samples it and a controller receives its parameters. The unit of its value
-is the business of the field that holds it (rad/s, N m ...), so the fields here are bare SI numbers.
+A signal is a frozen description for all rooms: a protocol states it, a plan checks its extremes,
+the simulator samples it and a controller receives its parameters. The field that contains the
+signal defines the unit of its value (rad/s, N m ...); the fields here are plain SI numbers.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ class Polyline(Options):
 
     @cached_property
     def _interpolated(self) -> partial[Array]:
-        """Made once: a simulation samples a long series thousands of times.
+        """Interpolator, created once: a simulation samples a long series thousands of times.
 
-        A function, since polylines are compared by their fields, and arrays have no one answer.
+        A function, since polylines are compared by their fields and array comparison is ambiguous.
         """
         return partial(np.interp, xp=np.asarray(self.times), fp=np.asarray(self.values))
 
     def __copy__(self) -> Self:
-        """Without what was made of the fields, which `model_copy` may change."""
+        """Copy without the interpolator: `model_copy` may change the fields."""
         copied = super().__copy__()
         copied.__dict__.pop("_interpolated", None)
         return copied

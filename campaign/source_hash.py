@@ -1,7 +1,7 @@
 """One hash of a package's source files.
 
-An archive keeps it beside a plug-in's version, and machine code is kept under it: a version says
-what somebody meant to release, the hash what was there.
+An archive keeps it beside a plug-in's version, and compiled machine code is stored under it. A
+version states the intended release, the hash the actual source.
 """
 
 from __future__ import annotations
@@ -21,16 +21,15 @@ _PROGRAM = __name__.partition(".")[0]
 
 
 def sources_of(packages: Iterable[str]) -> dict[str, Path]:
-    """Python files and extension modules of top-level `packages`, and of what these import.
+    """Python files and extension modules of top-level `packages` and of their imports.
 
-    Imports are followed into folders on the path and editable installs, which change from one
-    edit to the next; not into this program, the standard library, or libraries that were installed
-    once and for all. Nothing is imported. The keys are relative to the folder that is on the path;
-    a package that is not found has no files.
+    Imports are followed into folders on the path and editable installs, which change by edits; not
+    into this program, the standard library, or installed libraries. Nothing is imported. Keys are
+    relative to the folder on the path; an unknown package has no files.
     """
     chosen = tuple(packages)
     waiting = list(chosen)
-    found: dict[str, Path] = {}
+    files_by_key: dict[str, Path] = {}
     done: set[str] = set()
     while waiting:
         name = waiting.pop()
@@ -41,10 +40,10 @@ def sources_of(packages: Iterable[str]) -> dict[str, Path]:
         if name not in chosen and any(_INSTALLED.intersection(place.parts) for place in places):
             continue
         files = {key: path for place in places for key, path in _files(name, place)}
-        found |= files
+        files_by_key |= files
         if name != _PROGRAM:
             waiting += (each for path in files.values() for each in _imported(path))
-    return dict(sorted(found.items()))
+    return dict(sorted(files_by_key.items()))
 
 
 def digest(sources: Mapping[str, Path]) -> str:
@@ -58,7 +57,7 @@ def digest(sources: Mapping[str, Path]) -> str:
 
 
 def _places(name: str) -> tuple[Path, ...]:
-    """The folders of a top-level package, or the file of a module; none where there are none."""
+    """Folders of a top-level package, or the file of a module; empty if not found."""
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):  # ValueError: __main__
@@ -71,7 +70,7 @@ def _places(name: str) -> tuple[Path, ...]:
 
 
 def _files(name: str, place: Path) -> Iterator[tuple[str, Path]]:
-    """The source files at one of a package's places."""
+    """Keys and paths of the source files at one location of a package."""
     if place.is_file():
         yield place.name, place
     for path in place.rglob("*"):
@@ -80,19 +79,19 @@ def _files(name: str, place: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _imported(path: Path) -> tuple[str, ...]:
-    """Top-level names that a file imports and that are neither Python's nor this program's."""
+    """Top-level names that a file imports, without the standard library and this program."""
     try:
         return _imported_names(path.read_bytes()) if path.suffix == ".py" else ()
     except (OSError, SyntaxError, ValueError, RecursionError):
-        return ()  # a file that nobody can import
+        return ()  # a file that cannot be imported
 
 
 @cache
 def _imported_names(source: bytes) -> tuple[str, ...]:
-    """Parsed once for each content: a package of 500 files takes 2 s."""
+    """Imported names, parsed once per content: a package of 500 files takes 2 s."""
     names: list[str] = []
     waiting: list[ast.AST] = [ast.parse(source)]
-    while waiting:  # statements alone: an import is never part of an expression
+    while waiting:  # only statements: an import is never part of an expression
         node = waiting.pop()
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]

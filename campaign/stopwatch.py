@@ -1,7 +1,7 @@
 """Time of a run by kind of work.
 
-A `Stopwatch` is handed to whoever works; `UNTIMED` in its place costs next to nothing. Work inside
-of other work counts as its own only, so all of a thread's seconds count once.
+The executing code receives a `Stopwatch`, or `UNTIMED`, which costs almost nothing. Nested work
+counts only as its own kind, so each second of a thread counts once.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 class Work(StrEnum):
-    """What a run spends time on, in the order in which it is told."""
+    """Kinds of work of a run, in the order of the output."""
 
     IMPORTING = "importing"
     PREPARING = "preparing the plan"
@@ -35,7 +35,7 @@ class Work(StrEnum):
 
 @dataclass
 class Spent:
-    """Seconds: on the clock in the main thread and in all others together, and of processors."""
+    """Time in s: wall clock in the main thread, in all other threads, and processor time."""
 
     main: float = 0.0
     others: float = 0.0
@@ -43,23 +43,23 @@ class Spent:
 
 
 class Timing(Protocol):
-    """What measures, or does not."""
+    """Interface of a stopwatch."""
 
     def span(self, work: Work) -> AbstractContextManager[None]:
-        """What is done inside the block, in this thread, is `work`."""
+        """Count the time of this thread inside the block as `work`."""
 
     def each(self, work: Work, items: Iterable[T]) -> Iterable[T]:
-        """The same items; getting each of them is `work`."""
+        """The same items; the time to get each of them counts as `work`."""
 
     def add(self, work: Work, processor: float) -> None:
-        """Processor time (s) that was spent on `work` beside all spans."""
+        """Add processor time (s) of `work` outside all spans."""
 
     def add_worker(self, spent: Mapping[Work, Spent]) -> None:
-        """Add what a worker process of this run has spent."""
+        """Add the time of a worker process of this run."""
 
 
 class Stopwatch:
-    """Measures. Any thread may use it."""
+    """Measures the time by kind of work. Any thread may use it."""
 
     def __init__(self) -> None:
         self._began = time.perf_counter(), time.process_time()
@@ -104,24 +104,24 @@ class Stopwatch:
                 self._of_workers += each.processor
 
     def take(self) -> dict[Work, Spent]:
-        """What was measured since the last call, in this thread and all that have ended."""
+        """Time since the last call, of this thread and of all ended work in others; resets it."""
         self._begin(getattr(self._thread, "work", None))
         with self._lock:
-            found, self._spent = self._spent, {}
-        return found
+            spent, self._spent = self._spent, {}
+        return spent
 
     def elapsed(self) -> tuple[float, float]:
-        """Seconds since it was made: on the clock, and of this run's processors."""
+        """Seconds since its creation: wall clock, and processor time of this run."""
         used = time.process_time() - self._began[1] + self._of_workers
         return time.perf_counter() - self._began[0], used
 
     def spent(self) -> dict[Work, Spent]:
-        """What was measured so far; of work under way, only what has ended or was interrupted."""
+        """Time so far; for running work only its ended or interrupted parts."""
         with self._lock:
             return {work: Spent(**vars(self._spent[work])) for work in Work if work in self._spent}
 
     def _begin(self, work: Work | None) -> None:
-        """From now on this thread does `work`; what it did until now is counted."""
+        """Count the previous work of this thread, and start `work`."""
         now, used = time.perf_counter(), time.thread_time()
         before: Work | None = getattr(self._thread, "work", None)
         if before is not None:

@@ -10,21 +10,21 @@ from collections.abc import Iterable, Sequence
 from campaign.axis_kind import in_axis_terms
 
 MOST_DIGITS = 9
-"""that a number with an interval is shown with."""
+"""Maximum number of digits of a number with an interval."""
 MOST_DECIMALS = 7
-"""of such a number below 0.01; one that needs more has an exponent."""
+"""Maximum number of decimals of such a number below 0.01; beyond it, an exponent is used."""
 NARROW, SHORT = 1e-5, 5
-"""Half-width, as a share of its number, below which tables leave an interval out, and
-the digits that the number then has: the interval is narrower than the last of them."""
-_ROUNDING = 1e-12  # share of a number below which its half-width is a rounding error
-_LEAST = 1e-290  # half-width below which no digit of it could be written
+"""Relative half-width below which tables omit an interval, and the digits of the number then: the
+interval is narrower than the last digit."""
+_ROUNDING = 1e-12  # relative half-width below which it is a rounding error
+_LEAST = 1e-290  # smallest half-width that can be written
 
 
 def number(value: float | None, digits: int = 4, decimals: int = 0) -> str:
-    """A number for people: `digits` significant ones, no exponent where none is needed.
+    """Text of a number: `digits` significant digits, an exponent only if necessary.
 
-    Digits before the point are never rounded away. A number that is exact with fewer keeps at
-    least `decimals` after the point.
+    Digits before the point are never rounded. A number that is exact with fewer digits keeps at
+    least `decimals` decimals.
     """
     if value is None or not math.isfinite(value):
         return "–"
@@ -42,13 +42,12 @@ def number(value: float | None, digits: int = 4, decimals: int = 0) -> str:
 
 
 def interval(value: float | None, low: float | None, high: float | None) -> str:
-    """A number with its interval: `3.87 ± 0.12`, or `3.87 (3.80 to 4.10)` where it is lopsided.
+    """Text of a number with its interval: `3.87 ± 0.12`; asymmetric: `3.87 (3.80 to 4.10)`.
 
-    Half-widths have two significant digits and the number ends where they do, before the point as
-    behind it (401000 ± 12000), but has no more than `MOST_DIGITS` in all. What is very large or
-    very small has one exponent for all: `(4.01 ± 0.12) × 10⁹`; so has what is small and would have
-    more than `MOST_DECIMALS`. An interval that is open on one side says which side it has; one that
-    is a rounding error of the number is shown as none.
+    Half-widths have two significant digits. The number ends at the same digit, before or after the
+    point (401000 ± 12000), with at most `MOST_DIGITS` digits. Very large or small numbers have a
+    common exponent: `(4.01 ± 0.12) × 10⁹`; also small ones with more than `MOST_DECIMALS` decimals.
+    A one-sided interval shows its side; an interval within the rounding error is `± 0`.
     """
     if value is None or not math.isfinite(value) or (low is None and high is None):
         return number(value)
@@ -62,7 +61,7 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
     lopsided = abs(high + low - 2 * value) > 0.1 * half
     largest = max(abs(value), half)
     size = math.floor(math.log10(largest))
-    # Of the last digit that is shown; rounded first, as 0.0996 is 0.10.
+    # Position of the last shown digit; rounded first, since 0.0996 is shown as 0.10.
     place = math.floor(math.log10(float(f"{half:.1e}"))) - 1
     if size - place + 1 > MOST_DIGITS:
         middle, *ends = (number(each, MOST_DIGITS) for each in (value, low, high))
@@ -81,14 +80,14 @@ def _with_ends(middle: str, wide: str, ends: Sequence[str]) -> str:
 
 
 def _to(value: float, place: int, power: int) -> str:
-    """A number up to the digit of 10**place, in units of 10**power."""
+    """Text of a number, rounded to 10**place, in units of 10**power."""
     rounded = round(value, -place) / 10.0**power if place > 0 else value / 10.0**power
     text = f"{rounded:.{max(0, power - place)}f}"
     return minus(text if float(text) else text.removeprefix("-"))
 
 
 def percent(value: float | None) -> str:
-    """A deviation for people: signed, two significant digits, at least one decimal below 10 %."""
+    """Text of a deviation in %: signed; 2 decimals below 1 %, 1 below 100 %, else none."""
     if value is None or not math.isfinite(value):
         return "–"
     if abs(value) < 0.005:
@@ -101,19 +100,19 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def minus(text: str) -> str:
-    """With the minus sign of print."""
+    """Replace hyphens by the typographic minus sign."""
     return text.replace("-", "−")
 
 
 def pretty_unit(unit: str) -> str:
-    """A unit as people read it: `deg/s²`, `N·m`, `%`."""
+    """Displayed form of a unit: `deg/s²`, `N·m`, `%`."""
     shown = unit.replace("percent", "%").replace("^2", "²").replace("^3", "³").replace("ohm", "Ω")
     shown = re.sub(r"\bu(?=(rad|m|s|N|J|A|V)\b)", "µ", shown)
     return re.sub(r"(?<=\w) (?=\w)", "·", shown).replace("deg", "°" if unit == "deg" else "deg")
 
 
 def in_rows(numbers: Iterable[int]) -> str:
-    """Whole numbers in increasing order, those in a row by their ends: `1 to 4, 6, 8 and 9`."""
+    """Text of sorted whole numbers, with ranges: `1 to 4, 6, 8 and 9`."""
     rows: list[list[int]] = []
     for each in sorted(set(numbers)):
         if rows and each == rows[-1][-1] + 1:
@@ -156,7 +155,7 @@ QUANTITIES = {
     "stick_slip_top_rate": "largest rate of the load",
     "model_property": "property",
 }
-"""What people call a quantity whose name in files is not what they call it."""
+"""Displayed names of quantities that differ from their names in files."""
 
 
 def quantity_words(quantity: str) -> str:
@@ -170,8 +169,8 @@ _SAID_BY_THE_FIELD = ("friction", "compensation")
 def path_words(path: str) -> str:
     """A dotted path as words: `bench.gear.preload.torque` is `gear preload torque`.
 
-    Of a table that only says what kind of thing follows the name is left out: friction of the load
-    is `load coulomb torque`.
+    The tables `friction` and `compensation` are omitted: friction of the load is
+    `load coulomb torque`.
     """
     parts = path.split(".")
     if parts[0] == "bench" and len(parts) > 1:
@@ -182,7 +181,7 @@ def path_words(path: str) -> str:
 
 
 def nearest(word: object, names: Iterable[str]) -> str:
-    """What to append to a message when `word` looks like a slip for one of `names`."""
+    """Hint for a message if `word` resembles one of `names`; else empty."""
     known = {name.lower(): name for name in names}
     close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.6)
     return f"; did you mean {known[close[0]]!r}?" if close else ""

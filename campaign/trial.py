@@ -1,8 +1,7 @@
-"""Task and Trial: what a bench is to do, and how an experiment requests it.
+"""Task and Trial: the motion of a bench, and its request by an experiment.
 
-A Trial is everything a backend needs to execute one atomic thing; what comes back is a Recording
-(`campaign.recording`). Neither knows where protocols come from, how samples are made, or where
-they are kept.
+A Trial contains all that a backend needs to execute it; its result is a Recording
+(`campaign.recording`). Both are independent of protocols, of simulation, and of storage.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ __all__ = [
     "lost_samples",
     "trial_number",
 ]
-# Plug-ins that were written when recordings stood here import them from here.
+# Older plug-ins import the recording classes from here.
 
 Tree = dict[str, JsonValue]
 """A normalised, JSON-like description: SI numbers, text, booleans, lists and tables."""
@@ -74,8 +73,8 @@ class Role(StrEnum):
 
     MEASUREMENT = "measurement"
     WARM_UP = "warm-up"
-    HOME = "home"  # brings the axis to where the next trial begins
-    CHECK = "check"  # one trial again and again: is the bench still the same bench?
+    HOME = "home"  # brings the axis to the start of the next trial
+    CHECK = "check"  # one trial repeated during the run, to detect changes of the bench
 
 
 class Task(Options):
@@ -171,18 +170,18 @@ class Trial(Options):
 
     @property
     def label(self) -> str:
-        """For people: the test, and what is particular about this trial of it."""
-        told = {path: self.told.get(path) or _short(value) for path, value in self.point.items()}
-        point = ", ".join(f"{path}={value}" for path, value in told.items())
+        """Label for a reader: the test, its role, point and repeat."""
+        values = {path: self.told.get(path) or _short(value) for path, value in self.point.items()}
+        point = ", ".join(f"{path}={value}" for path, value in values.items())
         repeat = f" #{self.repeat}" if self.repeat > 1 else ""
         role = f" ({self.role})" if self.role is not Role.MEASUREMENT else ""
         return f"{self.test}{role}{f' [{point}]' if point else ''}{repeat}"
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of what determines the samples: bench, task, seed, truth and files, if any.
+        """SHA-256 of all that determines the samples: bench, task, seed, truth and files, if any.
 
-        In canonical JSON.
+        Hashed as canonical JSON.
         """
         what = {"task": self.task.model_dump(mode="json"), "seed": self.seed}
         if self.truth:
@@ -194,11 +193,11 @@ class Trial(Options):
 
     @property
     def apart_from_seed(self) -> tuple[str, str, Task]:
-        """What determines the samples of a simulation but its seed: equal for repeats."""
+        """All that determines simulated samples except the seed: equal for repeats."""
         return tree_text(self.bench), self.truth, self.task
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with some fields changed, which works its fingerprint out anew."""
+        """A copy with some fields changed and a new fingerprint."""
         copy = super().model_copy(update=update, deep=deep)
         copy.__dict__.pop("fingerprint", None)
         return copy
@@ -206,21 +205,21 @@ class Trial(Options):
 
 @dataclass(frozen=True)
 class TrialRequest:
-    """A trial as an experiment asks for it; the plan adds number, seed, bench and sweep point.
+    """Request of an experiment for a trial; the plan adds number, seed, bench and sweep point.
 
     Attributes:
-        point: what distinguishes it within the test, e.g. {"speed": 0.0175}; SI.
-        note: what the plan should say about it.
-        bench: a whole normalised bench (SI) to execute it on instead of the test's, for an
-            experiment that varies the bench itself; see `experiments.common.with_changes`.
-        requires, can_use: names of the channels, where they are not all that the experiment
-            declares; None: a measurement has all of those, and any other role none.
+        point: values that identify the trial within the test, e.g. {"speed": 0.0175}; SI.
+        note: remark of the plan about the trial.
+        bench: complete normalised bench (SI) that replaces the test's, for an experiment that
+            varies the bench; see `experiments.shared.common.with_changes`.
+        requires, can_use: channel names; None: all channels that the experiment declares for a
+            measurement, none for other roles.
         windows: parts of the recording that the analysis uses, by name; see `Trial`.
-        recording: where the samples of a trial come from that was executed elsewhere; see `Trial`.
-        part: of an offered recording that is this trial (s from its beginning); None: all of it.
-        options: those of the test's that a recording from elsewhere shows to have been others (SI).
-        planned: whether the test's options say how it is executed; of a recording that nobody
-            planned only those that the test writes are kept: defaults were never executed.
+        recording: origin of the samples of an imported trial; see `Trial`.
+        part: (start, stop) of this trial in an offered recording (s); None: all of it.
+        options: options of the test that an imported recording shows to have other values (SI).
+        planned: whether the test's options determined the execution. For an unplanned recording
+            only the options written in the test are kept: defaults were never executed.
     """
 
     task: Task
@@ -239,14 +238,14 @@ class TrialRequest:
 
 @dataclass(frozen=True)
 class OfferedRecording:
-    """A recording from elsewhere, as an experiment is offered it: it may hold several trials.
+    """An imported recording that is offered to an experiment; it may contain several trials.
 
     Attributes:
-        duration: of it (s), at `sample_rate` (Hz).
-        channels: names of those that it has, or that can be made of those that it has.
-        conditions: what is known to have been set for it, by name; SI where it has a unit.
-        windows: parts of it that whoever recorded it has named; s from its beginning.
-        read: the samples of some of its channels.
+        duration: its length (s), at `sample_rate` (Hz).
+        channels: names of recorded channels and of channels that can be derived from them.
+        conditions: known settings of the recording, by name; SI if they have a unit.
+        windows: named parts of the recording; s from its beginning.
+        read: returns the samples of the given channels.
     """
 
     duration: float
@@ -259,12 +258,12 @@ class OfferedRecording:
 
 @dataclass(frozen=True)
 class Most:
-    """What the trials of a stage take at most, said before anybody knows which they are.
+    """Upper bounds for the trials of a stage, before they are known.
 
     Attributes:
-        trials: how many; 0 where the options ask for none.
+        trials: number of trials; 0 if the options request none.
         duration: bench time of all of them (s).
-        samples: of all of them, per channel.
+        samples: samples of all of them, per channel.
     """
 
     trials: int
@@ -283,7 +282,7 @@ NONE_MORE = Most(0, 0.0, 0)
 
 
 def canonical_json(tree: Any) -> str:
-    """JSON that is equal for equal content: sorted keys, no spaces, no NaN."""
+    """JSON text that is identical for equal content: sorted keys, no spaces, no NaN."""
     return json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -293,8 +292,8 @@ _TEXTS: dict[int, tuple[Tree, str]] = {}
 
 
 def tree_text(tree: Tree) -> str:
-    """`canonical_json` of a tree that trials share and nothing changes; the last ones are kept."""
-    kept = _TEXTS.get(id(tree))  # the tree is kept, and so is its id
+    """`canonical_json` of an unchanged tree that trials share; recent texts are cached."""
+    kept = _TEXTS.get(id(tree))  # the cached tree keeps its id
     if kept is None:
         if len(_TEXTS) >= _MOST_TEXTS:
             _TEXTS.clear()
@@ -303,7 +302,7 @@ def tree_text(tree: Tree) -> str:
 
 
 def trial_number(wanted: str) -> int:
-    """The number of the trial that is called so: `17`, `trial-00017`. Else UsageError."""
+    """Number of a trial from `17` or `trial-00017`. Raises UsageError otherwise."""
     match = re.fullmatch(r"(?:trial[-_])?([0-9]{1,10})", wanted)
     if match is None:
         raise UsageError(f"{wanted!r} is neither the number nor the name of a trial: trial-00017")
@@ -311,7 +310,7 @@ def trial_number(wanted: str) -> int:
 
 
 def _short(value: JsonValue) -> str:
-    if isinstance(value, dict):  # what a swept table describes; the bench has all of it
+    if isinstance(value, dict):  # a swept table; the bench contains all of it
         kinds = (value[name] for name in ("model", "method", "kind") if name in value)
         return str(next(kinds, "{...}"))
     return f"{value:.6g}" if isinstance(value, float) else str(value)

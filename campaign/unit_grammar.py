@@ -5,15 +5,15 @@
     power   = ("^" | "**") integer | integer | superscripts        as in s^-1, cm2, min-1, m²
     separator = " " | "*" | "·" | "." | "/"
 
-Names joined by hyphens (`N-m`, `oz-in-s^2`) are a product that stands as one name, `V/oz-in` is
-`V/(ozf in)`; a power belongs to the last of them, as it does in `kgm²`.
+Names joined by hyphens (`N-m`, `oz-in-s^2`) are a product that counts as one name: `V/oz-in` is
+`V/(ozf in)`. A power applies to the last of them, as in `kgm²`.
 
-A quotient divides by the next factor alone, from left to right: `V/A/s` is `V/(A s)`, and `V/A s`
-is `(V/A) s`. Length, depth and powers are bounded, so that any text is decided at once. Nothing is
-computed but a product of exact fractions.
+A quotient divides only by the next factor, from left to right: `V/A/s` is `V/(A s)`, and `V/A s`
+is `(V/A) s`. Length, depth and powers are bounded, so that parsing any text is fast. The value is a
+product of exact fractions.
 
-What the SI calls one is kept apart where it would hide a mistake: an angle is no pure number (`N m`
-is no `N m/rad`), nor is a cycle (`1 Hz` is no `1 1/s` and no `1 rad/s`), and energy is no torque.
+To detect mistakes, some dimensionless SI units count as dimensions: an angle is no pure number
+(`N m` is not `N m/rad`), nor is a cycle (`1 Hz` is not `1 1/s` or `1 rad/s`). Energy is no torque.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from functools import cache, lru_cache
 from types import MappingProxyType
 
 LONGEST = 60
-"""characters of a unit."""
+"""Maximum number of characters of a unit."""
 DEEPEST = 3
-"""parentheses within each other."""
+"""Maximum depth of nested parentheses."""
 LARGEST_POWER = 6
 SMALLEST = Fraction(1, 10**40)
-"""SI units; and the largest unit is as many times one of them."""
+"""Smallest unit in SI units; the largest is its reciprocal."""
 
 PI = Fraction("3.1415926535897932384626433832795028841971693993751")
-"""To 50 digits, so that a product with it is right to the last bit of a double."""
+"""To 50 digits, so that a product with it is exact to the last bit of a double."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Unit:
     """A unit as a multiple of a product of base units.
 
     Attributes:
-        factor: how many SI units it is.
+        factor: its value in SI units.
         dimensions: base unit and its power, sorted, none zero: (("kg", 1), ("m", 2)).
     """
 
@@ -61,7 +61,7 @@ class Unit:
 
 
 def _bounded(factor: Fraction) -> Fraction:
-    """`factor`; ValueError outside of what anybody measures, before powers of powers grow."""
+    """`factor`; raises ValueError for extreme values, also to stop the growth of nested powers."""
     if not SMALLEST < factor < 1 / SMALLEST:
         raise ValueError("it is out of any scale")
     return factor
@@ -86,9 +86,9 @@ PREFIXES = MappingProxyType(
 )
 
 POUND = Fraction("0.45359237")  # kg, international yard and pound agreement of 1959
-GRAVITY = Fraction("9.80665")  # m/s^2, standard; what a pound-force and a kilogram-force weigh
+GRAVITY = Fraction("9.80665")  # m/s^2, standard; for pound-force and kilogram-force
 
-# Name: value in SI, base units, prefixes that data sheets put before it, other spellings.
+# Name: value in SI, base units, prefixes in data sheets, other spellings.
 _TABLE: tuple[tuple[str, Fraction | int, Mapping[str, int], str, tuple[str, ...]], ...] = (
     ("rad", 1, {"rad": 1}, "mun", ("radian", "radians")),
     ("deg", PI / 180, {"rad": 1}, "m", ("°", "degree", "degrees")),
@@ -120,14 +120,14 @@ _TABLE: tuple[tuple[str, Fraction | int, Mapping[str, int], str, tuple[str, ...]
     ("J", 1, {"J": 1}, "umkM", ("joule", "joules")),
     ("W", 1, {"J": 1, "s": -1}, "umkM", ("watt", "watts")),
     ("K", 1, {"K": 1}, "m", ("kelvin",)),
-    ("degC", 1, {"degC": 1}, "", ("°C",)),  # a temperature, from which no factor leads to K
-    ("dB", 1, {"dB": 1}, "", ()),  # a level, from which no factor leads to a ratio
+    ("degC", 1, {"degC": 1}, "", ("°C",)),  # a temperature; no factor converts it to K
+    ("dB", 1, {"dB": 1}, "", ()),  # a level; no factor converts it to a ratio
     ("count", 1, {"count": 1}, "", ("counts",)),
     ("percent", Fraction(1, 100), {}, "", ("%",)),
     ("ppm", Fraction(1, 10**6), {}, "", ()),
 )
 
-# As data sheets join them; a power belongs to the last, as in `kgm²`.
+# Joined names in data sheets; a power applies to the last unit, as in `kgm²`.
 _JOINED = MappingProxyType(
     {
         **{f"{p}Nm": (f"{p}N", "m") for p in ("", "u", "m", "c", "k", "M")},
@@ -160,7 +160,7 @@ _REASONS = MappingProxyType(
 _CHARACTERS = str.maketrans(
     {"\u00b5": "u", "\u03bc": "u", "\u2126": "Ω", "·": "*", "⋅": "*", ".": "*"}
 )
-"""Micro sign and Greek mu, the ohm sign that is no Omega, and the signs of a product."""
+"""Micro sign and Greek mu, ohm sign (not Omega), and product signs."""
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -175,26 +175,26 @@ _TOKEN = re.compile(
 
 @cache
 def names() -> Mapping[str, Unit]:
-    """Every name with its unit, prefixes included."""
-    found: dict[str, Unit] = {}
+    """Units by name, including prefixes."""
+    units: dict[str, Unit] = {}
     for name, factor, bases, prefixes, others in _TABLE:
         unit = Unit(Fraction(factor), _sorted(bases))
-        found |= dict.fromkeys((name, *others), unit)
+        units |= dict.fromkeys((name, *others), unit)
         for prefix in prefixes:
             scaled = Unit(PREFIXES[prefix] * unit.factor, unit.dimensions)
             symbols = (name, *(other for other in others if other in ("Ω", "Ohm", "r")))
-            found |= {prefix + symbol: scaled for symbol in symbols}
-    return MappingProxyType(found)
+            units |= {prefix + symbol: scaled for symbol in symbols}
+    return MappingProxyType(units)
 
 
 def listed() -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """Each unit of the table: name, the prefixes it takes, other spellings."""
+    """Each unit of the table: name, allowed prefixes, other spellings."""
     for name, _, _, prefixes, others in _TABLE:
         yield name, prefixes, others
 
 
 def parse_unit(text: str) -> Unit:
-    """The unit that `text` is. Raises ValueError saying what of it is not understood.
+    """Parse the unit `text`. Raises ValueError that names the invalid part.
 
     An empty text is the unit of pure numbers.
     """
@@ -231,7 +231,7 @@ def _tokens(text: str) -> list[tuple[str, str]]:
 
 
 def _bare(match: re.Match[str], text: str, tokens: list[tuple[str, str]]) -> str:
-    """A number right behind a name is its power (`cm2`); elsewhere only the 1 of `1/s` stands."""
+    """Kind of a bare number: a power directly after a name (`cm2`), or the 1 of `1/s`."""
     joined = match.start() == match.start("bare")
     if joined and tokens and (tokens[-1][0] == "name" or tokens[-1][1] == ")"):
         return "power"
@@ -241,7 +241,7 @@ def _bare(match: re.Match[str], text: str, tokens: list[tuple[str, str]]) -> str
 
 
 def _product(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Unit, int]:
-    """The product that begins at `place`, and where it ends: at the end, or at a `)`."""
+    """The product from index `place`, and the index of its end: end of tokens, or a `)`."""
     result, place = _factor(tokens, place, depth)
     while place < len(tokens) and tokens[place][1] != ")":
         divided = tokens[place][1] == "/"
@@ -285,7 +285,7 @@ def _power(text: str) -> int:
 
 
 def _named(name: str) -> tuple[Unit, Unit]:
-    """What comes before the last unit of a joined name, and that last one."""
+    """Product of all units before the last one of a joined name, and the last unit."""
     known = names()
     if name in known:
         return ONE, known[name]
@@ -303,7 +303,7 @@ def _named(name: str) -> tuple[Unit, Unit]:
 
 
 def _hyphened(parts: list[str]) -> tuple[Unit, Unit]:
-    """As `_named`. Beside a length, ounces and pounds are forces: `oz-in`, `ft-lb`."""
+    """As `_named`. Next to a length, ounces and pounds are forces: `oz-in`, `ft-lb`."""
     before, last = ONE, ONE
     for place, part in enumerate(parts):
         beside = {*parts[max(place - 1, 0) : place], *parts[place + 1 : place + 2]}
@@ -314,7 +314,7 @@ def _hyphened(parts: list[str]) -> tuple[Unit, Unit]:
 
 
 class UnknownNameError(ValueError):
-    """There is no unit of that name; `near` are those that it may be a spelling of."""
+    """Unknown unit name; `near`: units with a similar spelling."""
 
     def __init__(self, name: str, near: tuple[str, ...]) -> None:
         super().__init__(f"there is no {name!r}")
@@ -323,13 +323,13 @@ class UnknownNameError(ValueError):
 
 
 _PREFIX_SLIPS = ("Kk", "Uu", "Cc", "gG")
-"""Another case of a prefix that is the sign of no other magnitude."""
+"""Prefix with another case that denotes no other magnitude."""
 
 
 def _near(name: str) -> Iterator[str]:
-    """Units that differ from `name` in case, but in no letter that tells magnitudes apart.
+    """Units that differ from `name` only in case, but not in the case of a significant prefix.
 
-    `NM` is no `nm`, and `MA` no `mA`.
+    `NM` is not `nm`, and `MA` is not `mA`.
     """
     for other in (*names(), *_JOINED):
         parts = _JOINED.get(other, (other,))
@@ -345,13 +345,13 @@ def _near(name: str) -> Iterator[str]:
 
 @cache
 def _prefixed() -> frozenset[str]:
-    """The names that begin with a prefix."""
+    """Names that begin with a prefix."""
     spelled = {name for name, *_, others in _TABLE for name in (name, *others)}
     return frozenset(names().keys() - spelled)
 
 
 def respelled(text: str, names_left: int = 4) -> Iterator[str]:
-    """The units that `text`, which is none, may be meant to be: some names in another case."""
+    """Valid units with the spelling of `text` except for the case of up to `names_left` names."""
     try:
         parse_unit(text)
     except UnknownNameError as error:

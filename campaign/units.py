@@ -1,9 +1,9 @@
-"""Text quantities to SI, and back.
+"""Conversion of text quantities to SI, and back.
 
-Inside the program every number is SI. Text such as ``"18 deg/s^2"`` becomes a float when a
-protocol or a bench is validated, and becomes text in a reader's unit again on the page. What a
-unit may look like and what it is worth is in `unit_grammar`; a quantity accepts every unit of its
-own dimensions, where angles, cycles and energy have one of their own.
+Inside the program every number is SI. Validation of a protocol or bench converts text such as
+``"18 deg/s^2"`` to a float; the page converts it to text in the display unit. `unit_grammar`
+defines the spelling and value of units. A quantity accepts every unit of its dimensions; angles,
+cycles and energy have dimensions of their own.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from campaign.unit_grammar import Unit, parse_unit, respelled
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity: its SI unit, the unit people read, and units it is usually given in.
+    """A physical quantity: its SI unit, display unit, and usual units.
 
     Used as pydantic metadata: ``inertia: Annotated[float, INERTIA]``. The field then takes text
     with a unit. A bare number is an error, except under the validation context
     ``{"si": True}`` with which normalised (already SI) trees are read back.
 
     Attributes:
-        accepts: what messages and `campaign kinds units` name; any unit of the dimensions will do.
-        also: (unit, what it means here): `1/min` is `rpm` where a speed is meant.
-        linear: what stands for it where its side of the gear is linear; None: the same.
-        of_motor: whether it is the motor's, which may be rotary where the axis is linear.
-        through_lead: what stands for it between a rotary motor and a linear axis; None: `linear`.
+        accepts: units in messages and in `campaign kinds units`; all units of the dimensions work.
+        also: (unit, its meaning for this quantity): `1/min` is `rpm` for a speed.
+        linear: its replacement if its side of the gear is linear; None: the same.
+        of_motor: whether it belongs to the motor, which may be rotary with a linear axis.
+        through_lead: its replacement between a rotary motor and a linear axis; None: `linear`.
     """
 
     name: str
@@ -50,11 +50,11 @@ class Quantity:
 
     @property
     def here(self) -> Quantity:
-        """What this is of the axis that is meant (`axis_kind.axis_terms`)."""
+        """The corresponding quantity of the current axis (`axis_kind.axis_terms`)."""
         return self.of(current_sides())
 
     def of(self, sides: Sides) -> Quantity:
-        """What this is of a bench whose axis and motor are of these kinds."""
+        """The corresponding quantity of a bench with these sides."""
         kind = sides.motor if self.of_motor else sides.load
         if kind is AxisKind.ROTARY:
             return self
@@ -63,7 +63,7 @@ class Quantity:
         return self.linear or self
 
     def parse(self, text: str) -> float:
-        """SI value of `text`, by the axis that is meant; ValueError with a message for the user."""
+        """SI value of `text` for the current axis. Raises ValueError with a message for users."""
         own = self.here
         try:
             return own.parse_own(text)
@@ -71,7 +71,7 @@ class Quantity:
             raise ValueError(f"{error}{self._of_other_kind(text, own)}") from None
 
     def _of_other_kind(self, text: str, own: Quantity) -> str:
-        """What to append where the unit would be one if the bench moved the other way."""
+        """Hint for a unit that is valid only for another kind of axis; else empty."""
         for other in {self, self.linear, self.through_lead} - {own, None}:
             try:
                 other.parse_own(text)  # type: ignore[union-attr]
@@ -86,7 +86,7 @@ class Quantity:
         return ""
 
     def parse_own(self, text: str) -> float:
-        """SI value of `text` by this very quantity, whatever the axis."""
+        """SI value of `text` for exactly this quantity, independent of the axis."""
         number, unit = split_quantity(text)
         if not unit:
             raise ValueError(f"{text!r} has no unit; expected a {self.name} such as {self.example}")
@@ -102,7 +102,7 @@ class Quantity:
         return value
 
     def _factor(self, unit: Unit) -> float:
-        """How many SI units `unit` is; LookupError when it measures something else."""
+        """Value of `unit` in SI units. Raises LookupError for other dimensions."""
         for spelled, meant in self.also:
             if unit == parse_unit(spelled):
                 unit = parse_unit(meant)
@@ -112,7 +112,7 @@ class Quantity:
         return float(unit.factor / si.factor)
 
     def _meant(self, unit: str) -> str:
-        """Which of its units `unit`, which is none, may be meant to be; as `accepts` spells it."""
+        """Suggestion of a valid unit for the invalid `unit`, spelled as in `accepts`; or empty."""
         for near in respelled(unit):
             meant = parse_unit(near)
             try:
@@ -125,7 +125,7 @@ class Quantity:
 
     @property
     def example(self) -> str:
-        """What a valid value looks like, quoted."""
+        """A valid value, quoted."""
         return f'"1 {self.display}"'
 
     def _allowed(self) -> str:
@@ -161,11 +161,11 @@ _NUMBER = re.compile(
     re.I | re.S,
 )
 LONGEST = 100
-"""characters of a quantity."""
+"""Maximum number of characters of a quantity."""
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit text of ``"0.05 deg/s"``; ValueError when it does not begin with a number.
+    """Number and unit text of ``"0.05 deg/s"``. Raises ValueError without a number at the begin.
 
     The number may be a fraction: ``"1/65536 rev/count"``.
     """
@@ -185,16 +185,16 @@ def split_quantity(text: str) -> tuple[float, str]:
 
 
 def convert(value: Any, unit: str, to: str) -> Any:
-    """`value` (number or array) from `unit` to `to`; the same unit costs nothing."""
+    """Convert `value` (number or array) from `unit` to `to`; no operation for equal units."""
     if unit == to:
         return value
     return value * factor(unit, to)
 
 
 def to_si(text: str) -> float:
-    """SI value of `text` in any unit (`"18 deg/s^2"`), where no one field's dimensions apply.
+    """SI value of `text` in any unit (`"18 deg/s^2"`), without a check of dimensions.
 
-    Raises ValueError when it is not a number with a known unit.
+    Raises ValueError if it is not a number with a known unit.
     """
     number, unit = split_quantity(text)
     try:
@@ -208,7 +208,7 @@ def to_si(text: str) -> float:
 
 @lru_cache(maxsize=1024)
 def factor(unit: str, to: str) -> float:
-    """How many `to` one `unit` is. Raises ValueError when they measure different things."""
+    """Value of one `unit` in units of `to`. Raises ValueError for different dimensions."""
     one, other = parse_unit(unit), parse_unit(to)
     if one.dimensions != other.dimensions:
         raise ValueError(f"{unit!r} is no multiple of {to!r}")
@@ -216,7 +216,7 @@ def factor(unit: str, to: str) -> float:
 
 
 def same_dimension(one: str, other: str) -> bool:
-    """Whether numbers in both units measure the same; also of units that nobody here knows."""
+    """Whether both units have the same dimension; unknown units only if their texts are equal."""
     try:
         return one == other or factor(one, other) > 0
     except (LookupError, ValueError):
@@ -231,31 +231,31 @@ DISPLAY = {
     "m/s": "mm/s",
     "m/s^2": "mm/s^2",
 }
-"""What a reader is shown in place of an SI unit, where nothing says another one."""
+"""Default display unit by SI unit."""
 
 
 def in_words(value: float, unit: str, display: str = "", form: str = ".3g") -> str:
-    """`5 mm/s`: a number (SI) with the unit that a reader is shown, of the axis that is meant.
+    """`5 mm/s`: a number (SI) in the display unit of the current axis.
 
-    `unit` and `display` (absent: the same) are those of a rotary axis, such as rad/s and deg/s.
+    `unit` and `display` (absent: the same) are units of a rotary axis, such as rad/s and deg/s.
     """
     shown = axis_unit(display or unit)
-    told = "deg" if shown == "deg" else pretty_unit(shown)
-    return f"{convert(value, axis_unit(unit), shown):{form}} {told}"
+    unit_text = "deg" if shown == "deg" else pretty_unit(shown)
+    return f"{convert(value, axis_unit(unit), shown):{form}} {unit_text}"
 
 
 def angle_text(value: float, form: str = ".3g") -> str:
-    """`5 deg`, or `5 mm`, of an angle (rad) or a position (m)."""
+    """`5 deg` or `5 mm` for an angle (rad) or a position (m)."""
     return in_words(value, "rad", "deg", form)
 
 
 def rate_text(value: float, form: str = ".3g") -> str:
-    """`5 deg/s`, or `5 mm/s`, of a rate (rad/s or m/s)."""
+    """`5 deg/s` or `5 mm/s` for a rate (rad/s or m/s)."""
     return in_words(value, "rad/s", "deg/s", form)
 
 
 def torque_text(value: float, form: str = ".3g") -> str:
-    """`5 N·m`, or `5 N`, of a torque (N m) or a force (N)."""
+    """`5 N·m` or `5 N` for a torque (N m) or a force (N)."""
     return in_words(value, "N m", form=form)
 
 

@@ -1,4 +1,4 @@
-"""Backends execute trials: `sim`, and whatever else is a file here or an installed plug-in."""
+"""Backends, which execute trials: one file each in this folder, or an installed plug-in."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from campaign.plugins import Kinds
 
 @cache
 def backends() -> Kinds[BackendKind]:
-    """Every backend, by name."""
+    """All backends by name."""
     return Kinds("backend", __name__, "BACKEND", BackendKind)

@@ -1,8 +1,8 @@
 """Calls into a backend: time limit, checked answer, named faults.
 
-A backend may be the code of anybody. Whatever it raises is a BackendError here that names its
-package; an error of this program's own backends stays what it is, a bug. A call that exceeds its
-limit is left behind in a thread that keeps no program from ending.
+A backend may be third-party code. Its exceptions become a BackendError that names its package; an
+exception of this program's own backends is passed on as a bug. A call that exceeds its limit is
+abandoned in a daemon thread.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from campaign.recording import Ending, Fault, Outcome, PanicStop, Recorder, Safe
 from campaign.trial import Trial
 
 CONNECTING, MAKING_SAFE, LEAVING, LOOKING = 25.0, 10.0, 4.0, 20.0
-"""s that `__enter__`, `make_safe`, `__exit__`, and any question may take. With the patience of a
-trial (`supervision.py`) a bench is seen safe, or said not to be, within 40 s."""
+"""s; limits of `__enter__`, `make_safe`, `__exit__`, and of queries. With the limits of a trial
+(`supervision.py`) a safe state is confirmed, or reported as not confirmed, within 40 s."""
 TICK = 0.05
-"""s between two looks at the clock."""
+"""s between two checks of the clock."""
 METHODS: Mapping[type, tuple[str, ...]] = {
     Backend: ("__enter__", "__exit__", "refuses", "channels", "execute", "make_safe"),
     SupportsExternalStop: ("introduce", "panic_stop", "clear_stop"),
@@ -47,12 +47,12 @@ class HangsError(BackendError):
 
 
 class Heartbeat:
-    """Signs of life from the loops that watch a bench. Each sends its own: a thread beside them
-    would send while they hang.
+    """Signs of life from the loops that supervise a bench. The loops send them themselves: a
+    separate thread would also send while they hang.
 
     Attributes:
-        interval: s between two.
-        tell: where they go; False for the last one until a loop begins again.
+        interval: s between two signs.
+        tell: receiver; called with False for the last sign before a pause.
     """
 
     interval = 0.5
@@ -64,7 +64,7 @@ class Heartbeat:
 
     @contextmanager
     def expected(self) -> Iterator[None]:
-        """Inside the block somebody expects `beat`."""
+        """Expect calls of `beat` inside the block."""
         with self._counting:
             self._loops += 1
             self.tell(True)
@@ -77,7 +77,7 @@ class Heartbeat:
                     self.tell(False)
 
     def beat(self) -> None:
-        """One turn of a loop; most turns send nothing."""
+        """Called in each cycle of a loop; sends a sign if it is due."""
         now = time.monotonic()
         if now >= self._due:
             self._due = now + self.interval
@@ -85,11 +85,11 @@ class Heartbeat:
 
 
 HEARTBEAT = Heartbeat()
-"""Of this process."""
+"""Heartbeat of this process."""
 
 
 def opened(kind: BackendKind, options: Options) -> Backend:
-    """A backend of `kind`. This and all below raise BackendError."""
+    """Open a backend of `kind`. This and all functions below raise BackendError."""
     backend = _blaming(lambda: kind.open(options), kind.open, "open")
     if kind.stopped_outside:
         _typed(backend, SupportsExternalStop, kind.open, "open")  # type: ignore[type-abstract]
@@ -97,23 +97,23 @@ def opened(kind: BackendKind, options: Options) -> Backend:
 
 
 def connect(backend: Backend) -> None:
-    """Enter `backend`, which stays the same, whatever that returns. Raises HangsError, too."""
+    """Enter `backend`; the returned object is ignored. Also raises HangsError."""
     _within(CONNECTING, backend, "__enter__")
 
 
 def leave(backend: Backend, error: BaseException | None) -> None:
-    """Let go of the bench; `error` is what ended the work."""
+    """Leave `backend`; `error` is the exception that ended the work, or None."""
     trace = error.__traceback__ if error is not None else None
     _within(LEAVING, backend, "__exit__", type(error) if error else None, error, trace)
 
 
 def make_safe(backend: Backend) -> SafeState:
-    """Bring the bench to rest."""
+    """Bring the bench to rest; whether that is confirmed."""
     return _typed(_within(MAKING_SAFE, backend, "make_safe"), SafeState, backend, "make_safe")
 
 
 def panic_stop(backend: SupportsExternalStop) -> PanicStop | None:
-    """The stop from outside that keeps the bench off."""
+    """The external stop that keeps the bench off, or None."""
     stop = _within(LOOKING, backend, "panic_stop")
     if stop is None:
         return None
@@ -124,7 +124,7 @@ def panic_stop(backend: SupportsExternalStop) -> PanicStop | None:
 
 
 def stop_command(backend: Backend) -> tuple[str, ...]:
-    """What stops the bench when this program has died; empty where nothing does."""
+    """Command that stops the bench after the death of this program; empty without one."""
     if not isinstance(backend, StoppedByCommand):
         return ()
     command = _typed(_within(LOOKING, backend, "stop_command"), tuple, backend, "stop_command")
@@ -132,33 +132,33 @@ def stop_command(backend: Backend) -> tuple[str, ...]:
 
 
 def refusal(backend: Backend, trial: Trial) -> str:
-    """Why `backend` does not execute `trial`; empty when it does."""
+    """Why `backend` refuses `trial`; empty if it accepts it."""
     return storable(_typed(_asked(backend, "refuses", trial) or "", str, backend, "refuses"))
 
 
 def channels(backend: Backend, trial: Trial) -> frozenset[str] | None:
-    """Names of the channels of `trial`, None while they are not known."""
-    found = _asked(backend, "channels", trial)
-    return None if found is None else _typed(found, frozenset, backend, "channels")
+    """Names of the channels of `trial`; None while unknown."""
+    names = _asked(backend, "channels", trial)
+    return None if names is None else _typed(names, frozenset, backend, "channels")
 
 
 def execute(backend: Backend, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-    """How `trial` ended. No limit: the caller counts the time without samples."""
+    """Execute `trial`. Without time limit: the caller measures the time without samples."""
     return checked_ending(called(backend, "execute", trial, recorder, stop), backend)
 
 
 def checked_ending(ending: Any, backend: object) -> Ending:
-    """An ending with members of the right types."""
-    told = _typed(ending, Ending, backend, "execute")
-    fault = Fault.OTHER if told.fault is None else told.fault
-    members = ((told.outcome, Outcome), (told.safe_state, SafeState), (fault, Fault))
-    for member, wanted in (*members, (told.telemetry, Mapping)):
+    """`ending`, after a check of its types."""
+    answer = _typed(ending, Ending, backend, "execute")
+    fault = Fault.OTHER if answer.fault is None else answer.fault
+    members = ((answer.outcome, Outcome), (answer.safe_state, SafeState), (fault, Fault))
+    for member, wanted in (*members, (answer.telemetry, Mapping)):
         _typed(member, wanted, backend, "execute")
-    return told
+    return answer
 
 
 def called(backend: object, method: str, *arguments: object) -> Any:
-    """The answer of a method that needs no limit."""
+    """Call a method without time limit."""
     return _blaming(lambda: getattr(backend, method)(*arguments), backend, method)
 
 
@@ -172,7 +172,7 @@ def _blaming(work: Callable[[], Any], backend: object, method: str) -> Any:
 
 
 def as_fault(error: BaseException, backend: object, method: str) -> BaseException:
-    """`error` as BackendError, unless it is a message for the user, Ctrl-C, or our own bug."""
+    """`error` as BackendError, unless it is a CampaignError, Ctrl-C, or a bug of this program."""
     by_user = isinstance(error, KeyboardInterrupt) and threading.current_thread() is _MAIN
     plug_in = blamed(error)
     bug = plug_in is None and _is_ours(backend) and isinstance(error, Exception)
@@ -183,14 +183,14 @@ def as_fault(error: BaseException, backend: object, method: str) -> BaseExceptio
 
 
 def _asked(backend: Backend, method: str, trial: Trial) -> Any:
-    """Of thousands of trials: the program's own backends need no thread for each."""
+    """Query about a trial; without a thread for own backends, as there are thousands of trials."""
     if _is_ours(backend):
         return called(backend, method, trial)
     return _within(LOOKING, backend, method, trial)
 
 
 class Call(Generic[T]):
-    """A function at work in a thread that is left behind when it hangs."""
+    """A function in a thread that can be abandoned if it hangs."""
 
     def __init__(self, work: Callable[[], T], name: str) -> None:
         self._answers: list[T] = []
@@ -201,35 +201,35 @@ class Call(Generic[T]):
     def _run(self, work: Callable[[], T]) -> None:
         try:
             self._answers.append(work())
-        except BaseException as error:  # noqa: BLE001 - for whoever asks for the answer
+        except BaseException as error:  # noqa: BLE001 - raised by answer()
             self._error = error
         finally:
             self._done.set()
 
     def has_ended(self, timeout: float) -> bool:
-        """Wait for the end for so long (s)."""
+        """Wait for the end, at most `timeout` (s)."""
         return self._done.wait(timeout)
 
     def answer(self) -> T:
-        """Once it has ended. Raises what the function raised."""
+        """Result, after the end. Raises the exception of the function."""
         if self._error is not None:
             raise self._error
         return self._answers[0]
 
 
 _HANGING: dict[tuple[int, str], Call[Any]] = {}
-"""By backend and method: calls that exceeded their limit; each keeps its backend."""
+"""Calls that exceeded their limit, by backend and method; each keeps its backend alive."""
 
 
 def _within(limit: float, backend: object, method: str, *arguments: object) -> Any:
-    """The answer of a method in time. One that hangs is not called again until it has ended."""
+    """Call a method with a time limit. A hanging method is not called again until it has ended."""
     late = HangsError(f"{method}() of {_named(backend)} did not end within {limit:g} s")
     hung = _HANGING.get((id(backend), method))
     if hung is not None and not hung.has_ended(0.0):
         raise late
     call = Call(partial(called, backend, method, *arguments), method)
     with HEARTBEAT.expected():
-        for _ in range(round(limit / TICK)):  # the sleep of this program does not count
+        for _ in range(round(limit / TICK)):  # time in which this program is suspended is excluded
             if call.has_ended(TICK):
                 return call.answer()
             HEARTBEAT.beat()
@@ -249,7 +249,7 @@ def _typed(value: Any, wanted: type[T], backend: object, method: str) -> T:
 
 
 def _module(thing: object) -> str:
-    """Of a function, or of the class of an object."""
+    """Module of a function, or of an object's class."""
     return getattr(thing if hasattr(thing, "__qualname__") else type(thing), "__module__", "") or ""
 
 
@@ -258,7 +258,7 @@ def _is_ours(thing: object) -> bool:
 
 
 def _named(thing: object) -> str:
-    """Who has written a backend, for messages."""
+    """Package or module of a backend, for messages."""
     plug_in = provider(_module(thing))
     own = getattr(thing, "__qualname__", type(thing).__qualname__)
     return plug_in.package if plug_in is not None else f"{_module(thing)}.{own}"

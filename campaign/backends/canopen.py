@@ -53,11 +53,11 @@ from campaign.trial import Trial
 from campaign.units import Current, Time, Torque
 
 RETRY = 0.2
-"""s between two attempts to find it again."""
+"""s between two attempts to connect again."""
 OVERSHOOT = 1.2
-"""times the rate limit: what one sample may show, where the limit is of a mean."""
+"""Permitted rate of one sample as a multiple of the rate limit, which applies to a mean."""
 JITTER_TIME = 0.5
-"""s in which jitter is measured before more than the promised rate."""
+"""s; duration of the jitter measurement before a rate above the promised one."""
 
 
 class CanopenOptions(Options):
@@ -90,18 +90,18 @@ class CanopenOptions(Options):
 
 
 class CanopenBackend:
-    """One drive. One trial at a time."""
+    """Backend of one drive; executes one trial at a time."""
 
     def __init__(self, options: CanopenOptions, start: Start = start_process) -> None:
         self._options, self._start = options, start
         self._refusal = self._new_refusal()
         self._host = identity("campaign")
         self._client: Client | None = None
-        self._own: dict[od.Item, int] = {}  # limits that the drive had
-        self._proved: set[tuple[str, Scale]] = set()  # by the motion and the scale that it showed
-        self._found = (0, 0)  # boots and 1016h, once its reactions were set
+        self._own: dict[od.Item, int] = {}  # original limits of the drive
+        self._proved: set[tuple[str, Scale]] = set()  # passed proofs: motion, scale
+        self._found = (0, 0)  # boots and 1016h, after its reactions were set
         self._busy = threading.RLock()
-        self._urgent = threading.Event()  # set: the drive was made safe, a trial before ends
+        self._urgent = threading.Event()  # set: the drive is made safe, a running trial ends
 
     def __enter__(self) -> CanopenBackend:
         try:
@@ -110,43 +110,43 @@ class CanopenBackend:
             self._disconnect()
             if not isinstance(error, DriveError):
                 raise
-            told = "no drive answers" if error.silent else "the drive cannot be used"
-            raise BackendError(f"{self._options.port}: {told}: {error}") from None
-        self._refusal = self._new_refusal()  # all trials are asked again, from the first on
+            summary = "no drive answers" if error.silent else "the drive cannot be used"
+            raise BackendError(f"{self._options.port}: {summary}: {error}") from None
+        self._refusal = self._new_refusal()  # all trials are checked again
         return self
 
     def __exit__(self, *exception: object) -> None:
         client = self._client
-        # A trial that hangs keeps its limits.
+        # Do not restore the drive's limits while a trial hangs.
         if client is not None and self._busy.acquire(blocking=False):
             for item, value in {**self._own, od.CONSUMER: 0}.items():  # the heartbeat ends last
                 try:
                     client.write(item, value)
-                except DriveError as error:  # one that cannot be written keeps none of the others
+                except DriveError as error:  # restore the others nevertheless
                     if error.silent:
                         break
             self._busy.release()
         self._disconnect()
 
     def introduce(self, run: str) -> None:
-        """`campaign status` shows this run as the holder."""
+        """Set this run as the holder that `campaign status` shows."""
         self._host = identity(f"run {run}")
 
     def stop_command(self) -> tuple[str, ...]:
-        """`campaign stop`: at the process that owns the bus, or on the bus."""
+        """Command `campaign stop`: through the process that owns the bus, or on the bus."""
         program = (sys.executable, "-P", "-m", "campaign")
         return (*program, "stop", "--port", self._options.port, "--patience", "5")
 
     def panic_stop(self) -> PanicStop | None:
-        """The stop from outside, by this computer's latch; the drive has none."""
+        """The external stop, from this computer's latch; the drive has none."""
         try:
-            found = self._client.ask("latch") if self._client is not None else None
+            latched = self._client.ask("latch") if self._client is not None else None
         except DriveError:
-            return None  # the next trial is told
-        return None if found is None else PanicStop(*found)
+            return None  # the next trial detects it
+        return None if latched is None else PanicStop(*latched)
 
     def clear_stop(self, count: int) -> None:
-        """Let the drive move again after the stop that a person has seen."""
+        """Clear the stop number `count`, so that the drive can move again."""
         try:
             if self._client is not None and self._client.ask("clear", count=count):
                 return
@@ -154,7 +154,7 @@ class CanopenBackend:
             raise BackendError(f"the stop was not cleared: {error}") from None
         raise BackendError(f"{count} is not the latest stop")
 
-    # What it can do
+    # Refusals
 
     def _new_refusal(self) -> Refusal:
         return Refusal(base_motion=False, remedy="a drive moves its own axis alone")
@@ -181,9 +181,9 @@ class CanopenBackend:
 
     def _beyond_bus(self, trial: Trial) -> str | None:
         rate = trial.task.sample_rate
-        told = beyond_bus(rate, self._bitrate, self._options.heartbeat)
-        if told is not None or rate <= PROMISED or self._client is None:
-            return told
+        reason = beyond_bus(rate, self._bitrate, self._options.heartbeat)
+        if reason is not None or rate <= PROMISED or self._client is None:
+            return reason
         try:
             count = round(JITTER_TIME * rate)
             counted = present(self._client, od.COUNTER) is not None
@@ -210,7 +210,7 @@ class CanopenBackend:
     # A trial
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Set limits and ramps, prove the drive once, play the targets."""
+        """Set limits and ramps, prove the drive (once per scale), play the targets."""
         with self._busy:
             self._urgent.clear()
             try:
@@ -230,15 +230,15 @@ class CanopenBackend:
     def _execute(self, client: Client, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
         task = trial.task
         limits = LimitsOptions.model_validate(trial.bench["limits"], context={"si": True})
-        found = self.panic_stop()
-        if found is not None or stop() or self._urgent.is_set():
-            return Ending(Outcome.INTERRUPTED, str(found or "stopped by the operator"))
+        panic_stop = self.panic_stop()
+        if panic_stop is not None or stop() or self._urgent.is_set():
+            return Ending(Outcome.INTERRUPTED, str(panic_stop or "stopped by the operator"))
         if (fault := self._in_fault(client)) is not None:
             return fault
         scale = self._scale_for(client, trial)
         if lacking := set_limits(client, limits, scale, self._own):
-            told = f"limits that the drive lacks, and this program alone watches: {lacking}"
-            recorder.event(Event(0.0, told))
+            remark = f"limits that the drive lacks, and this program alone watches: {lacking}"
+            recorder.event(Event(0.0, remark))
         counted, here = set_times(client, 1 / PROOF_RATE), client.read(od.POSITION)
         angle = here / scale.position
         if abs(angle) > limits.angle:
@@ -282,7 +282,7 @@ class CanopenBackend:
         return ending_of(end, telemetry)
 
     def _in_fault(self, client: Client) -> Ending | None:
-        """How a trial ends on a drive in fault. A lost heartbeat of this program's is cleared."""
+        """Ending of a trial if the drive is in fault; a fault by a lost heartbeat is cleared."""
         if state_of(client.read(od.STATUSWORD)) is not State.FAULT:
             return None
         code = present(client, od.ERROR_CODE) or 0
@@ -300,14 +300,14 @@ class CanopenBackend:
         return scale_of(lambda item: present(client, item), ratio=ratio, **given)
 
     def _prove(self, client: Client, trial: Trial, proof: Proof) -> None:
-        """Once per connection and scale, before the first motion of its kind. Raises DriveError."""
+        """Prove the drive once per connection and scale, before the motion. Raises DriveError."""
         ramp = max(1, round(proof.limits.acceleration * abs(proof.scale.rate)))
         for item in (od.ACCELERATION, od.DECELERATION):
             written(client, item, ramp)
         if ("moves", proof.scale) not in self._proved:
             proof.moves_as_commanded()
             proof.stops_in_silence(self._options.heartbeat)
-            self._in_fault(client)  # its own, which is cleared
+            self._in_fault(client)  # clears the fault that the proof caused
             self._proved.add(("moves", proof.scale))
         if trial.task.mode == "torque" and ("speed limit", proof.scale) not in self._proved:
             peak = float(np.max(np.abs(targets_of(trial.task).values)))
@@ -317,8 +317,8 @@ class CanopenBackend:
     # Rest
 
     def make_safe(self) -> SafeState:
-        """Rest with the drive off, over a new connection when there is none."""
-        self._urgent.set()  # a trial in another thread ends, also where it is between two motions
+        """Bring the drive to rest and switch it off; connect again if necessary."""
+        self._urgent.set()  # ends a trial in another thread, also between two motions
         deadline = time.monotonic() + self._options.safe_time
         seen = self._seen_safe(deadline)
         while not seen and time.monotonic() < deadline:
@@ -348,7 +348,7 @@ class CanopenBackend:
         return client
 
     def _connect(self) -> Client:
-        """Open the bus, know the drive, set its reactions. Raises DriveError, UsageError."""
+        """Open the bus, check the drive, set its reactions. Raises DriveError, UsageError."""
         client, options = self._client or self._opened(), self._options
         address = address_of(options.port)
         self._proved.clear()
@@ -365,7 +365,7 @@ class CanopenBackend:
         return client
 
     def _still_set(self) -> Client | None:
-        """The connection, unless the drive has started anew, and forgotten its reactions."""
+        """The connection, or None if the drive has restarted and lost its reactions."""
         client = self._client
         if client is not None and (client.ask("boots"), client.read(od.CONSUMER)) != self._found:
             self._disconnect()

@@ -1,8 +1,8 @@
-"""The `files` backend: trials go out as files, recordings come back as files.
+"""The `files` backend: exports trials as files, imports recordings as files.
 
-A person plays what lies in a folder on whatever controller there is, and puts the recording beside
-it. That is read by the layout of a mapping, held against what was asked, and refused by name or
-recorded as on any hardware. See `docs/handover.md`.
+A person executes the files of a trial on any controller and puts the recording into the folder. The
+backend reads it by the layout of a mapping and compares it with the trial. It refuses the recording
+with a reason, or records it like other hardware. See `docs/handover.md`.
 """
 
 from __future__ import annotations
@@ -71,14 +71,14 @@ from campaign.trial import Trial, canonical_json
 from campaign.units import Time
 
 GLANCE = 0.2
-"""s between two looks into a folder."""
+"""s between two polls of a folder."""
 BLOCK = 1000
-"""samples that are recorded between two looks at the stop flag."""
+"""samples that are recorded between two checks of the stop flag."""
 WEEK = 604800.0
 CLIPPING = "clipping"
-"""What a layout accepts of a channel that is meant to be at its limit."""
+"""Word of a layout that accepts a clipped channel."""
 DEFECTS = {"sign": "wrong sign", "factor": "wrong scale", CLIPPING: "clipped"}
-"""What a recording is refused as, by the defect that was found when it was read."""
+"""Reason of refusal by the defect that the reader reports."""
 NOT_IN_PROGRESS = "The run is not in progress now: what is handed in is read when it is resumed."
 
 
@@ -110,7 +110,7 @@ class FilesOptions(Options):
 
 
 class FilesBackend:
-    """Hands trials out, and takes their recordings in. One trial at a time."""
+    """Exports trials and imports their recordings, one trial at a time."""
 
     def __init__(self, options: FilesOptions) -> None:
         self._options = options
@@ -126,7 +126,7 @@ class FilesBackend:
         self._begun = False
 
     def introduce(self, run: str) -> None:
-        """The folder belongs to this run."""
+        """Set the run that owns the folder."""
         self._run = run
 
     def __enter__(self) -> FilesBackend:
@@ -149,18 +149,18 @@ class FilesBackend:
         return why
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """Those that the layout names, and those that follow; None while there is no layout."""
+        """Channels of the layout, and channels derived from them; None without a layout."""
         if not self._options.mapping and not (self._options.folder and self._mapping.exists()):
             return None
         try:
             known = read_layouts(self._mapping)
             layout = layout_of(trial, known, self._options.columns, self._mapping)
         except ProtocolError:
-            return None  # said when it is entered
+            return None  # reported on entering
         return sufficient(layout.channels, facts_of(trial))
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Hand `trial` out, wait for its recording, hold it against what was asked, record it."""
+        """Export `trial`, wait for its recording, compare it with the trial, record it."""
         self._trials.setdefault(trial.number, trial)
         self._begin()
         attempt = self._hand_out(trial)
@@ -170,7 +170,7 @@ class FilesBackend:
         if isinstance(files, Ending):
             return files
         used = _digests(files)
-        told: dict[str, JsonValue] = {
+        telemetry: dict[str, JsonValue] = {
             "handed_in": ", ".join(used),
             "handover_attempt": attempt.number,
             "safe_state_by": "whoever handed it in",
@@ -185,20 +185,20 @@ class FilesBackend:
             recording = self._taken(trial, files, layout)
         except (ProtocolError, MappingError, ColumnsError) as error:
             reason = f"the hand-over: the recording of {attempt.name} is not understood: {error}"
-            return Ending(Outcome.INTERRUPTED, reason, telemetry=told)
+            return Ending(Outcome.INTERRUPTED, reason, telemetry=telemetry)
         except RefusedRecording as refused:
             reason = str(refused.found)
             self._judge(attempt, Verdict(reason, used, read_by))
             if refused.recording is not None:
                 _record(refused.recording, recorder, lambda: False)  # as evidence
-            return Ending(Outcome.FAULT, reason, fault=Fault.RECORDING, telemetry=told)
+            return Ending(Outcome.FAULT, reason, fault=Fault.RECORDING, telemetry=telemetry)
         self._judge(attempt, Verdict(not_completed(trial, recording), used, read_by))
         if not _record(recording, recorder, stop):
-            return Ending(Outcome.INTERRUPTED, "stopped by the operator", telemetry=told)
-        return Ending(Outcome.COMPLETED, telemetry=told)
+            return Ending(Outcome.INTERRUPTED, "stopped by the operator", telemetry=telemetry)
+        return Ending(Outcome.COMPLETED, telemetry=telemetry)
 
     def make_safe(self) -> SafeState:
-        """Nothing here moves anything. Who hands a recording in says that the rig is at rest."""
+        """Confirm: the program moves nothing. The person who returns a recording confirms rest."""
         return SafeState.CONFIRMED
 
     # Handing out
@@ -223,7 +223,7 @@ class FilesBackend:
                 self._hand_out(self._trials[number])
 
     def _hand_out(self, trial: Trial) -> Attempt:
-        """The attempt that is due, with all its files."""
+        """The due attempt; its files are written if they do not exist."""
         attempt, is_out = self._places.next_attempt(trial)
         if is_out:
             return attempt
@@ -241,7 +241,7 @@ class FilesBackend:
         return attempt
 
     def _list(self, due: str, state: str) -> None:
-        """The page of all trials, as they are now."""
+        """Write the page of all trials with their present state."""
         rows = []
         for number in sorted({*self._trials, *self._places.trials()}):
             attempts = self._places.attempts(number)
@@ -253,14 +253,14 @@ class FilesBackend:
     # Waiting
 
     def _wait_for(self, attempt: Attempt, stop: StopFlag) -> list[Path] | Ending:
-        """The files of the recording once all of it is there, or why nobody waits any more."""
+        """Files of the complete recording, or the ending if the wait is over."""
         began = time.monotonic()
         seen: list[tuple[str, int, int]] = []
         since = began
         while not stop():
             files, now = attempt.files, time.monotonic()
             if files and attempt.is_marked:
-                return attempt.files  # what was there before the mark is all of it
+                return attempt.files  # the mark is written last: list all files again
             state = _state(files)
             if state != seen:
                 seen, since = state, now
@@ -275,9 +275,9 @@ class FilesBackend:
     # Taking in
 
     def _taken(self, trial: Trial, files: Sequence[Path], layout: Layout) -> ReturnedRecording:
-        """The recording, if it is what was asked.
+        """Read the recording and check it against the trial.
 
-        Raises RefusedRecording, and what reading raises.
+        Raises RefusedRecording, and errors of reading.
         """
         wanted = {*trial.requires, *trial.can_use, *(each.channel for each in WATCHED)}
         others = [each for number, each in sorted(self._trials.items()) if number != trial.number]
@@ -298,10 +298,10 @@ class FilesBackend:
     def _check_whose(
         self, trial: Trial, attempt: Attempt, used: Mapping[str, str], read_by: str
     ) -> None:
-        """Raises RefusedRecording for files that came back for another attempt.
+        """Raise RefusedRecording for files that were returned for another attempt.
 
-        What was refused may come once more for its own trial, when the columns were wrong and have
-        been corrected: then the rig need not do it again.
+        A refused file may be returned again for its own trial after a correction of the columns:
+        the rig need not repeat the trial.
         """
         for name, digest in used.items():
             came = self._came.get(digest)
@@ -309,12 +309,15 @@ class FilesBackend:
                 continue
             if came.trial == trial.number and came.columns != read_by:
                 continue
-            told = f"{name} is, to the last byte, what came back for {came.attempt}"
-            raise RefusedRecording(checks.RecordingProblem("the same file", told))
-        said = read_json(attempt.returned / MANIFEST)
-        if said is not None and said.get("fingerprint") != trial.fingerprint:
-            told = f"the manifest beside it is that of {said.get('name')}"
-            raise RefusedRecording(checks.RecordingProblem("another trial", told))
+            reason = f"{name} is, to the last byte, what came back for {came.attempt}"
+            raise RefusedRecording(checks.RecordingProblem("the same file", reason))
+        returned_manifest = read_json(attempt.returned / MANIFEST)
+        if (
+            returned_manifest is not None
+            and returned_manifest.get("fingerprint") != trial.fingerprint
+        ):
+            reason = f"the manifest beside it is that of {returned_manifest.get('name')}"
+            raise RefusedRecording(checks.RecordingProblem("another trial", reason))
 
     def _judge(self, attempt: Attempt, verdict: Verdict) -> None:
         attempt.judge(verdict)
@@ -322,7 +325,7 @@ class FilesBackend:
 
 
 def _record(recording: ReturnedRecording, recorder: Recorder, stop: StopFlag) -> bool:
-    """Whether all of it was recorded: a stop ends it, and the recording is there for a resume."""
+    """Record all samples; False after a stop. The file remains for a resume."""
     recorder.start(recording.channels)
     for remark in recording.remarks:
         recorder.event(Event(0.0, remark))
@@ -339,26 +342,26 @@ def _record(recording: ReturnedRecording, recorder: Recorder, stop: StopFlag) ->
 
 
 def _digests(files: Sequence[Path]) -> dict[str, str]:
-    """SHA-256 by name; empty for a file that cannot be read, which is told when it is opened."""
-    found = {}
+    """SHA-256 by file name; empty for an unreadable file, which is reported on opening."""
+    digests = {}
     for path in files:
         try:
-            found[path.name] = file_used(path, path.name).sha256
+            digests[path.name] = file_used(path, path.name).sha256
         except RecordingError:
-            found[path.name] = ""
-    return found
+            digests[path.name] = ""
+    return digests
 
 
 def _state(files: Sequence[Path]) -> list[tuple[str, int, int]]:
-    """By what it is seen that a file has changed."""
-    found = []
+    """Name, size and modification time of each file, to detect changes."""
+    state = []
     for path in files:
         try:
             about = path.stat()
         except OSError:
             continue
-        found.append((path.name, about.st_size, about.st_mtime_ns))
-    return found
+        state.append((path.name, about.st_size, about.st_mtime_ns))
+    return state
 
 
 def _open(options: Options) -> FilesBackend:

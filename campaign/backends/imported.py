@@ -1,7 +1,7 @@
 """The backend of imported recordings: served from their files (`campaign import`).
 
-A trial says itself where its samples come from, and this reads them. A file that is not what it was
-when the plan was made ends its trial as a fault.
+Each trial describes the source of its samples; this backend reads them. A file that has changed
+since the plan was made ends its trial as a fault.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class ImportBackend:
 
     def __init__(self) -> None:
         self._stack = ExitStack()
-        # Several trials may lie in one file, which is opened and read once by each thread.
+        # One file may contain several trials; each thread opens and reads it once.
         self._kept = threading.local()
 
     def __enter__(self) -> ImportBackend:
@@ -41,15 +41,15 @@ class ImportBackend:
         self._stack.close()
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why `trial` has no recording to be served from, or None."""
+        """Why `trial` has no recording; None if it has one."""
         return None if trial.recording else "nothing was recorded elsewhere for it"
 
     def channels(self, trial: Trial) -> frozenset[str]:
-        """Those that its files have, and those that are made of them."""
+        """Channels in its files, and channels derived from them."""
         return frozenset(each.name for each in _described(trial).channels)
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Copy the samples of the trial's files, as its description says."""
+        """Copy the samples of the trial's files according to its description."""
         described = _described(trial)
         try:
             reader = RecordingReader(described, self._opened(described))
@@ -69,7 +69,7 @@ class ImportBackend:
         return Ending(Outcome.COMPLETED)
 
     def make_safe(self) -> SafeState:
-        """Nothing here moves."""
+        """Confirm: this backend moves nothing."""
         return SafeState.CONFIRMED
 
     def _opened(self, described: RecordingDescription) -> OpenedFiles:
@@ -87,7 +87,7 @@ def _described(trial: Trial) -> RecordingDescription:
 
 
 def _stretches(lost: np.ndarray) -> list[tuple[int, int]]:
-    """Begin and end of stretches that are all lost, or not at all."""
+    """Begin and end of segments in which all samples are lost, or none."""
     edges = [0, *(np.flatnonzero(lost[1:] != lost[:-1]) + 1).tolist(), len(lost)]
     return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
 

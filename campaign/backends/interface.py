@@ -15,126 +15,126 @@ from campaign.trial import Tree, Trial
 
 
 class Source(StrEnum):
-    """Where a backend's samples come from."""
+    """Source of a backend's samples."""
 
     SIMULATION = "simulation"
     HARDWARE = "hardware"
-    RECORDING = "recording"  # measured before, here or elsewhere
+    RECORDING = "recording"  # an existing recording
 
 
 class StopFlag(Protocol):
-    """Whether one trial is to end early. Every trial has its own; any thread may ask."""
+    """Whether one trial is to end early. Each trial has its own flag; any thread may call it."""
 
     def __call__(self) -> bool: ...
 
 
 @runtime_checkable
 class Backend(Protocol):
-    """Executes trials. Used as a context manager: entering connects, leaving lets go."""
+    """Executes trials. A context manager: entering connects, leaving disconnects."""
 
     def __enter__(self) -> Backend: ...
 
     def __exit__(self, *exception: object) -> None: ...
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why this backend cannot execute `trial` (naming the field), or None when it can.
+        """Why this backend cannot execute `trial` (naming the field); None if it can.
 
-        Asked of every trial of a plan, in order, before anything is connected. A live backend is
-        asked again, in the same order, once it is, before anything moves: by then its bench may
-        have said more. Later trials of a stage are asked of the connected backend only.
+        Called for all trials of a plan, in order, before connecting. For a live backend it is
+        called again, in the same order, after connecting and before any motion: the bench may then
+        provide more data. For trials of later stages it is called after connecting only.
         """
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """Names of the channels that `trial` will have; None while only a connection could tell.
+        """Names of the channels of `trial`; None if they are unknown before connecting.
 
-        Asked before anything is connected, and again, when that answer was None, once it is.
+        Called before connecting, and again after it if the answer was None.
         """
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Execute `trial`, handing samples to `recorder` as they come; end early when `stop()`.
+        """Execute `trial`; pass samples to `recorder` as they come; end early if `stop()`.
 
-        A bench that fails, diverges or meets a limit is an Ending, not an exception; samples that
-        are lost are named to `recorder.lost`, and the trial then ends as a fault. A backend that
-        lost its bench may be asked again: it then tries to find it again. Where several trials at
-        a time are possible, it is called from several threads.
-        Raises BackendError when the backend itself cannot go on.
+        A failing or diverging bench and a reached limit result in an Ending, not in an exception.
+        Lost samples are passed to `recorder.lost`, and the trial ends as a fault. After the loss of
+        its bench the backend may be called again, and tries to reconnect. If several trials at a
+        time are possible, several threads call it.
+        Raises BackendError if the backend itself cannot continue.
         """
 
     def make_safe(self) -> SafeState:
-        """Bring the bench to rest with its drive off, and say whether that was seen.
+        """Bring the bench to rest with its drive off; whether that is confirmed.
 
-        May be called at any time from any thread, also while `execute` does not return: it must
-        then get through all the same.
+        It may be called at any time from any thread, and must also work while `execute` hangs.
         """
 
 
 @runtime_checkable
 class SupportsHolder(Protocol):
-    """What a backend does besides when others ask whose bench it is."""
+    """Additional interface of a backend that reports the holder of its bench to other hosts."""
 
     def introduce(self, run: str) -> None:
-        """Told the name of the run before entering: the same when it is resumed."""
+        """Receive the name of the run, before entering; a resumed run has the same name."""
 
 
 @runtime_checkable
 class SupportsExternalStop(SupportsHolder, Protocol):
-    """What a backend does besides when others can switch its bench off: see `PanicStop`."""
+    """Additional interface of a backend whose bench can be stopped externally: see `PanicStop`."""
 
     def panic_stop(self) -> PanicStop | None:
-        """The stop that keeps the bench off now, or None. Asked at any time between trials.
+        """The stop that keeps the bench off now, or None. Called at any time between trials.
 
-        None, too, while the bench cannot be asked: such a stop must then keep the next trial from
-        moving, which ends as interrupted.
+        Also None while the bench does not answer: the stop must then prevent the motion of the next
+        trial, which ends as interrupted.
         """
 
     def clear_stop(self, count: int) -> None:
-        """Let the bench move again after the stop with this count, which a person has seen.
+        """Clear the stop with this count, which a person has seen; the bench can move again.
 
-        Raises BackendError when there is none, or a later one.
+        Raises BackendError if there is no stop, or a later one.
         """
 
 
 @runtime_checkable
 class StoppedByCommand(Protocol):
-    """What a backend has besides when another process can stop its bench, should this one die."""
+    """Additional interface of a backend whose bench another process can stop, if this one dies."""
 
     def stop_command(self) -> tuple[str, ...]:
-        """The program and its arguments. It ends within some seconds and says what it saw."""
+        """Program and arguments. The program ends within some seconds and reports the result."""
 
 
 @runtime_checkable
 class ExecutesTogether(Protocol):
-    """What a backend does besides when many trials together cost less than one after the other.
+    """Additional interface of a backend that executes trials together at lower cost.
 
     Attributes:
-        fewest_together, most_together: how many at a time are worth it, and possible.
+        fewest_together: smallest number of trials with a lower cost.
+        most_together: largest possible number of trials.
     """
 
     fewest_together: int
     most_together: int
 
     def group(self, trial: Trial) -> Hashable:
-        """Trials of equal groups can be executed together. Asked of trials that are not refused."""
+        """Group of a trial that is not refused; trials of equal groups can be executed together."""
 
     def execute_together(
         self, trials: Sequence[Trial], recorders: Sequence[Recorder], stops: Sequence[StopFlag]
     ) -> Iterator[tuple[int, Ending]]:
-        """As `execute` of each of these trials of one group, with its own recorder and stop flag.
+        """Execute trials of one group, as `execute`, each with its own recorder and stop flag.
 
-        Yields place and ending of each as soon as that one has ended. What one of them records
-        does not depend on the others. Raises BackendError when the backend cannot go on; then it
-        has not executed those whose ending it did not yield.
+        Yields index and ending of each trial when it has ended. The samples of a trial are
+        independent of the others. Raises BackendError if the backend cannot continue; trials
+        without a yielded ending are then not executed.
         """
 
 
 @dataclass(frozen=True)
 class TrialCost:
-    """What a trial costs a backend that computes its samples.
+    """Cost of a trial for a backend that computes its samples.
 
     Attributes:
-        step: of the integration (s).
-        steps: of them in all.
-        because: why the step is shorter than it could be; empty when it is not.
+        step: integration step (s).
+        steps: number of steps.
+        because: why the step is shortened; empty if it is not.
     """
 
     step: float
@@ -144,18 +144,18 @@ class TrialCost:
 
 @runtime_checkable
 class KnowsCost(Protocol):
-    """What a backend does besides when it can say beforehand what a trial costs it."""
+    """Additional interface of a backend that can predict the cost of a trial."""
 
     def cost(self, trial: Trial) -> TrialCost:
-        """Asked of trials that are not refused."""
+        """Cost of a trial that is not refused."""
 
 
 @runtime_checkable
 class SimulatesTruth(Protocol):
-    """What a backend does besides when it can simulate another bench than the stated one."""
+    """Additional interface of a backend that can simulate another bench than the stated one."""
 
     def simulate_instead(self, truths: Mapping[str, Tree]) -> None:
-        """Told, before it is asked anything, what `Trial.truth` stands for: plants, by digest.
+        """Receive the plants that `Trial.truth` refers to, by digest; called before all else.
 
         See `campaign.physics.truth`.
         """
@@ -163,40 +163,39 @@ class SimulatesTruth(Protocol):
 
 @runtime_checkable
 class SupportsTiming(Protocol):
-    """What a backend has besides when it can tell what it spends its time on."""
+    """Additional interface of a backend that measures its time by kind of work."""
 
     timing: Timing
-    """Told of it from now on; whoever executes a plan may set it before the first trial."""
+    """Timing sink. Set it before the first trial."""
 
 
 @runtime_checkable
 class ServesArchive(Protocol):
-    """What a backend has besides when its samples come out of an archived run."""
+    """Additional interface of a backend whose samples come from an archived run."""
 
     @property
     def archive(self) -> RunReader:
-        """That run: commands say what of it is damaged, on screen and in the new archive."""
+        """The archived run; commands report its damage, on screen and in the new archive."""
 
 
 @dataclass(frozen=True)
 class BackendKind:
-    """A backend as `--backend NAME` finds it, with what it declares of itself.
+    """A backend for `--backend NAME`, with its declarations.
 
     Attributes:
-        options: what it accepts (`--set backend.NAME=...`).
-        open: makes one from its options.
-        source: where its samples come from.
-        live: whether it moves something, in the time of the wall clock: `campaign run` then asks
-            before the first motion, a person confirms operator steps, pauses are waited for, and
-            a bench that falls silent in mid-trial is made safe.
-        by_hand: whether a person executes the trials, and nothing here moves anything: operator
-            steps and pauses are a person's as with a live one, but nobody counts how long nothing
-            is heard.
-        stopped_outside: whether others can switch its bench off: then it is a
+        options: class of its options (`--set backend.NAME=...`).
+        open: creates a backend from its options.
+        source: source of its samples.
+        live: whether it moves a bench in wall-clock time: `campaign run` then prompts before the
+            first motion, a person confirms operator steps, pauses take their time, and a bench
+            without samples during a trial is made safe.
+        by_hand: whether a person executes the trials and the program moves nothing: operator steps
+            and pauses are as for a live backend, but silence has no time limit.
+        stopped_outside: whether its bench can be stopped externally; it is then a
             `SupportsExternalStop`.
         several: whether several trials may be executed at a time (`--workers`).
-        needs: what it needs of a bench, as dotted paths (`motor.resistance`); a protocol with a
-            bench that lacks some is refused, with all of them named.
+        needs: bench fields that it needs, as dotted paths (`motor.resistance`); a protocol with a
+            bench without some of them is refused, with all of them named.
         picklable: whether worker processes can have copies of its backend.
         simulates: whether it runs the engine of `campaign.physics`, which is compiled at its first
             start.

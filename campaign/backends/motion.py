@@ -1,7 +1,7 @@
-"""The interface of a hull motion device beside the controller.
+"""The interface of a hull motion device next to the controller.
 
-The thesis puts the platform on a six-degree-of-freedom table. Here is what such a table has to do,
-and the one of a rehearsal, whose motion the rehearsal controller emulates together with the bench.
+The thesis puts the platform on a six-degree-of-freedom table. This module defines the interface of
+such a table, and its substitute for the controller emulator, which emulates the hull motion itself.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ class BaseMotion(Protocol):
     """A device that moves the hull; its true motion is recorded by the controller's sensors."""
 
     def load(self, acceleration: Signal, duration: float) -> None:
-        """Get ready for an angular acceleration (rad/s^2) over `duration` (s). BackendError."""
+        """Prepare an angular acceleration (rad/s^2) over `duration` (s). Raises BackendError."""
 
     def trigger(self) -> None:
-        """Begin now; the trial begins with it."""
+        """Begin the motion, and with it the trial."""
 
     def stop(self) -> None:
-        """Come to rest; nothing to do when it is."""
+        """Come to rest, if it moves."""
 
     def make_safe(self) -> SafeState:
-        """Come to rest and say whether that was seen."""
+        """Come to rest; whether that is confirmed."""
 
 
 class EmulatedMotion:
-    """What it would do goes to the rehearsal controller with the rest of the trial."""
+    """Motion that the controller emulator receives with the trial's configuration."""
 
     def load(self, acceleration: Signal, duration: float) -> None:
         """Nothing to load."""
@@ -38,8 +38,8 @@ class EmulatedMotion:
         """The controller's START is the trigger."""
 
     def stop(self) -> None:
-        """The emulated hull rests when the trial has ended."""
+        """Nothing to do: the emulated hull rests at the end of the trial."""
 
     def make_safe(self) -> SafeState:
-        """Nothing moves."""
+        """Confirm: nothing moves."""
         return SafeState.CONFIRMED

@@ -1,9 +1,8 @@
 """The `replay` backend: archived recordings under a new protocol.
 
-A planned trial is answered by an archived one of the same bench and the same task; only the
-measuring window may differ, since it is the analysis' business. Every archived trial is served
-once; those that somebody interrupted are not. One that cannot be read ends as a fault that names
-what is damaged.
+A planned trial gets the recording of an archived one with the same bench and task; only the
+measuring window, which concerns the analysis, may differ. Every archived trial is used once;
+interrupted ones are not used. An unreadable trial ends as a fault that names the damage.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ from campaign.physics.bench import Bench
 from campaign.recording import Ending, Fault, Outcome, Recorder, SafeState
 from campaign.trial import Task, Tree, Trial, canonical_json
 
-_BLOCK = 4096  # samples between two looks at whether to stop
-_NOT_ASKED = {"window"}  # what a task says to an analysis alone
-_COMPARED = 2000  # archived trials among which the nearest is looked for, to explain a refusal
-_TOLD = 3  # differing fields that a refusal names
+_BLOCK = 4096  # samples between two checks of the stop flag
+_NOT_ASKED = {"window"}  # fields of a task that only an analysis uses
+_COMPARED = 2000  # archived trials that are searched for the nearest, to explain a refusal
+_TOLD = 3  # maximum number of differing fields in a refusal
 _ABSENT = object()
 
 
@@ -46,7 +45,7 @@ class ReplayOptions(Options):
 
 @dataclass(frozen=True)
 class _Lost:
-    """An archived trial that cannot be read: what it was, the archived plan tells."""
+    """An unreadable archived trial, with its trial from the archived plan."""
 
     trial: Trial
     reason: str
@@ -57,16 +56,16 @@ _Archived = ArchivedTrial | _Lost
 
 @dataclass
 class _Alike:
-    """Archived trials of one bench and task, and the planned trials that they answer."""
+    """Archived trials of one bench and task, and the planned trials assigned to them."""
 
     archived: list[_Archived] = field(default_factory=list)
-    answers: dict[int, Trial] = field(default_factory=dict)  # by place in `archived`
+    answers: dict[int, Trial] = field(default_factory=dict)  # by index in `archived`
 
     def assign(self, trial: Trial) -> bool:
-        """Give `trial` the archived one that suits it best; False when all are taken.
+        """Assign the best matching archived trial to `trial`; False if all are assigned.
 
-        A planned trial gives its recording up to one that it suits better, and takes the next best:
-        whatever the order of the plan, each gets its own when it is there.
+        A planned trial cedes its recording to a better match and takes its next best. So each gets
+        its own recording, if it exists, independent of the order of the plan.
         """
         if len(self.answers) == len(self.archived):
             return False
@@ -76,7 +75,7 @@ class _Alike:
         return True
 
     def _take(self, trial: Trial) -> Trial | None:
-        """Assign the best place that is free or held by a trial it suits less; who had it."""
+        """Assign the best recording that is free or held by a worse match; its former holder."""
         suits = [_likeness(trial, archived.trial) for archived in self.archived]
         for place in sorted(range(len(suits)), key=lambda place: suits[place], reverse=True):
             holder = self.answers.get(place)
@@ -86,7 +85,7 @@ class _Alike:
         raise AssertionError("a free place suits everybody")
 
     def answer_to(self, trial: Trial) -> _Archived | None:
-        """What was assigned to `trial`."""
+        """The archived trial assigned to `trial`, or None."""
         for place, planned in self.answers.items():
             if planned.number == trial.number:
                 return self.archived[place]
@@ -94,7 +93,7 @@ class _Alike:
 
 
 class ReplayBackend:
-    """Serves the trials of one archive, whichever order they are asked for in."""
+    """Serves the trials of one archive in any order."""
 
     def __init__(self, run: RunReader) -> None:
         self._run = run
@@ -118,14 +117,14 @@ class ReplayBackend:
         return None
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why the archive has no recording for `trial`: the fields in which the nearest differs."""
+        """Why no recording fits `trial`, with the differing fields of the nearest; or None."""
         return None if self._answer(trial) else self._why_not(trial)
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """What the archive has for `trial`; None where it has nothing.
+        """Archived channels for `trial`; None if they are unknown.
 
-        An archived trial that ended before its channels were announced, or whose record is damaged,
-        ends here as it did there, or as a fault: nothing is said of its channels.
+        They are unknown if the archived trial ended before their announcement, or is damaged. The
+        trial then ends as the archived one, or as a fault.
         """
         archived = self._answer(trial)
         if archived is None or isinstance(archived, _Lost):
@@ -139,9 +138,9 @@ class ReplayBackend:
         return self._channels[key]
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Copy channels, samples, events and ending of the archived trial; the same one again.
+        """Copy channels, samples, events and ending of the archived trial; repeatable.
 
-        Nothing moves, so the state is safe, however the archived trial left its bench.
+        Nothing moves: the safe state is confirmed, whatever the archived one was.
         """
         archived = self._answer(trial)
         if archived is None:
@@ -171,7 +170,7 @@ class ReplayBackend:
         return replace(archived.ending, safe_state=SafeState.CONFIRMED)
 
     def make_safe(self) -> SafeState:
-        """A replay has nothing that moves."""
+        """Confirm: a replay moves nothing."""
         return SafeState.CONFIRMED
 
     def _answer(self, trial: Trial) -> _Archived | None:
@@ -214,19 +213,19 @@ class ReplayBackend:
 
 
 def _lost(run: RunReader) -> Iterator[_Lost]:
-    """The trials that were executed to their end and cannot be read, as far as a plan has them."""
+    """Unreadable trials that were not interrupted, if the archived plan contains them."""
     finished = run.story.finished
     for number, damage in sorted(lost_trials(run).items()):
         if number in finished and finished[number].outcome is Outcome.INTERRUPTED:
             continue
-        with contextlib.suppress(ArchiveError):  # without a plan nobody knows what it was
+        with contextlib.suppress(ArchiveError):  # without a plan the trial is unknown
             yield _Lost(run.planned(number), f"{run.path}: {in_words(damage)}")
 
 
 def _asked_of_bench(trial: Trial) -> dict[str, Any]:
-    """What determines a recording but for chance: bench, truth, and the task without its window.
+    """All that determines a recording except the seed: bench, truth, task without window, files.
 
-    Through today's classes, so that an option which is younger than the archive has its default.
+    Validated by the present classes: an option newer than the archive has its default.
     """
     task = Task.model_dump(trial.task, mode="json", exclude=_NOT_ASKED)
     asked: dict[str, Any] = {"bench": _normalised(canonical_json(trial.bench)), "task": task}
@@ -239,12 +238,12 @@ def _normalised(bench: str) -> Tree:
     tree: Tree = json.loads(bench)
     try:
         return Bench.model_validate(tree, context={"si": True}).model_dump(mode="json")
-    except ValueError:  # of a program that knows other benches; compared as it is
+    except ValueError:  # a bench of another version; compared unchanged
         return tree
 
 
 def _likeness(trial: Trial, archived: Trial) -> tuple[bool, ...]:
-    """How well an archived trial of the same bench and task suits; the greater, the better."""
+    """Rank of an archived trial of the same bench and task; larger is better."""
     return (
         trial.seed == archived.seed,
         trial.test == archived.test,
@@ -255,12 +254,12 @@ def _likeness(trial: Trial, archived: Trial) -> tuple[bool, ...]:
 
 
 def _differences(archived: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """`path: what it is there, what is asked for here`, the task's before the bench's."""
-    there = dict(_leaves(archived))
+    """Differences as `path: archived value there, wanted value here`; task before bench."""
+    leaves = dict(_leaves(archived))
     differing = [
-        f"{path}: {_told(there.get(path, _ABSENT))} there, {_told(wanted.get(path, _ABSENT))} here"
-        for path in dict.fromkeys((*there, *wanted))
-        if there.get(path, _ABSENT) != wanted.get(path, _ABSENT)
+        f"{path}: {_told(leaves.get(path, _ABSENT))} there, {_told(wanted.get(path, _ABSENT))} here"
+        for path in dict.fromkeys((*leaves, *wanted))
+        if leaves.get(path, _ABSENT) != wanted.get(path, _ABSENT)
     ]
     return sorted(differing, key=lambda text: text.startswith("bench."))
 

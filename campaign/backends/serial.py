@@ -38,15 +38,15 @@ from campaign.wire.channel_features import named_channels
 from campaign.wire.messages import Channel, Clear, Release, State, Value, WireError
 
 RETRY = 0.2
-"""s between two attempts to reach a controller that has gone."""
+"""s between two attempts to reach a lost controller."""
 ANSWER = 1.0
-"""s that a controller found again may take to answer while it is being made safe."""
+"""s; time limit for an answer of a reconnected controller while it is made safe."""
 LETTING_GO = 1.0
-"""s in which a trial in another thread lets go of the line, unless it hangs elsewhere."""
+"""s in which a trial in another thread releases the line, unless it hangs."""
 LOOKING = 2.0
-"""s between two looks for a controller that was lost, while no trial runs."""
+"""s between two attempts to reconnect a lost controller while no trial runs."""
 REST = 2.0
-"""s in which a controller that has ended a trial is seen at rest."""
+"""s; time limit to confirm rest after the controller has ended a trial."""
 
 
 class SerialOptions(Options):
@@ -65,7 +65,7 @@ class SerialOptions(Options):
 
 
 class SerialBackend:
-    """One controller; it is found again when it was lost. One trial at a time."""
+    """Backend of one controller, reconnected after a loss; executes one trial at a time."""
 
     def __init__(self, options: SerialOptions) -> None:
         self._options = options
@@ -73,12 +73,12 @@ class SerialBackend:
         self._refusal = self._new_refusal()
         self._number = new_session()
         self._host = identity("campaign")
-        self._trials = new_session() // 2  # no other host's records can be taken for ours
-        self._look_for_it = 0.0  # when (steady clock) a controller that was lost is looked for
+        self._trials = new_session() // 2  # distinguishes trials from those of other hosts
+        self._look_for_it = 0.0  # monotonic time of the next attempt to reconnect
         self._connection: Connection | None = None
         self._session: Session | None = None
         self._busy = threading.RLock()
-        self._urgent = threading.Event()  # set: the bench is being made safe, everything else ends
+        self._urgent = threading.Event()  # set: the bench is being made safe, all else ends
 
     def __enter__(self) -> SerialBackend:
         if not self._options.port:
@@ -94,7 +94,7 @@ class SerialBackend:
                 f"no controller answers by the protocol on {self._options.port}: {error}; is it "
                 "the right port and baud rate, and is the controller switched on?"
             ) from None
-        self._refusal = self._new_refusal()  # all trials are asked again, from the first on
+        self._refusal = self._new_refusal()  # all trials are checked again
         return self
 
     def _new_refusal(self) -> Refusal:
@@ -104,30 +104,30 @@ class SerialBackend:
         self._disconnect()
 
     def stop_command(self) -> tuple[str, ...]:
-        """`campaign stop`, which needs no session."""
+        """Command `campaign stop`, which needs no session."""
         baud = str(self._options.baud)
         program = (sys.executable, "-P", "-m", "campaign")
         line = ("--port", self._options.port, "--baud", baud)
         return (*program, "stop", *line, "--patience", "5")
 
     def introduce(self, run: str) -> None:
-        """The controller tells others that this run holds it."""
+        """Set this run as the holder that the controller reports to other hosts."""
         self._host = identity(f"run {run}")
 
     def panic_stop(self) -> PanicStop | None:
-        """The stop from outside that keeps the bench off; None, too, while nobody can be asked."""
+        """The external stop that keeps the bench off; None also while the controller is lost."""
         if not self._busy.acquire(timeout=LETTING_GO):
-            return None  # a trial that hangs has the line, and is left behind
+            return None  # a hanging trial has the line, and is abandoned
         try:
             session = self._session or self._found_again()
             return None if session is None else session.panic_stop()
         except (LinkFaultError, BackendError, UsageError):
-            return None  # the next trial is told when it arms
+            return None  # the next trial detects it when it arms
         finally:
             self._busy.release()
 
     def _found_again(self) -> Session | None:
-        """A controller that was lost, if it is there again; looked for now and then."""
+        """Try to reconnect a lost controller, at most once per `LOOKING`."""
         now = time.monotonic()
         if now < self._look_for_it:
             return None
@@ -135,7 +135,7 @@ class SerialBackend:
         return self._connect()
 
     def clear_stop(self, count: int) -> None:
-        """Let the bench move again after the stop that a person has seen."""
+        """Clear the stop number `count`, so that the bench can move again."""
         with self._busy:
             try:
                 (self._session or self._reconnect(self._options.silence)).clear_stop(count)
@@ -143,14 +143,14 @@ class SerialBackend:
                 raise BackendError(f"the stop was not cleared: {error}") from None
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why no controller could execute `trial`, and once one has said hello, why it could not.
+        """Why no controller can execute `trial`, or, after connecting, why this one cannot.
 
         Needs no port.
         """
         return self._refusal(trial) or self._refused_by_it(trial)
 
     def _refused_by_it(self, trial: Trial) -> str | None:
-        """What the controller says of itself rules out; None while there is none to ask."""
+        """Refusal by the controller's capabilities; None before it is connected."""
         session = self._session
         if session is None or session.capabilities is None:
             return None
@@ -161,14 +161,14 @@ class SerialBackend:
         return None
 
     def channels(self, trial: Trial) -> frozenset[str] | None:
-        """What the controller's features name; None before it is connected, or if they do not."""
+        """Channels in the controller's features; None before connecting, or if they name none."""
         session = self._session
         if session is None or session.capabilities is None:
             return None
         return named_channels(session.capabilities.features)
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Configure, arm, start and record `trial`; STOP when `stop()`."""
+        """Configure, arm, start and record `trial`; send STOP if `stop()`."""
         with self._busy:
             try:
                 session = self._session or self._reconnect(self._options.silence)
@@ -184,12 +184,12 @@ class SerialBackend:
                     self._motion.stop()
 
     def make_safe(self) -> SafeState:
-        """SAFE until the controller says that it is, over a new connection when there is none.
+        """Send SAFE until the controller confirms it; connect again if necessary.
 
-        A trial that hangs in another thread, on a full disk perhaps, keeps the line: it is then
-        spoken on over its head.
+        A trial that hangs in another thread, e.g. on a full disk, keeps the line: SAFE is then sent
+        over its connection nevertheless.
         """
-        self._urgent.set()  # a trial that still runs in another thread lets go of the line
+        self._urgent.set()  # a running trial in another thread releases the line
         deadline = time.monotonic() + self._options.safe_time
         seen = held = False
         try:
@@ -249,10 +249,10 @@ class SerialBackend:
         return settings_of(trial, session.capabilities, emulated=emulated)
 
     def _released(self, session: Session, number: int, ending: Ending) -> Ending:
-        """Let the controller forget the trial; see it at rest where its END did not say so."""
+        """Release the trial on the controller; confirm rest if END did not confirm it."""
         status = session.status
         if status is not None and status.state is State.ENDED:
-            # Refused when somebody sent SAFE meanwhile: CLEAR before the next trial does the same.
+            # Refused after a SAFE from another host: CLEAR before the next trial does the same.
             with contextlib.suppress(RefusedError):
                 session.command(Release(number))
         if ending.safe_state is SafeState.CONFIRMED:
@@ -261,7 +261,7 @@ class SerialBackend:
         return replace(ending, safe_state=_state(rested))
 
     def _broken_off(self, session: Session, error: LinkFaultError) -> Ending:
-        """How a trial ended that the session could not bring to its end."""
+        """Ending of a trial after an error of the link."""
         safe, stop = False, None
         try:
             if isinstance(error, SilenceError | HeldError):
@@ -271,7 +271,7 @@ class SerialBackend:
                 if isinstance(error, ResetError):
                     session.hello()
                 else:
-                    stop = session.panic_stop()  # it may be why a command came at a wrong time
+                    stop = session.panic_stop()  # it may have caused the refusal
             else:
                 safe = session.safe(time.monotonic() + REST)
         except (LinkFaultError, BackendError):
@@ -297,7 +297,7 @@ class SerialBackend:
         return session
 
     def _reconnect(self, patience: float) -> Session:
-        """Try again and again for `patience` (s). LinkFaultError or UsageError of the last try."""
+        """Retry for `patience` (s). Raises LinkFaultError or UsageError of the last attempt."""
         deadline = time.monotonic() + patience
         while True:
             try:
@@ -307,16 +307,15 @@ class SerialBackend:
                     raise
 
     def _disconnect(self, *, last_words: bool = True) -> None:
-        """Let go of the line. Without `last_words` only the heartbeats end, and it stops by that:
-
-        to a controller that is silent because it has started anew, a SAFE would be a stranger's.
+        """Release the line. Without `last_words` no SAFE is sent: the end of heartbeats stops the
+        bench. A restarted controller would treat the SAFE as a stop from another host.
         """
         connection, self._connection, self._session = self._connection, None, None
         if connection is not None:
             connection.close(last_words=last_words)
 
     def _seen_safe(self, deadline: float) -> bool:
-        """Raises HeldError: another host's bench now is not ours to stop, nor to call safe."""
+        """Whether SAFE is confirmed. Raises HeldError if another host holds the bench now."""
         try:
             if self._session is not None:
                 return self._session.safe(deadline)
@@ -332,9 +331,9 @@ class SerialBackend:
         return False
 
     def _seen_safe_anew(self, deadline: float) -> bool:
-        """SAFE over a new connection, with HELLO before it: of a session that the controller does
-        not know, it would be a stop from outside, and a person would have to clear it. Who does not
-        answer HELLO may still hear SAFE.
+        """Send HELLO, then SAFE, over a new connection; SAFE also if HELLO gets no answer.
+
+        In an unknown session SAFE would be an external stop, which a person must clear.
         """
         self._connection = Connection(self._options.port, self._options.baud, self._number)
         session = Session(self._connection, ANSWER, self._number, self._host)
@@ -346,10 +345,10 @@ class SerialBackend:
         return seen
 
     def _seen_safe_beside(self, deadline: float) -> bool:
-        """Over the connection of a trial that does not let go of it, and does not read it."""
+        """Send SAFE over the connection of a trial that neither releases nor reads it."""
         connection = self._connection
         if connection is None:
-            return False  # it is being looked for, which ends soon
+            return False  # the trial reconnects, which ends soon
         beside = Session(connection, self._options.silence, self._number, self._host)
         try:
             return beside.safe(min(deadline, time.monotonic() + REST))
@@ -358,15 +357,17 @@ class SerialBackend:
 
 
 def _info(channel: Channel, mode: str, sides: Sides) -> ChannelInfo:
-    """A channel as the controller describes it; it need not know that its axis is linear."""
-    told = ChannelInfo(
+    """Channel as declared by the controller, which may treat a linear axis as rotary."""
+    as_declared = ChannelInfo(
         channel.name, channel.unit, channel.label, channel.display_unit, channel.measured
     )
     axis = axis_of(channel.name, sides)
     if axis is AxisKind.ROTARY or channel.name not in VOCABULARY:
-        return told
+        return as_declared
     as_rotary = info(channel.name, mode)
-    return info(channel.name, mode, axis=axis) if told.unit == as_rotary.unit else told
+    return (
+        info(channel.name, mode, axis=axis) if as_declared.unit == as_rotary.unit else as_declared
+    )
 
 
 def _state(safe: bool) -> SafeState:

@@ -27,15 +27,15 @@ from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Tree, Trial, tree_text
 from campaign.units import Time
 
-if TYPE_CHECKING:  # the engine takes its time to be imported
+if TYPE_CHECKING:  # the import of the engine is slow
     from campaign.physics.lanes import Lane
 
 __all__ = ["BACKEND", "CHANNELS", "SimBackend", "SimOptions", "announced"]
 
 MOST_BENCHES = 64
-"""Benches that are kept validated: trials of a test mostly share one."""
+"""Size of the cache of validated benches: most trials of a test share one."""
 MOST_KNOWN = 200_000
-"""Trials of which step and structure are kept: more than a plan has."""
+"""Size of the cache of steps and structures of trials: more than a plan has."""
 
 
 class SimOptions(Options):
@@ -49,25 +49,25 @@ class SimOptions(Options):
 
 
 class _Known(NamedTuple):
-    """What is kept of a trial that was looked at: what it costs, and whom it goes with."""
+    """Cached cost and group of a trial."""
 
     cost: TrialCost
     group: Hashable
 
 
 class SimBackend:
-    """Simulates every trial from rest, whatever came before it.
+    """Simulates every trial from rest, independently of earlier trials.
 
-    Trials of one structure go side by side through the engine: each one's samples are, to the bit,
-    what they are when it is simulated alone.
+    The engine simulates trials of one structure in parallel lanes; their samples are bitwise equal
+    to those of a single simulation.
 
     Attributes:
-        has_blocks: whether trials go side by side at all: not where the engine for that was never
-            compiled, and compiling it would take longer.
+        has_blocks: whether lanes are used: False if their engine is not compiled and compiling it
+            would take longer than single simulation.
     """
 
     fewest_together = 4
-    """A block costs what four trials cost alone, however few are in it."""
+    """A block costs as much as four single trials, for any number of lanes."""
 
     def __init__(self, options: SimOptions) -> None:
         self._options = options
@@ -81,7 +81,7 @@ class SimBackend:
         self.has_blocks = True
 
     def __reduce__(self) -> tuple[object, ...]:
-        """For another process: what it was told, and nothing of what it has worked out."""
+        """Pickled for another process: its settings, without caches."""
         return _again, (self._options, self._truths, self.has_blocks)
 
     def __enter__(self) -> SimBackend:
@@ -92,20 +92,20 @@ class SimBackend:
 
     @property
     def most_together(self) -> int:
-        """Lanes of a block."""
+        """Number of lanes of a block."""
         from campaign.physics.vector import LANES
 
         return LANES if self.has_blocks else 1
 
     def simulate_instead(self, truths: Mapping[str, Tree]) -> None:
-        """Told the plants of truths, by the digest that trials have of theirs."""
+        """Add plants of truths, by the digest in `Trial.truth`."""
         self._truths.update(truths)
 
     def refuses(self, trial: Trial) -> str | None:
         """Why this backend cannot execute `trial`, or None.
 
-        Of trials that differ in their seed alone the first is looked at: draws of friction change
-        the step by a few percent, and only one that needs the finest could be refused for them.
+        Of trials that differ only in their seed the first is checked. Draws of friction change the
+        step by a few percent: only a trial near the finest step could be refused for that.
         """
         kind = trial.apart_from_seed
         if kind in self._accepted:
@@ -128,26 +128,26 @@ class SimBackend:
         return None
 
     def channels(self, trial: Trial) -> frozenset[str]:
-        """All that the simulation knows; where it has a truth of its own, what a rig could tell."""
+        """All simulated channels; with a separate truth only those that a rig can measure."""
         return _MEASURED if trial.truth else _NAMES
 
     def group(self, trial: Trial) -> Hashable:
-        """Trials of one structure: the same models, inputs, sensors, sample rates and step."""
+        """Structure of a trial: models, inputs, sensors, sample rates and step."""
         return self._look_at(trial).group
 
     def cost(self, trial: Trial) -> TrialCost:
-        """The step that was chosen for a trial, and how many there are."""
+        """Integration step of a trial, and number of steps."""
         return self._look_at(trial).cost
 
     def steps_together(self, trials: Sequence[Trial]) -> int:
-        """Steps of all trials that would be executed together."""
+        """Total steps of the trials that would be executed together."""
         alike = self._by_group(trials)
         many = (each for each in alike if len(each) >= self.fewest_together)
         return sum(self.cost(trial).steps for each in many for trial in each)
 
     def make_ready(self, trials: Sequence[Trial]) -> None:
-        """Compile what these trials need besides the engine of a loop, as they are executed:
-        friction models and the engine of a prescribed motion, for lanes or for one.
+        """Compile the code of these trials besides the engine of a loop: friction models and the
+        engine of a prescribed motion, for lanes or for single trials.
         """
         from campaign.physics.lanes import together
         from campaign.physics.machine_code import engine
@@ -169,14 +169,14 @@ class SimBackend:
         return alike.values()
 
     def execute(self, trial: Trial, recorder: Recorder, stop: StopFlag) -> Ending:
-        """Simulate `trial`; end it at a limit, at a divergence, or when `stop()`."""
+        """Simulate `trial`; end it at a limit, at a divergence, or if `stop()`."""
         ((_, ending),) = self.execute_together([trial], [recorder], [stop])
         return ending
 
     def execute_together(
         self, trials: Sequence[Trial], recorders: Sequence[Recorder], stops: Sequence[StopFlag]
     ) -> Iterator[tuple[int, Ending]]:
-        """As `execute` of each of these trials of one structure, side by side."""
+        """Execute trials of one structure in parallel lanes."""
         from campaign.physics.simulate import samples_at_a_time, simulate_together
 
         lanes = [self._lane(trial) for trial in trials]
@@ -214,7 +214,7 @@ class SimBackend:
         return SimulatedTrial(lane.stated, lane.task, samples, recorder, stop, check, told=told)
 
     def make_safe(self) -> SafeState:
-        """A simulation has nothing that moves."""
+        """Confirm: a simulation moves nothing."""
         return SafeState.CONFIRMED
 
     def _look_at(self, trial: Trial) -> _Known:
@@ -226,7 +226,7 @@ class SimBackend:
                 self._known.clear()
                 self._groups.clear()
             structure = lane.structure
-            group = self._groups.setdefault(structure, structure)  # one object for all that have it
+            group = self._groups.setdefault(structure, structure)  # one shared object
             known = self._known[trial.fingerprint] = _Known(cost, group)
         return known
 
@@ -240,7 +240,7 @@ class SimBackend:
             return Lane.of(bench, trial.task, trial.seed, longest_step, stated)
 
     def _simulated_instead(self, trial: Trial, stated: CompleteBench) -> CompleteBench:
-        """The truth under the software of the stated bench."""
+        """Bench with the plant of the truth and the software of the stated bench."""
         key = (tree_text(trial.bench), trial.truth)
         bench = self._simulated.get(key)
         if bench is None:

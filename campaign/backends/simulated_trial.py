@@ -47,10 +47,10 @@ CHANNELS = tuple(
         LOAD_RATE,
     )
 )
-"""In the order of a block; what the command is depends on the task."""
+"""Channels in the order of a block; the quantity of the command depends on the task."""
 
 MEASURED = tuple(channel for channel in CHANNELS if channel.measured)
-"""What a rig would have, too."""
+"""Channels that a rig can also measure."""
 
 OUTPUTS = (
     GYRO_RATE,
@@ -62,16 +62,16 @@ OUTPUTS = (
     FRICTION_TORQUE,
     LOAD_RATE,
 )
-"""The channels that the engine's outputs are, in the order of its rows."""
+"""Channels of the engine's outputs, in the order of its rows."""
 
 
 def announced(names: Sequence[str], mode: str, sides: Sides) -> tuple[ChannelInfo, ...]:
-    """What the channels are, of a bench with these sides and of a task with this mode."""
+    """Channels for a bench with these sides and a task with this mode."""
     return tuple(info(name, mode, axis=axis_of(name, sides)) for name in names)
 
 
 class SimulatedTrial:
-    """Takes the outputs of the engine until the trial ends."""
+    """Records the outputs of the engine until the trial ends."""
 
     def __init__(
         self,
@@ -84,11 +84,11 @@ class SimulatedTrial:
         *,
         told: bool = True,
     ) -> None:
-        """A trial of `bench`, as far as those know it who move it.
+        """Begin a trial of the stated `bench` (not its truth).
 
         Args:
-            samples: how many there are when nothing ends the trial before.
-            told: whether what only a simulator can know is recorded, too.
+            samples: number of samples of the whole trial.
+            told: whether channels that only a simulation provides are recorded, too.
         """
         self._bench = bench
         self._task = task
@@ -103,9 +103,9 @@ class SimulatedTrial:
         recorder.start(announced(names, task.mode, bench.sides))
 
     def take(self, time: Array, out: Array, half: Array | None = None) -> Ending | None:
-        """The next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); None: it goes on.
+        """Record the next outputs (8, n), rows as `OUTPUTS`, at `time` (n,); the ending, or None.
 
-        `half`: the same outputs at half the step, where that is checked.
+        `half`: the same outputs at half the step, for a step check.
         """
         ending = self._take(time, out, half)
         if ending is None or self._check is None:
@@ -114,7 +114,7 @@ class SimulatedTrial:
 
     def _take(self, time: Array, out: Array, half: Array | None) -> Ending | None:
         block = self._block(time, out)
-        # By the gyro where there is one: an angle, differenced, is too coarse for slow motion.
+        # From the gyro if available: a differentiated angle is too coarse for slow motion.
         rate = block[2] if self._bench.rate_is_of_encoder else block[2] - block[1]
         reached = _first_beyond(rate, self._task.stop_rate)
         end, ending = _first_violation(self._watch, time[:reached], block[:, :reached])
@@ -123,7 +123,7 @@ class SimulatedTrial:
             self._check.add(out[:, :end], half[:, :end])
         self._left -= len(time)
         if ending is not None:
-            late = ending.outcome is Outcome.LIMIT  # its own sample is the last one kept
+            late = ending.outcome is Outcome.LIMIT  # the sample beyond the limit is kept, as last
             self._recorder.event(Event(float(time[end - 1 if late else end]), ending.reason))
             return ending
         if reached < len(time):
@@ -136,14 +136,14 @@ class SimulatedTrial:
         return None if self._left > 0 else Ending(Outcome.COMPLETED)
 
     def _block(self, time: Array, out: Array) -> Array:
-        """The recorded channels, shape (11, n); fewer where the truth is not told."""
+        """The recorded channels, shape (11, n); fewer rows if the truth is not recorded."""
         bench, task = self._bench, self._task
         block = np.empty((len(CHANNELS), len(time)))
         gyro, relative, angle, current, pointing, compensation, friction, load_rate = out
         block[0] = task.command.sample(time)
         block[1] = base_rate(task.base_acceleration, time)
         block[2], block[3], block[4], block[5] = gyro, relative, angle, current
-        if task.mode == "spring":  # it pulls the load in place of the motor
+        if task.mode == "spring":  # the spring pulls the load instead of the motor
             block[6] = task.spring_stiffness * (block[0] - angle)
         else:
             block[6] = current * bench.torque_per_current
@@ -152,7 +152,7 @@ class SimulatedTrial:
 
 
 def _first_beyond(samples: Array, bound: float | None) -> int:
-    """Index of the first sample beyond `bound` either way; all of them when there is none."""
+    """Index of the first sample with a magnitude above `bound`; the sample count without any."""
     if bound is None:
         return len(samples)
     beyond = np.abs(samples) > bound
@@ -160,15 +160,15 @@ def _first_beyond(samples: Array, bound: float | None) -> int:
 
 
 def _first_violation(watch: LimitWatch, time: Array, block: Array) -> tuple[int, Ending | None]:
-    """How many samples are good, and why the trial ends there (None: it goes on).
+    """Number of samples to record, and the ending at that sample (None: no violation).
 
-    Looks at the recorded samples: what exceeds a limit only between two of them is not seen.
-    Acceleration has no channel: its limit, like the duration's, is checked in the plan only.
+    Checks the recorded samples; an excess between two samples is not detected. Acceleration has no
+    channel: its limit and that of the duration are checked in the plan only.
     """
     finite = np.isfinite(block)
     first = len(time) if finite.all() else int(np.argmin(finite.all(axis=0)))
     violation = watch.look(time[:first], block[:, :first])
-    if violation is not None:  # the offending sample is kept: it is the evidence
+    if violation is not None:  # the violating sample is kept as evidence
         return violation.index + 1, Ending(Outcome.LIMIT, violation.text)
     if first < len(time):
         reason = f"the simulation diverged at {time[first]:.4g} s: no finite value"

@@ -10,28 +10,28 @@ from pydantic import JsonValue
 from campaign.recording import Array
 
 STEP, CHANGE = "step_s", "change_at_half_the_step"
-"""What it is called in a trial's telemetry: the step, and per channel the RMS of the change over
-the RMS of the channel. For a scheme of second order the error is 4/3 of the change."""
+"""Keys in a trial's telemetry: step (s), and per channel the RMS of the change divided by the RMS
+of the channel. For a scheme of second order the error is 4/3 of the change."""
 
 
 class StepCheck:
-    """Adds up, over the samples that are kept, one trial's channels and their changes."""
+    """Sums the squares of one trial's recorded channels and of their changes."""
 
     def __init__(self, step: float, names: Sequence[str]) -> None:
-        """`names`: of the channels, in the order of the rows."""
+        """`names`: channel names in the order of the rows."""
         self._step = step
         self._names = tuple(names)
         self._squares = np.zeros(len(names))
         self._changes = np.zeros(len(names))
 
     def add(self, out: Array, half: Array) -> None:
-        """The same samples at the step and at half of it, each of shape (channels, n)."""
+        """Add the same samples at the step and at half of it, each of shape (channels, n)."""
         with np.errstate(over="ignore", invalid="ignore"):
             self._squares += np.sum(out * out, axis=1)
             self._changes += np.sum((out - half) ** 2, axis=1)
 
     def telemetry(self) -> dict[str, JsonValue]:
-        """For the record of the trial; of channels that are not zero throughout."""
+        """Telemetry of the trial, for channels that are not all zero."""
         moved = np.flatnonzero(self._squares > 0.0)
         with np.errstate(invalid="ignore"):
             change = np.sqrt(self._changes[moved] / self._squares[moved])

@@ -1,1 +1,1 @@
-"""One CiA 402 drive on a CAN bus: its objects, its states, and the process that owns the bus."""
+"""One CiA 402 drive on a CAN bus: objects, states, and the process that owns the bus."""

@@ -1,4 +1,4 @@
-"""Where a drive is: `can://INTERFACE/CHANNEL?node=N`, and who serves it."""
+"""Address of a drive, `can://INTERFACE/CHANNEL?node=N`, and the process that serves it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OWN = {"node": (1, 127), "host": (1, 127), "bitrate": (10_000, 1_000_000), "rest
 
 @dataclass(frozen=True)
 class Address:
-    """One drive on one bus.
+    """Address of one drive on one bus.
 
     Attributes:
         text: as written.
@@ -31,8 +31,8 @@ class Address:
         node: the drive's node-ID.
         host: the node-ID of this program's heartbeat.
         bitrate: bit/s.
-        rest: increments of 6064h that it may move in `REST_TIME` and still be at rest.
-        others: arguments for python-can.
+        rest: largest motion at rest within `REST_TIME`, in increments of 6064h.
+        others: further arguments for python-can.
     """
 
     text: str
@@ -45,10 +45,10 @@ class Address:
     others: tuple[tuple[str, str], ...] = ()
 
     def open_bus(self) -> Any:
-        """A bus of python-can. Raises UsageError, with what to do."""
+        """Open a bus of python-can. Raises UsageError with the required action."""
         try:
             import can
-            import canopen  # noqa: F401 - said here, once, for both
+            import canopen  # noqa: F401 - one message for both packages
             from can.util import cast_from_string
         except ImportError:
             raise UsageError(
@@ -60,23 +60,23 @@ class Address:
             return can.Bus(
                 interface=self.interface, channel=self.channel, bitrate=self.bitrate, **extra
             )
-        except Exception as error:  # noqa: BLE001 - of any adapter's driver
+        except Exception as error:  # noqa: BLE001 - any error of an adapter's driver
             raise UsageError(
                 f"port {self.text!r} cannot be opened: {error}; is the adapter plugged in, the "
                 "interface up, and does no other program own it?"
             ) from None
 
     def file(self, kind: str) -> Path:
-        """Where this computer keeps the `latch` and the `port` of the drive.
+        """Path of the file for `kind` (`latch` or `port`) of the drive on this computer.
 
-        One for each drive: the node on its channel, however its address is spelled.
+        One per drive (node on its channel), independent of the spelling of its address.
         """
         key = f"{self.interface}/{self.channel}/{self.node}"
         name = hashlib.sha256(key.encode()).hexdigest()[:16]
         return user_state_path("campaign") / "canopen" / f"{name}.{kind}.json"
 
     def served_at(self) -> int | None:
-        """The local TCP port of the process that owns the bus; None where none lives."""
+        """Local TCP port of the process that owns the bus; None without such a process."""
         try:
             port = int((read_tree(self.file("port")) or {})["port"])
             socket.create_connection(("127.0.0.1", port), 1.0).close()
@@ -86,7 +86,7 @@ class Address:
 
 
 def address_of(text: str) -> Address:
-    """Raises UsageError with the form that is expected."""
+    """Parse an address. Raises UsageError with the expected form."""
     parts = urlsplit(text)
     values, others = dict[str, int](), []
     for name, value in parse_qsl(parts.query):
@@ -106,7 +106,7 @@ def address_of(text: str) -> Address:
 
 
 def read_tree(path: Path) -> dict[str, Any] | None:
-    """A file's JSON object; None when there is none. Raises ValueError when it is damaged."""
+    """JSON object of a file; None without the file. Raises ValueError for a damaged file."""
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -117,7 +117,7 @@ def read_tree(path: Path) -> dict[str, Any] | None:
 
 
 def write_whole(path: Path, tree: dict[str, Any]) -> None:
-    """All of it or nothing: a crash leaves the file as it was."""
+    """Write a file atomically: a crash leaves the old content."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_suffix(f".{os.getpid()}")
     beside.write_text(json.dumps(tree), encoding="utf-8")

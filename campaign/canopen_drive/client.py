@@ -17,22 +17,22 @@ from campaign.canopen_drive.objects import Item
 from campaign.errors import UsageError
 
 OPENING = 20.0
-"""s that the relay may take to open the bus; some adapters wait before they answer."""
+"""s; time limit of the relay to open the bus; some adapters are slow."""
 LEAVING = 3.5
-"""s that it may take to leave."""
+"""s; time limit of the relay to exit."""
 ANSWER = 10.0
-"""s for an answer to a request; the relay asks the drive twice."""
+"""s; time limit of an answer; the relay tries an access to the drive twice."""
 GONE = "the process that owns the bus has ended"
 
 Answers = queue.SimpleQueue[dict[str, Any]]
 Start = Callable[[str], tuple[BinaryIO, BinaryIO, Callable[[float], None]]]
-"""Starts a relay for an address: its input, its output, and what waits for its end (s)."""
+"""Starts a relay for an address; its input, its output, a function that waits for its end (s)."""
 
 
 def start_process(address: str) -> tuple[BinaryIO, BinaryIO, Callable[[float], None]]:
-    """A relay as a process of its own."""
-    # A session of its own: Ctrl-C in a terminal is for the host, which then stops in order.
-    # -P: nothing in the user's folder can stand in for a module of ours.
+    """Start a relay in a separate process."""
+    # New session: Ctrl-C in a terminal reaches only the host, which then stops in order.
+    # -P: a file in the user's folder cannot replace a module of the program.
     process = subprocess.Popen(  # noqa: S603 - our own program, no shell
         [sys.executable, "-P", "-m", "campaign.canopen_drive.relay", address],
         stdin=subprocess.PIPE,
@@ -51,10 +51,10 @@ def start_process(address: str) -> tuple[BinaryIO, BinaryIO, Callable[[float], N
 
 
 class Client:
-    """An open relay. Any thread may ask."""
+    """Connection to a relay. Any thread may use it."""
 
     def __init__(self, address: str, start: Start = start_process) -> None:
-        """Raises UsageError when the bus cannot be opened."""
+        """Start a relay. Raises UsageError if the bus cannot be opened."""
         self._out, self._in, self._wait = start(address)
         self._sending, self._number, self._lost = threading.Lock(), 0, False
         opened: Answers = queue.SimpleQueue()
@@ -70,15 +70,15 @@ class Client:
             raise UsageError(first["error"])
 
     def read(self, item: Item) -> int:
-        """An object of the drive. Raises DriveError."""
+        """Read an object of the drive. Raises DriveError."""
         return int(self.ask("read", item=astuple(item)))
 
     def write(self, item: Item, value: int) -> None:
-        """Raises DriveError."""
+        """Write an object of the drive. Raises DriveError."""
         self.ask("write", value=value, item=astuple(item))
 
     def ask(self, what: str, wait: float = ANSWER, **arguments: Any) -> Any:
-        """The answer to a request within `wait` (s). Raises DriveError."""
+        """Send a request; its answer within `wait` (s). Raises DriveError."""
         answers: Answers = queue.SimpleQueue()
         number = self.tell(what, answers, **arguments)
         try:
@@ -89,9 +89,9 @@ class Client:
             self._answers.pop(number, None)
 
     def tell(self, what: str, answers: Answers | None = None, **arguments: Any) -> int:
-        """Send a request; what the relay says of it goes to `answers`. Raises DriveError.
+        """Send a request; its number. The relay's answers go to `answers`. Raises DriveError.
 
-        The last has the key `is` or `error`; samples of a trial come before it.
+        The last answer has the key `is` or `error`; samples of a trial precede it.
         """
         with self._sending:
             self._number += 1
@@ -110,7 +110,7 @@ class Client:
         return number
 
     def close(self) -> None:
-        """Let the relay go; it brings the drive to rest."""
+        """End the relay, which first brings the drive to rest."""
         with contextlib.suppress(OSError):
             self._out.close()
         self._wait(LEAVING)
@@ -123,7 +123,7 @@ class Client:
             for line in self._in:
                 answer = json.loads(line)
                 asked = self._answers.get(answer["id"])
-                if asked is not None:  # None: late, and awaited no more
+                if asked is not None:  # None: too late
                     asked.put(answer)
                 if "is" in answer or "error" in answer:
                     self._answers.pop(answer["id"], None)
@@ -133,7 +133,7 @@ class Client:
 
 
 def checked(answer: dict[str, Any]) -> dict[str, Any]:
-    """What the relay says, unless it is an error. Raises DriveError."""
+    """`answer`, unless it is an error. Raises DriveError."""
     if "error" in answer:
         raise DriveError(answer["error"], silent=bool(answer.get("silent")))
     return answer

@@ -1,4 +1,4 @@
-"""A drive on a bus: objects by SDO, samples by PDO, and the way to rest."""
+"""A drive on a bus: objects by SDO, samples by PDO, and stopping."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from campaign.canopen_drive.objects import CONTROLWORD, MAPPED, POSITION, STATUS
 from campaign.canopen_drive.state import State, state_of, stop_word
 
 SDO_TIMEOUT = 0.5
-"""s for an answer, which is asked for twice."""
+"""s; time limit of an answer; two attempts."""
 INTERVAL = 0.02
-"""s between two commands on the way to rest."""
+"""s between two commands while the drive comes to rest."""
 REST_TIME = 0.1
-"""s in which a drive at rest moves by `Address.rest` increments at most."""
+"""s in which a drive at rest moves by at most `Address.rest` increments."""
 READINGS = 5
-"""In a row, of a drive that is off."""
+"""Number of consecutive readings of a drive that is off."""
 SYNC = 0x80
 TPDOS = (0x180, 0x280)
 """COB-ID of each of `MAPPED` for node 0."""
@@ -31,7 +31,7 @@ OPERATIONAL, PREOPERATIONAL = 0x01, 0x80
 
 
 class DriveError(Exception):
-    """What a drive did not do. `silent`: it did not answer, or the bus is gone."""
+    """Failed access to a drive. `silent`: no answer, or the bus is lost."""
 
     def __init__(self, text: str, *, silent: bool = False, code: int = 0) -> None:
         super().__init__(text)
@@ -39,20 +39,20 @@ class DriveError(Exception):
 
 
 class RestWatch:
-    """Whether a position stays where it is; nothing else counts as rest."""
+    """Detects rest from constant position readings only."""
 
     def __init__(self, most: int) -> None:
         self._most, self._at, self._since = most, 0, float("inf")
 
     def seen(self, position: int) -> bool:
-        """At rest for `REST_TIME`, with this reading."""
+        """Add a reading; whether the position was constant for `REST_TIME`."""
         now = time.monotonic()
         if self._since > now or abs(position - self._at) > self._most:
             self._at, self._since = position, now
         return now - self._since >= REST_TIME
 
     def unseen(self) -> None:
-        """A reading failed."""
+        """Note a failed reading."""
         self._since = float("inf")
 
 
@@ -61,16 +61,16 @@ class Drive:
 
     Attributes:
         mapped: whether RPDO 1 carries the controlword, so that a stop needs no answer.
-        emergencies: error codes of EMCY messages that came since they were cleared.
-        boots: how often the node has said that it started.
+        emergencies: error codes of EMCY messages since the list was cleared.
+        boots: number of boot-up messages of the node.
     """
 
     def __init__(self, address: Address) -> None:
         """Open the bus. Raises UsageError."""
-        bus = address.open_bus()  # before the import: it says what is missing
+        bus = address.open_bus()  # before the import: it reports missing packages
         import canopen
 
-        nothing: Any = canopen.ObjectDictionary  # objects are read by number
+        nothing: Any = canopen.ObjectDictionary  # empty: objects are accessed by number
         for name in ("canopen", "can"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self.address, self.mapped, self.boots = address, False, 0
@@ -79,7 +79,7 @@ class Drive:
         self._arrived = threading.Condition()
         self._answers: tuple[list[bytes], ...] = ([], [])
         self._network: Any = canopen.Network(bus)
-        self._network.NOTIFIER_CYCLE = 0.1  # s until it notices that it is to end
+        self._network.NOTIFIER_CYCLE = 0.1  # s; poll interval of its end
         self._network.connect()
         node = self._network.add_node(address.node, nothing())
         self._sdo: Any = node.sdo
@@ -91,18 +91,18 @@ class Drive:
             self._network.subscribe(cob + address.node, take)
 
     def close(self) -> None:
-        """Let go of the bus."""
+        """Close the bus."""
         with contextlib.suppress(Exception):
             self._network.disconnect()
 
     # Objects
 
     def read(self, item: Item) -> int:
-        """Raises DriveError."""
+        """Read an object. Raises DriveError."""
         return int(self._access(item, lambda: item.unpack(self._sdo.upload(item.index, item.sub))))
 
     def write(self, item: Item, value: int) -> None:
-        """Raises DriveError."""
+        """Write an object. Raises DriveError."""
         data = item.pack(value)
         self._access(item, lambda: self._sdo.download(item.index, item.sub, data))
 
@@ -114,29 +114,29 @@ class Drive:
                 return transfer()
         except canopen.SdoAbortedError as error:
             raise DriveError(f"{item}: the drive answers {error}", code=error.code) from None
-        except Exception as error:  # noqa: BLE001 - of any adapter's driver
+        except Exception as error:  # noqa: BLE001 - any error of an adapter's driver
             raise DriveError(f"{item}: no answer: {error}", silent=True) from None
 
     # Frames
 
     def send(self, cob: int, data: bytes) -> None:
-        """Raises DriveError."""
+        """Send a frame. Raises DriveError."""
         try:
             self._network.send_message(cob, data)
-        except Exception as error:  # noqa: BLE001 - of any adapter's driver
+        except Exception as error:  # noqa: BLE001 - any error of an adapter's driver
             raise DriveError(f"the bus is lost: {error}", silent=True) from None
 
     def nmt(self, command: int) -> None:
-        """To this node alone."""
+        """Send an NMT command to this node only."""
         self.send(0, bytes((command, self.address.node)))
 
     def command(self, word: int) -> None:
-        """A controlword that waits for no answer."""
+        """Send a controlword without waiting for an answer."""
         if self.mapped:
             self.send(0x200 + self.address.node, CONTROLWORD.pack(word))
 
     def sync(self, counter: int | None) -> bool:
-        """The next sample begins. False when more frames had come for the last than it has."""
+        """Send SYNC for the next sample. False if the last sample got duplicate frames."""
         with self._arrived:
             doubled = any(len(frames) > 1 for frames in self._answers)
             self._answers = ([], [])
@@ -144,14 +144,14 @@ class Drive:
         return not doubled
 
     def sample(self, patience: float) -> tuple[int, ...] | None:
-        """The values of `MAPPED` that answer the last SYNC; None without them for so long (s)."""
+        """Values of `MAPPED` in answer to the last SYNC; None after `patience` (s)."""
         with self._arrived:
             if not self._arrived.wait_for(lambda: all(self._answers), patience):
                 return None
             frames = [each[0] for each in self._answers]
         try:
             parts = [struct.unpack(f, data) for f, data in zip(FORMATS, frames, strict=True)]
-        except struct.error:  # of another length
+        except struct.error:  # wrong length
             return None
         return tuple(value for part in parts for value in part)
 
@@ -162,7 +162,7 @@ class Drive:
 
     def _take_emergency(self, cob: int, data: bytearray, timestamp: float) -> None:
         code = int.from_bytes(data[:2], "little")
-        if code:  # 0: an error has gone
+        if code:  # 0: error reset
             self.emergencies.append(code)
 
     def _take_heartbeat(self, cob: int, data: bytearray, timestamp: float) -> None:
@@ -171,14 +171,14 @@ class Drive:
     # Rest
 
     def look(self) -> tuple[State | None, int]:
-        """State and position now. Raises DriveError."""
+        """Present state and position. Raises DriveError."""
         return state_of(self.read(STATUSWORD)), self.read(POSITION)
 
     def bring_to_rest(self, patience: float) -> bool:
-        """Quick stop, then off; whether it was seen at rest with its drive off within `patience`.
+        """Quick stop, then off; whether it was observed at rest and off within `patience` (s).
 
-        Sends nothing that enables. What a statusword says only ends it, or switches off a drive
-        that stands.
+        Sends no command that enables. A statusword can only end the procedure or switch off a drive
+        at rest.
         """
         deadline = time.monotonic() + patience
         watch, state, at_rest, off = RestWatch(self.address.rest), None, False, 0

@@ -1,4 +1,4 @@
-"""How a trial of the relay ended, and what outcome of the run that is."""
+"""Ends of a trial in the relay, and the corresponding outcomes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from campaign.recording import Fault, Outcome
 
 
 class End(StrEnum):
-    """What the relay tells the host."""
+    """End of a job, as the relay reports it to the host."""
 
     PLAYED = "played"
     STOPPED = "stopped"
@@ -28,7 +28,7 @@ class End(StrEnum):
 
 
 STOPPED = {End.STOPPED, End.PANIC_STOP, End.HOST_GONE, End.HOST_SILENT}
-"""By somebody, whatever the drive says of itself."""
+"""Ends by the host or a user, independent of the drive's state."""
 RESULTS = {
     End.PLAYED: (Outcome.COMPLETED, None),
     End.STOPPED: (Outcome.INTERRUPTED, None),

@@ -1,7 +1,7 @@
-"""A drive as `campaign stop` and `campaign status` reach it, and the latch it does not have.
+"""Access of `campaign stop` and `campaign status` to a drive, and the latch that a drive lacks.
 
-Both commands use the frames of the serial protocol. Here they are answered for a drive: by the
-process that owns the bus, at a local TCP port, or, without one, by the command itself.
+Both commands use the frames of the serial protocol. This module answers them for a drive: in the
+process that owns the bus, at a local TCP port, or, without one, in the command itself.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ from campaign.wire.messages import Ack, Holder, Message, Query, Safe, Status, de
 from campaign.wire.messages import Latch as LatchMessage
 
 POLL = 0.05
-"""s that a read waits."""
+"""s; longest wait of a read."""
 STOPPING = 2.0
-"""s of one attempt to bring the drive to rest."""
+"""s; duration of one attempt to bring the drive to rest."""
 UNREADABLE = "a file of this computer that cannot be read"
 
 
 class Latch:
-    """The last stop from outside, in a file of this computer: a drive cannot hold one."""
+    """Latch of the last external stop, in a file of this computer: a drive has none."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._kept: dict[str, Any] = {}  # a stop that may not be in the file
-        self._changing = threading.Lock()  # who clears a stop must not lose the next one
+        self._kept: dict[str, Any] = {}  # a stop that is perhaps not in the file
+        self._changing = threading.Lock()  # clearing a stop must not lose the next one
         self._at_work: threading.Thread | None = None
 
     def stop(self, by: str) -> None:
-        """Keep the drive off from now on: in this process at once, then in the file."""
+        """Latch a stop in this process; `write` stores it in the file."""
         with self._changing:
             count = int(self._tree().get("count", 0)) + 1
             self._kept = {"latched": True, "count": count, "by": by, "at": time.time()}
 
     def hold(self, bring_to_rest: Callable[[float], object]) -> None:
-        """Bring the drive to rest beside the caller, while the stop is not cleared."""
+        """Bring the drive to rest in a separate thread, unless the stop is cleared."""
         with self._changing:
             if self.now() and (self._at_work is None or not self._at_work.is_alive()):
                 work = threading.Thread(target=bring_to_rest, args=(STOPPING,), daemon=True)
@@ -56,18 +56,18 @@ class Latch:
                 work.start()
 
     def wait(self) -> None:
-        """Until the attempt to bring the drive to rest has ended."""
+        """Wait for the end of the attempt to bring the drive to rest."""
         if self._at_work is not None:
             self._at_work.join()
 
     def write(self) -> None:
-        """Remember the stop beyond this process. Raises OSError."""
+        """Store the stop in the file. Raises OSError."""
         with self._changing:
             if self._kept:
                 write_whole(self._path, self._kept)
 
     def now(self) -> tuple[int, str, float | None] | None:
-        """Count, who it was, and the time since (s); None when nothing was stopped."""
+        """Count, source, and age (s) of the latched stop; None without one."""
         tree = self._tree()
         if not tree.get("latched"):
             return None
@@ -76,14 +76,14 @@ class Latch:
         return int(tree.get("count", 0)), str(tree.get("by", "")), age
 
     def clear(self, count: int) -> bool:
-        """Let the drive move again; False when this is not the latest stop."""
+        """Clear the stop, so that the drive can move again; False if it is not the latest stop."""
         with self._changing:
-            found = self.now()
-            if found is None or found[0] != count:
+            latched = self.now()
+            if latched is None or latched[0] != count:
                 return False
             write_whole(self._path, {"latched": False, "count": count})
             self._kept = {}
-        self.wait()  # a quick stop that is still sent would end the next trial
+        self.wait()  # a late quick stop would end the next trial
         return True
 
     def _tree(self) -> dict[str, Any]:
@@ -102,8 +102,8 @@ class Desk:
 
     Attributes:
         running: whether a trial moves the drive now.
-        stop: ends that trial at once, whoever says so.
-        host: who runs trials, or empty.
+        stop: ends that trial immediately; its argument is the source of the stop.
+        host: host that runs trials, or empty.
     """
 
     drive: Drive
@@ -114,22 +114,22 @@ class Desk:
 
     def __post_init__(self) -> None:
         self._decoder = FrameDecoder()
-        self._stopped = 0  # the session whose SAFE has been latched
+        self._stopped = 0  # session whose SAFE is latched
 
     def feed(self, data: bytes) -> bytes:
-        """The answers to what has come: one for all of a kind."""
+        """The answers to received frames, one per kind of message."""
         answers = {}
         for frame in self._decoder.feed(data):
             with contextlib.suppress(WireError):
                 answers[frame.kind] = frame.sequence, decode(frame.kind, frame.body)
-        told = b""
+        reply = b""
         for sequence, message in answers.values():
             if isinstance(message, Safe):
                 self._safe(message)
-                told += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
+                reply += _frame(Ack(sequence, Kind.SAFE, State.SAFE, 1))
             elif isinstance(message, Query):
-                told += _frame(Holder(bool(self.host), 0.0 if self.host else None, self.host))
-        return told + _frame(self._status()) + _frame(self._latched()) if told else b""
+                reply += _frame(Holder(bool(self.host), 0.0 if self.host else None, self.host))
+        return reply + _frame(self._status()) + _frame(self._latched()) if reply else b""
 
     def _safe(self, message: Safe) -> None:
         by = printable(message.host) or "an unnamed host"
@@ -138,7 +138,7 @@ class Desk:
             self.latch.stop(by)
             self.stop(by)
         self.latch.hold(self.drive.bring_to_rest)
-        self.latch.write()  # last: a full disk must not keep the drive moving
+        self.latch.write()  # last: a full disk must not prevent the stop
 
     def _status(self) -> Status:
         running, state, at_rest = self.running(), None, False
@@ -150,18 +150,18 @@ class Desk:
                 state, position = self.drive.look()
                 at_rest = watch.seen(position)
         on = running or state is None or not state.off
-        said, fault = State.RUNNING if on else State.IDLE, Fault.NONE
+        shown_state, fault = State.RUNNING if on else State.IDLE, Fault.NONE
         if state is DriveState.FAULT:
-            said, fault = State.FAULT, Fault.DRIVE
+            shown_state, fault = State.FAULT, Fault.DRIVE
         elif not on and self.latch.now() is not None:
-            said = State.SAFE
-        return Status(said, fault, at_rest, on, 1, time.monotonic(), 0, 0.0, 0, 0, 0, 0)
+            shown_state = State.SAFE
+        return Status(shown_state, fault, at_rest, on, 1, time.monotonic(), 0, 0.0, 0, 0, 0, 0)
 
     def _latched(self) -> LatchMessage:
-        found = self.latch.now()
-        if found is None:
+        latched = self.latch.now()
+        if latched is None:
             return LatchMessage(latched=False, count=0, cause=LatchCause.NONE, age=None)
-        count, by, age = found
+        count, by, age = latched
         return LatchMessage(latched=True, count=count, cause=LatchCause.STOPPED, age=age, by=by)
 
 
@@ -171,7 +171,7 @@ def _frame(message: Message) -> bytes:
 
 
 class DirectLine:
-    """A drive that no other process serves, as a port with the bytes of the serial protocol."""
+    """Port with the bytes of the serial protocol, for a drive that no other process serves."""
 
     def __init__(self, address: Address) -> None:
         """Raises UsageError."""
@@ -188,17 +188,17 @@ class DirectLine:
         return answers
 
     def write(self, data: bytes) -> None:
-        """Take a command, and carry it out."""
+        """Receive a command and execute it."""
         self._answers += self._desk.feed(data)
 
     def close(self) -> None:
-        """Let go of the bus, once the drive was stopped: a full disk may end the line before."""
+        """Release the bus after the drive is stopped; an error of the disk may close it earlier."""
         self._latch.wait()
         self._drive.close()
 
 
 class Counter(socketserver.ThreadingTCPServer):
-    """Serves a desk at a local TCP port, which a file tells to `campaign stop`."""
+    """Serves a desk at a local TCP port; `campaign stop` reads the port number from a file."""
 
     daemon_threads = True
 
@@ -216,7 +216,7 @@ class Counter(socketserver.ThreadingTCPServer):
         threading.Thread(target=self.serve_forever, args=(POLL,), daemon=True).start()
 
     def close(self) -> None:
-        """No more."""
+        """Remove the file and stop serving."""
         self._file.unlink(missing_ok=True)
         self.shutdown()
         self.server_close()

@@ -1,7 +1,7 @@
 """Objects of a drive: number, data type, name.
 
-Numbers 1xxxh are of CiA 301, all others of CiA 402 (IEC 61800-7-201). docs/canopen.md says which
-were compared with manuals of drives.
+Numbers 1xxxh are from CiA 301, all others from CiA 402 (IEC 61800-7-201). docs/canopen.md lists
+those compared with manuals of drives.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ class Item:
     """An entry of the object dictionary.
 
     Attributes:
-        code: its type as `struct` writes it, little-endian: `H` for UNSIGNED16, `i` for INTEGER32.
+        code: its type in `struct` format, little-endian: `H` for UNSIGNED16, `i` for INTEGER32.
     """
 
     index: int
@@ -29,22 +29,22 @@ class Item:
 
     @property
     def bits(self) -> int:
-        """Its length."""
+        """Length in bits."""
         return 8 * struct.calcsize(self.code)
 
     @property
     def range(self) -> tuple[int, int]:
-        """Least and largest value of its type."""
+        """Smallest and largest value of its type."""
         if self.code.isupper():
             return 0, 2**self.bits - 1
         return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
 
     def pack(self, value: int) -> bytes:
-        """As it is sent."""
+        """Bytes to send."""
         return struct.pack("<" + self.code, value)
 
     def unpack(self, data: bytes) -> int:
-        """As it is received; some drives send more bytes than the type has."""
+        """Value of received bytes; some drives send more bytes than the type has."""
         return int(struct.unpack("<" + self.code, data[: self.bits // 8])[0])
 
 
@@ -67,7 +67,7 @@ MODE = Item(0x6060, 0, "b", "modes of operation")
 MODE_DISPLAY = Item(0x6061, 0, "b", "modes of operation display")
 QUICK_STOP_DECELERATION = Item(0x6085, 0, "I", "quick stop deceleration")
 
-# Motion; accelerations are in velocity units per second where the drive says nothing else.
+# Motion; accelerations are in velocity units per second, unless the drive states another unit.
 POSITION = Item(0x6064, 0, "i", "position actual value")
 FOLLOWING_ERROR = Item(0x6065, 0, "I", "following error window")
 VELOCITY = Item(0x606C, 0, "i", "velocity actual value")
@@ -85,7 +85,7 @@ ACCELERATION = Item(0x6083, 0, "I", "profile acceleration")
 DECELERATION = Item(0x6084, 0, "I", "profile deceleration")
 TORQUE_SLOPE = Item(0x6087, 0, "I", "torque slope")  # per mille of 6076h in a second
 CYCLE_VALUE = Item(0x60C2, 1, "B", "interpolation time period value")
-CYCLE_EXPONENT = Item(0x60C2, 2, "b", "interpolation time index")  # s times ten to the power of it
+CYCLE_EXPONENT = Item(0x60C2, 2, "b", "interpolation time index")  # 10^index s
 MAX_ACCELERATION = Item(0x60C5, 0, "I", "max acceleration")
 MAX_DECELERATION = Item(0x60C6, 0, "I", "max deceleration")
 POSITIVE_TORQUE = Item(0x60E0, 0, "H", "positive torque limit value")  # per mille of 6076h
@@ -105,7 +105,7 @@ POSITION_UNIT = Item(0x60A8, 0, "I", "SI unit position")
 VELOCITY_UNIT = Item(0x60A9, 0, "I", "SI unit velocity")
 
 MAPPED = ((STATUSWORD, VELOCITY, TORQUE), (POSITION, CURRENT, MODE_DISPLAY))
-"""Of each TPDO, in order: 64 and 56 bits."""
+"""Objects of each TPDO, in order: 64 and 56 bits."""
 COUNTED = 240
 """Largest count of a SYNC (1019h)."""
 PROFILE_VELOCITY, PROFILE_TORQUE = 3, 4
@@ -115,5 +115,5 @@ TARGETS = {PROFILE_VELOCITY: (TARGET_VELOCITY, 0x300), PROFILE_TORQUE: (TARGET_T
 
 
 def mapping(item: Item) -> int:
-    """An entry of a PDO's mapping."""
+    """Mapping entry of an object in a PDO."""
     return item.index << 16 | item.sub << 8 | item.bits

@@ -1,4 +1,4 @@
-"""Trials as the relay plays them: jobs, samples in SI, endings."""
+"""Execution of trials by the relay: jobs, samples in SI, endings."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from campaign.channels import info
 from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome, Recorder, SafeState
 
 BLOCK = 0.1
-"""s of samples that are handed over at a time."""
+"""s of samples per delivered block."""
 KEEP_ALIVE = 0.05
 """s between two signs of life to the relay."""
 ENDING = 20.0
-"""s without a word from the relay, which brings the drive to rest meanwhile."""
+"""s; time limit for an answer of the relay, which may be bringing the drive to rest."""
 HEARTBEAT_LOST = 0x8130
 """Error code: life guard or heartbeat error (CiA 301)."""
 ERRORS = {0x4: Fault.OVER_TEMPERATURE, 0x73: Fault.SENSOR, 0x8130: Fault.HEARTBEAT}
-"""Of error codes of CiA 301 and CiA 402, by their first digits."""
+"""Faults by the first digits of error codes of CiA 301 and CiA 402."""
 
 
 class EndedError(Exception):
-    """A motion ended before it was over."""
+    """A motion ended early."""
 
     def __init__(self, end: Mapping[str, Any]) -> None:
         super().__init__(end["why"] or end["end"])
@@ -38,7 +38,7 @@ class EndedError(Exception):
 
 
 def channels(mode: str) -> tuple[ChannelInfo, ...]:
-    """What a drive records. On a hull at rest the rate in space is the relative one."""
+    """Channels of a drive. With the hull at rest the rate in space equals the relative rate."""
     gyro = replace(info("gyro_rate"), label="Rate of the load (drive; hull at rest)")
     names = ("relative_rate", "relative_angle", "motor_current", "drive_torque")
     return (info("command", mode), gyro, *map(info, names))
@@ -48,7 +48,7 @@ class Player:
     """Plays one job after another.
 
     Args:
-        base: what all jobs have: bounds, patience, whether SYNC is counted.
+        base: common fields of all jobs: bounds, patience, whether SYNC is counted.
         stop: whether to end early.
     """
 
@@ -59,9 +59,9 @@ class Player:
     def rows(
         self, job: Mapping[str, Any], expected: End = End.PLAYED
     ) -> tuple[Array, Mapping[str, Any]]:
-        """Samples (n, 6) in numbers of the drive, and how it ended.
+        """Play a job; samples (n, 6) in numbers of the drive, and its end.
 
-        Raises EndedError unless it was played to its end, or ended as `expected`.
+        Raises EndedError unless it was played completely, or ended as `expected`.
         """
         rows = []
         for item in self._items(job):
@@ -75,7 +75,7 @@ class Player:
     def record(
         self, job: Mapping[str, Any], recorder: Recorder, command: Array, scale: Scale
     ) -> Mapping[str, Any]:
-        """How it ended. `command`: shape (n,), rad/s or N m, of each SYNC."""
+        """Play and record a job; its end. `command`: shape (n,), rad/s or N m, at each SYNC."""
         period = job["period"]
         rows: list[list[int]] = []
 
@@ -93,7 +93,7 @@ class Player:
         for item in self._items(job):
             if "sample" in item:
                 rows.append(item["sample"])
-            # What comes after a stop is handed over at once, at the end.
+            # Samples after a stop are delivered in one block at the end.
             if (len(rows) * period >= BLOCK and not self._halted) or "sample" not in item:
                 flush()
             if "lost" in item:
@@ -102,9 +102,9 @@ class Player:
         return end
 
     def _items(self, job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-        """What the relay says; the last is how the job ended, as `is`. Raises DriveError.
+        """Messages of the relay; the last contains the job's end as `is`. Raises DriveError.
 
-        Signs of life are sent from here alone: who hangs with a sample in hand sends none.
+        Only this loop sends signs of life: none are sent while the recording of a sample hangs.
         """
         client, answers, alive = self._client, Answers(), 0.0
         self._halted = False
@@ -131,7 +131,7 @@ class Player:
 
 
 def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
-    """The ending of a trial, from what the relay says of it."""
+    """Ending of a trial from the job's end."""
     how, why = End(end["end"]), str(end["why"])
     codes = end["emcy"] or ([end["error"]] if how is End.STATE and end["error"] else [])
     outcome, fault = RESULTS[how]
@@ -151,11 +151,11 @@ def ending_of(end: Mapping[str, Any], telemetry: Mapping[str, Any]) -> Ending:
 
 
 def safe_state(*, seen: bool) -> SafeState:
-    """Of a drive that was seen at rest and off, or not."""
+    """Safe state of a drive; `seen`: whether it was observed at rest and off."""
     return SafeState.CONFIRMED if seen else SafeState.NOT_CONFIRMED
 
 
 def fault_of(code: int) -> Fault:
-    """The fault that an error code of a drive tells of."""
-    found = (ERRORS[code >> digits] for digits in (0, 8, 12) if code >> digits in ERRORS)
-    return next(found, Fault.DRIVE)
+    """Fault for an error code of a drive."""
+    faults = (ERRORS[code >> digits] for digits in (0, 8, 12) if code >> digits in ERRORS)
+    return next(faults, Fault.DRIVE)

@@ -1,4 +1,4 @@
-"""Motions that show, once per connection, that a drive does what its objects say."""
+"""Test motions, once per connection, that verify a drive's objects."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from campaign.canopen_drive.units import Scale
 from campaign.physics.bench import LimitsOptions
 
 RATE = 100.0
-"""Hz."""
+"""Hz; sample rate of the test motions."""
 LEG = 1.0
-"""s of a slow move, one way."""
+"""s; duration of a slow move, one way."""
 RATE_SHARE, ANGLE_SHARE = 0.1, 0.1
-"""Of the limits: how fast and how far it goes."""
+"""Rate and distance of a slow move as shares of the limits."""
 TOLERANCE = 0.2
-"""Relative, of the measured rate."""
+"""Relative tolerance of the measured rate."""
 REACTION = 2.0
-"""s beyond three times the heartbeat in which the drive stops by itself."""
+"""s in addition to three heartbeats in which the drive must stop by itself."""
 FAST = 0.5
-"""Of the rate limit, on the way to where a trial starts."""
+"""Rate of the move to a trial's start angle as a share of the rate limit."""
 LONGEST = 6.0
-"""s of one such move: samples have to come 15 s after a trial began."""
+"""s; longest such move: samples must begin within 15 s of a trial's start."""
 CLOSE = 5
-"""Samples of slow motion: nearer it does not go."""
+"""Samples of slow motion; a shorter distance is not corrected."""
 HOLD = 0.5
-"""s at the largest torque, at the limit of speed."""
+"""s at the largest torque, at the speed limit."""
 OVERSHOOT, UNBOUNDED = 1.5, 8.0
-"""times the limit of speed: the most that it settles at, and where the relay ends it."""
+"""Multiples of the speed limit: largest permitted settled rate; rate at which the relay stops."""
 
 Play = Callable[..., tuple[np.ndarray, Mapping[str, Any]]]
 """See `Player.rows`."""
@@ -43,7 +43,7 @@ Play = Callable[..., tuple[np.ndarray, Mapping[str, Any]]]
 
 @dataclass(frozen=True)
 class Proof:
-    """What the motions need: the drive, its scale, its limits, and the slow rate (rad/s)."""
+    """Test motions of a drive, with its scale and limits."""
 
     drive: Objects
     play: Play
@@ -52,14 +52,17 @@ class Proof:
 
     @property
     def slow(self) -> float:
-        """In rad/s."""
+        """Rate of slow moves (rad/s)."""
         return min(RATE_SHARE * self.limits.rate, ANGLE_SHARE * self.limits.angle / LEG)
 
     def moves_as_commanded(self) -> None:
-        """There and back: commanded rate against position and velocity. Raises DriveError."""
-        way, count = round(self._inward() * self.slow * self.scale.rate), round(LEG * RATE)
-        rows = self._rate([way] * count + [-way] * count + [0] * (count // 10))
-        for leg, target in ((rows[:count], way), (rows[count : 2 * count], -way)):
+        """Move forth and back; compare the commanded rate with position and velocity.
+
+        Raises DriveError.
+        """
+        target_rate, count = round(self._inward() * self.slow * self.scale.rate), round(LEG * RATE)
+        rows = self._rate([target_rate] * count + [-target_rate] * count + [0] * (count // 10))
+        for leg, target in ((rows[:count], target_rate), (rows[count : 2 * count], -target_rate)):
             settled = leg[3 * count // 4 :]
             travel = (settled[-1, 3] - settled[0, 3]) / (len(settled) - 1) * RATE
             wanted = target / self.scale.rate
@@ -75,24 +78,27 @@ class Proof:
                     )
 
     def stops_in_silence(self, heartbeat: float) -> None:
-        """Moves slowly while the heartbeat (s) falls silent. Raises DriveError if it goes on."""
-        way, count = round(self._inward() * self.slow * self.scale.rate), round(LEG / 4 * RATE)
+        """Stop the heartbeat (s) in a slow move. Raises DriveError if the drive does not stop."""
+        target_rate, count = (
+            round(self._inward() * self.slow * self.scale.rate),
+            round(LEG / 4 * RATE),
+        )
         mute = {"mute": count - 1, "mute_patience": 3 * heartbeat + REACTION}
-        _, end = self.play(self._job([way] * count, od.PROFILE_VELOCITY) | mute)
+        _, end = self.play(self._job([target_rate] * count, od.PROFILE_VELOCITY) | mute)
         if not end["reacted"]:
             raise DriveError(
                 "the drive moved on when the heartbeat fell silent; check 1016h, 1029h and 6007h"
             )
 
     def keeps_speed_limit(self, peak: float) -> None:
-        """Torque up to `peak` (N m) against a low limit of speed. Raises DriveError."""
-        slow, way = self.slow, self._inward()
+        """Apply torque up to `peak` (N m) with a low speed limit. Raises DriveError."""
+        slow, sign = self.slow, self._inward()
         both = (od.MAX_PROFILE_VELOCITY, od.MAX_MOTOR_SPEED)
         had = {item: value for item in both if (value := present(self.drive, item)) is not None}
         ramp = np.append(
             np.linspace(0, peak, round(LEG / 2 * RATE)), np.full(round(HOLD * RATE), peak)
         )
-        job = self._job(np.rint(way * ramp * self.scale.torque), od.PROFILE_TORQUE)
+        job = self._job(np.rint(sign * ramp * self.scale.torque), od.PROFILE_TORQUE)
         job["fastest"] = round(UNBOUNDED * slow * abs(self.scale.rate))
         try:
             for item in had:
@@ -115,21 +121,21 @@ class Proof:
             )
 
     def goes_to(self, position: int, *, fast: bool = False) -> None:
-        """To a position of the drive: fast first, where that is wanted, then slowly."""
+        """Move to a position of the drive: first fast, if `fast`, then slowly."""
         for rate in (FAST * self.limits.rate, self.slow) if fast else (self.slow,):
-            way = position - self.drive.read(od.POSITION)
-            count = round(abs(way / self.scale.position) / rate * RATE)
+            distance = position - self.drive.read(od.POSITION)
+            count = round(abs(distance / self.scale.position) / rate * RATE)
             if count > LONGEST * RATE:
                 raise DriveError(
                     f"the way to the start angle takes {count / RATE:.3g} s at {rate:.3g} rad/s; "
                     f"turn the load nearer, at most {LONGEST:g} s are allowed"
                 )
-            raw = math.copysign(rate * abs(self.scale.rate), way)
+            raw = math.copysign(rate * abs(self.scale.rate), distance)
             if count > CLOSE:
                 self._rate([round(raw)] * count + [0] * round(LEG / 10 * RATE))
 
     def _inward(self) -> int:
-        """The sign of a motion toward zero."""
+        """Sign of a motion toward zero."""
         return 1 if self.drive.read(od.POSITION) * self.scale.position <= 0 else -1
 
     def _rate(self, targets: list[int]) -> np.ndarray:

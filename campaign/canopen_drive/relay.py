@@ -1,10 +1,10 @@
 """The process that owns the bus: `python -m campaign.canopen_drive.relay ADDRESS`.
 
-It alone commands the drive. The drive is enabled inside `Relay._play` only, and however that ends,
-it ends by bringing the drive to rest. A line of JSON is a request or an answer.
+Only this process commands the drive. Only `Relay._play` enables the drive, and it always ends by
+bringing the drive to rest. Requests and answers are lines of JSON.
 
-Heartbeat and SYNC are sent by threads of this process, never by an adapter or by the kernel: what
-goes on by itself would go on when this process hangs.
+Threads of this process send heartbeat and SYNC, never an adapter or the kernel: these would
+continue while this process hangs.
 """
 
 from __future__ import annotations
@@ -45,36 +45,36 @@ from campaign.canopen_drive.state import (
 from campaign.errors import UsageError
 
 BEATS = 4
-"""Heartbeats in the time after which the drive stops without one, and looks for a silent host."""
+"""Number of heartbeats, and of checks for a silent host, within their time limits."""
 ENABLE = 3.0
-"""s from one state to the next, and to another mode."""
+"""s; time limit of a change of state or mode."""
 REST = 8.0
-"""s to come to rest after a trial."""
+"""s; time limit to come to rest after a trial."""
 LAST_WORDS = 3.0
-"""s to come to rest when nobody is left to command."""
+"""s; time limit to come to rest after the loss of the host."""
 LEAD = 0.02
 """s from the last preparation to the first SYNC."""
 Why = tuple[End, str]
-"""How a trial ended, and more of it for people."""
+"""End of a trial, and its explanation as text."""
 PLAYED: Why = (End.PLAYED, "")
 
 
-class Halt(Exception):  # noqa: N818 - no error: somebody stopped it
-    """Nothing that enables the drive may be sent any more."""
+class Halt(Exception):  # noqa: N818 - no error: a requested stop
+    """Stop of a trial: no more commands that enable the drive are permitted."""
 
 
 class Relay:
-    """One drive, one host."""
+    """Relay between one host and one drive."""
 
     def __init__(self, drive: Drive, out: BinaryIO) -> None:
         self.drive, self._out = drive, out
         self._unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self.latch = Latch(drive.address.file("latch"))
         self._commanding = threading.RLock()
-        # Nothing may enable the drive; None in a trial.
+        # If not None, no command may enable the drive; None during a trial.
         self._halted: Why | None = (End.STOPPED, "")
         self._armed = False
-        self._cancelled = -1.0  # the last request that a stop came after
+        self._cancelled = -1.0  # number of the last stop request; earlier trials do not begin
         self._alive = time.monotonic()
         self._beat = 0.0  # s between two heartbeats; 0: none
         self._silence = 1.0
@@ -84,7 +84,7 @@ class Relay:
         self.counter: Counter | None = None
 
     def serve(self, commands: BinaryIO) -> bool:
-        """Until the host has gone; whether the drive was then seen at rest and off."""
+        """Serve until the host is gone; whether the drive was then observed at rest and off."""
         self.counter = Counter(self.drive.address, self._desk)
         for work in (self._heartbeats, self._work, self._send):
             threading.Thread(target=work, daemon=True).start()
@@ -96,9 +96,9 @@ class Relay:
         return self.leave()
 
     def leave(self) -> bool:
-        """Nobody is left to command. Heartbeat and SYNC end once the drive is at rest, or later."""
+        """Make the drive safe after the loss of the host; only then end heartbeat and SYNC."""
         enabled = self._armed
-        self._cancelled = float("inf")  # a trial that still waits does not begin
+        self._cancelled = float("inf")  # no waiting trial begins
         self.halt(End.HOST_GONE)
         used = enabled or self.drive.mapped
         safe = self.drive.bring_to_rest(LAST_WORDS) if used else True
@@ -109,7 +109,7 @@ class Relay:
         return safe
 
     def halt(self, end: End, text: str = "") -> None:
-        """From now on nothing that enables is sent; the quick stop is, without an answer."""
+        """Block commands that enable the drive; send a quick stop without waiting for an answer."""
         with self._commanding:
             self._halted = self._halted or (end, text)
             if self._armed:
@@ -117,7 +117,7 @@ class Relay:
                     self.drive.command(QUICK_STOP)
 
     def _halt_if_latched(self) -> None:
-        """By `campaign stop`; also by another process, which stopped it while this one hung."""
+        """Halt after `campaign stop`, also if another process stopped the drive."""
         if (latched := self.latch.now()) is not None:
             self._panic_stop(latched[1])
 
@@ -130,7 +130,7 @@ class Relay:
     # Requests
 
     def _take(self, job: dict[str, Any]) -> None:
-        """What must not wait is done here."""
+        """Execute urgent requests; queue all others."""
         match job["do"]:
             case "alive":
                 return
@@ -165,14 +165,14 @@ class Relay:
             self._tell({"id": job["id"], "is": task(job)})
         except DriveError as error:
             self._tell({"id": job["id"], "error": str(error), "silent": error.silent})
-        except Exception as error:  # noqa: BLE001 - the host has to hear of a bug as well
+        except Exception as error:  # noqa: BLE001 - a bug is also reported to the host
             self._tell({"id": job["id"], "error": f"{type(error).__name__}: {error}"})
 
     def _tell(self, answer: dict[str, Any]) -> None:
         self._unsent.put(json.dumps(answer).encode() + b"\n")
 
     def _send(self) -> None:
-        """A thread of its own: a host that reads no more must not hold up a trial or its stop."""
+        """Send answers in a separate thread: a blocked host must not delay a trial or its stop."""
         with contextlib.suppress(OSError, ValueError):
             while True:
                 self._out.write(self._unsent.get())
@@ -189,7 +189,7 @@ class Relay:
         self.drive.write(item, job["value"])
 
     def _reset(self, job: dict[str, Any]) -> str:
-        """Clear a fault; the state afterwards."""
+        """Clear a fault; returns the state afterwards."""
         for word in reset_words(self.drive.look()[0]):
             self.drive.write(od.CONTROLWORD, word)
         self.drive.emergencies.clear()
@@ -197,7 +197,7 @@ class Relay:
         return state.text if state is not None else "unknown"
 
     def _jitter(self, job: dict[str, Any]) -> float:
-        """Largest delay (s) of `count` SYNC; a drive that is pre-operational answers none."""
+        """Largest delay (s) of `count` SYNC; the drive is pre-operational and does not answer."""
         self.drive.nmt(PREOPERATIONAL)
         worst, start = 0.0, time.monotonic() + LEAD
         for number in range(job["count"]):
@@ -224,7 +224,7 @@ class Relay:
     # A trial
 
     def _play(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Enable, play the targets, come to rest: how it ended."""
+        """Enable the drive, play the targets, bring it to rest; returns the end."""
         drive, fault = self.drive, 0
         why: Why = (End.DRIVE, "a bug of the relay")
         with self._commanding:
@@ -250,14 +250,14 @@ class Relay:
             self._muted = False
             silent = (self._halted or why)[0] is End.HOST_SILENT
             safe = drive.bring_to_rest(LAST_WORDS if silent else REST)
-            self._quiet = silent  # from now on without a heartbeat, at rest
+            self._quiet = silent  # at rest: no more heartbeats
             self._armed = False
         with contextlib.suppress(DriveError):
             fault = drive.read(od.ERROR_CODE)
         if drive.boots != boots:
             why = (End.RESET, "the drive has started anew")
-        told = {"safe": safe, "error": fault, "emcy": drive.emergencies[:]}
-        return {"end": why[0], "why": why[1], **told, **seen}
+        status = {"safe": safe, "error": fault, "emcy": drive.emergencies[:]}
+        return {"end": why[0], "why": why[1], **status, **seen}
 
     def _enable(self, job: dict[str, Any]) -> None:
         drive = self.drive
@@ -265,11 +265,13 @@ class Relay:
         drive.write(od.TARGETS[job["mode"]][0], 0)
         drive.write(od.MODE, job["mode"])
         self._until(lambda: drive.read(od.MODE_DISPLAY) == job["mode"], f"mode {job['mode']}")
-        way = list(ENABLING)
+        remaining = list(ENABLING)
         while (state := state_of(drive.read(od.STATUSWORD))) is not State.ENABLED:
-            if state not in way:  # also one that it fell back to: something else stops it
+            if (
+                state not in remaining
+            ):  # also for a return to an earlier state: another device stops it
                 raise DriveError(f"the state is {state.text if state else 'unknown'}")
-            way = way[way.index(state) + 1 :]
+            remaining = remaining[remaining.index(state) + 1 :]
             with self._commanding:
                 self._halt_if_latched()
                 if self._halted:
@@ -323,7 +325,7 @@ class Relay:
     def _judged(
         self, sample: tuple[int, ...], job: dict[str, Any], seen: dict[str, Any]
     ) -> Why | None:
-        """How the trial ends with this sample; None where it goes on."""
+        """End of the trial by this sample; None if it continues."""
         status, velocity, torque, position, _, mode = sample
         state = state_of(status)
         seen["state"] = state.text if state is not None else f"{status:04X}h"
@@ -345,7 +347,7 @@ class Relay:
         return PLAYED if abs(velocity) >= job.get("stop", 2**31) else None
 
     def _muted_until_rest(self, patience: float) -> bool:
-        """Send neither heartbeat nor SYNC nor a command; whether the drive stopped by itself."""
+        """Wait without heartbeat, SYNC and commands; whether the drive stopped by itself."""
         self._muted = True
         watch, deadline = RestWatch(self.drive.address.rest), time.monotonic() + patience
         while time.monotonic() < deadline and not self._halted:
@@ -359,8 +361,8 @@ class Relay:
 
 
 def main(text: str) -> int:
-    """Serve one host until it goes; 0 when the drive was then seen safe, else 5 (2: no bus)."""
-    # Ctrl-C and a closing terminal are the host's business: it stops in order, with our help.
+    """Serve one host until its end; 0 if the drive was then observed safe, else 5 (2: no bus)."""
+    # The host handles Ctrl-C and a closed terminal: it needs the relay for an orderly stop.
     for stop in ("SIGINT", "SIGHUP"):
         if hasattr(signal, stop):
             signal.signal(getattr(signal, stop), signal.SIG_IGN)
@@ -379,5 +381,5 @@ def main(text: str) -> int:
 
 
 if __name__ == "__main__":
-    # Not sys.exit: a thread that waits for a bus or a pipe must not keep the process.
+    # Not sys.exit: a thread that waits for a bus or a pipe must not prevent the exit.
     os._exit(main(sys.argv[1]))

@@ -1,4 +1,4 @@
-"""Settings of a drive before it may move, all read back; and the load of its bus."""
+"""Settings of a drive before a motion, all read back; load of its bus."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from campaign.errors import UsageError
 from campaign.physics.bench import LimitsOptions
 
 ABORTS = (3, 1, 2)
-"""Of 6007h, best first: quick stop, fault reaction, no voltage. 0 would be no reaction."""
+"""Values of 6007h, best first: quick stop, fault reaction, no voltage. 0 would be no reaction."""
 FOLLOWING = 0.02
-"""Of the angle limit: largest error in following a position, in modes that have one."""
+"""Largest following error as a share of the angle limit, in position modes."""
 SYNCHRONOUS, AT_ONCE = 1, 255
 """Transmission types of PDOs."""
 
 
 class Objects(Protocol):
-    """What reads and writes objects of a drive. Both raise DriveError."""
+    """Access to objects of a drive. Both methods raise DriveError."""
 
     def read(self, item: Item) -> int: ...
 
@@ -30,7 +30,7 @@ class Objects(Protocol):
 
 
 def present(drive: Objects, item: Item) -> int | None:
-    """An object's value; None of one that the drive refuses to tell."""
+    """Value of an object; None if the drive refuses the access."""
     try:
         return drive.read(item)
     except DriveError as error:
@@ -42,25 +42,25 @@ def present(drive: Objects, item: Item) -> int | None:
 def written(drive: Objects, item: Item, value: int) -> None:
     """Write and read back. Raises DriveError."""
     drive.write(item, value)
-    found = drive.read(item)
-    if found != value:
-        raise DriveError(f"{item} is {found} after {value} was written")
+    value_read = drive.read(item)
+    if value_read != value:
+        raise DriveError(f"{item} is {value_read} after {value} was written")
 
 
 def compare_eds(drive: Objects, path: str) -> None:
-    """Refuse an EDS of another drive. Raises DriveError, and UsageError where it cannot be read."""
+    """Compare the EDS with the drive. Raises DriveError, or UsageError for an unreadable EDS."""
     import canopen
 
     try:
         described = canopen.import_od(path)
-    except Exception as error:  # noqa: BLE001 - of a parser of texts
+    except Exception as error:  # noqa: BLE001 - any error of the parser
         raise UsageError(f"eds = {path!r} cannot be read: {error}") from None
-    told = described.device_information
+    device = described.device_information
     vendor, product = drive.read(od.VENDOR), present(drive, od.PRODUCT) or 0
-    if (told.vendor_number, told.product_number) != (vendor, product):
+    if (device.vendor_number, device.product_number) != (vendor, product):
         raise DriveError(
-            f"wrong EDS: {path} is of vendor {told.vendor_number}, product "
-            f"{told.product_number}; the drive says {vendor:#x}, {product:#x}"
+            f"wrong EDS: {path} is of vendor {device.vendor_number}, product "
+            f"{device.product_number}; the drive says {vendor:#x}, {product:#x}"
         )
     for item in vars(od).values():
         variable = isinstance(item, Item) and described.get_variable(item.index, item.sub)
@@ -69,23 +69,23 @@ def compare_eds(drive: Objects, path: str) -> None:
 
 
 def set_reactions(drive: Objects, host: int, heartbeat: float) -> None:
-    """What the drive does when it no longer hears the host for `heartbeat` (s).
+    """Set the drive's reactions to a loss of the host's heartbeat for `heartbeat` (s).
 
-    Raises DriveError naming the object without which it may not move.
+    Raises DriveError that names a missing object; without it no motion is permitted.
     """
     wanted: tuple[tuple[Item, Sequence[int]], ...] = (
         (od.CONSUMER, (host << 16 | round(heartbeat * 1e3),)),
-        (od.ERROR_BEHAVIOUR, (0,)),  # pre-operational: no PDO is obeyed then
+        (od.ERROR_BEHAVIOUR, (0,)),  # pre-operational: PDOs have no effect then
         (od.ABORT_OPTION, ABORTS),
         (od.QUICK_STOP_OPTION, (2,)),  # along its ramp, then off
-        (od.FAULT_OPTION, (2, 1)),  # along the ramp of the quick stop, else of its own
+        (od.FAULT_OPTION, (2, 1)),  # along the quick stop ramp, else the slow-down ramp
     )
     for item, values in wanted:
         _set_reaction(drive, item, values)
 
 
 def _set_reaction(drive: Objects, item: Item, values: Sequence[int]) -> None:
-    """The first of `values` that the drive keeps. Raises DriveError when it keeps none."""
+    """Set the first of `values` that the drive accepts. Raises DriveError if it accepts none."""
     lacks: DriveError | None = None
     for value in values:
         try:
@@ -100,7 +100,7 @@ def _set_reaction(drive: Objects, item: Item, values: Sequence[int]) -> None:
 
 
 def set_pdos(drive: Objects, node: int) -> None:
-    """RPDO 1 the controlword, 2 the target velocity, 3 the target torque; TPDO 1 and 2 samples."""
+    """Map RPDO 1: controlword, 2: target velocity, 3: target torque; TPDO 1 and 2: samples."""
     for number, (item, cob) in enumerate(((od.CONTROLWORD, 0x200), *od.TARGETS.values())):
         kind = AT_ONCE if item is od.CONTROLWORD else SYNCHRONOUS
         _map(drive, 0x1400 + number, cob + node, (item,), kind)
@@ -109,7 +109,7 @@ def set_pdos(drive: Objects, node: int) -> None:
 
 
 def _map(drive: Objects, index: int, cob: int, items: Sequence[Item], kind: int) -> None:
-    """One PDO; it is invalid (bit 31) while its mapping changes."""
+    """Map one PDO; it is invalid (bit 31) while its mapping changes."""
     name = f"{'R' if index < 0x1800 else 'T'}PDO {(index & 0xFF) + 1}"
     valid = Item(index, 1, "I", f"COB-ID of {name}")
     count = Item(index + 0x200, 0, "B", f"number of objects in {name}")
@@ -120,13 +120,13 @@ def _map(drive: Objects, index: int, cob: int, items: Sequence[Item], kind: int)
         written(drive, Item(index + 0x200, sub, "I", f"{name}, entry {sub}"), mapping(item))
     written(drive, count, len(items))
     drive.write(valid, cob)
-    found = drive.read(valid)
-    if found & 0x800007FF != cob:  # bits 30 and 29 may say more
-        raise DriveError(f"{valid} is {found:08X}h after {cob:08X}h was written")
+    value_read = drive.read(valid)
+    if value_read & 0x800007FF != cob:  # bits 30 and 29 may be set
+        raise DriveError(f"{valid} is {value_read:08X}h after {cob:08X}h was written")
 
 
 def set_times(drive: Objects, period: float) -> bool:
-    """Period of SYNC (s), in 1006h and 60C2h where there are such; whether SYNC is counted."""
+    """Set the period of SYNC (s) in 1006h and 60C2h, if present; whether SYNC is counted."""
     value, exponent = cycle(period)
     for item, wanted in (
         (od.CYCLE, 0),  # 1019h may change only while it is 0
@@ -141,9 +141,9 @@ def set_times(drive: Objects, period: float) -> bool:
 
 
 def cycle(period: float) -> tuple[int, int]:
-    """60C2h: a whole number up to 255, times ten to the power of the other (s).
+    """Value and exponent of 60C2h: period (s) = value · 10^exponent, value from 1 to 255.
 
-    Raises ValueError for a period that cannot be written so.
+    Raises ValueError for a period without such a representation.
     """
     for exponent in range(-3, -7, -1):
         value = period / 10.0**exponent
@@ -153,13 +153,13 @@ def cycle(period: float) -> tuple[int, int]:
 
 
 def set_limits(drive: Objects, limits: LimitsOptions, scale: Scale, own: dict[Item, int]) -> str:
-    """The bench's limits in the drive, or the drive's own, which are narrower.
+    """Set the bench's limits in the drive; narrower limits of the drive stay.
 
     Args:
-        own: values that the drive had, kept here at the first call and never exceeded.
+        own: original values of the drive, stored at the first call and never exceeded.
 
-    Returns the limits that the drive does not have: they are watched here alone. Raises DriveError
-    when it has none of a torque, none of a speed, or no ramp for its quick stop.
+    Returns the limits that the drive lacks: only this program supervises them. Raises DriveError
+    without a torque limit, a speed limit, or a ramp of the quick stop.
     """
     position, rate, torque = abs(scale.position), abs(scale.rate), abs(scale.torque)
     largest = {
@@ -187,7 +187,7 @@ def set_limits(drive: Objects, limits: LimitsOptions, scale: Scale, own: dict[It
 
 
 def _limited(drive: Objects, item: Item, most: float, own: dict[Item, int]) -> bool:
-    """Whether the drive keeps to `most`: written and read back, or narrower by itself."""
+    """Whether the drive limits to `most`: written and read back, or already narrower."""
     if not math.isfinite(most):
         return True
     had = own.get(item, present(drive, item))
@@ -196,29 +196,29 @@ def _limited(drive: Objects, item: Item, most: float, own: dict[Item, int]) -> b
     own.setdefault(item, had)
     low, high = item.range
     wanted = min(max(math.trunc(most), low), high)
-    # 607Dh: both 0 is no limit. 0 of any other would let nothing move: it is unset.
+    # 0 means unset: in 607Dh both 0 is no limit; 0 in another object would prevent any motion.
     if had and abs(had) < abs(wanted):
         wanted = had
-    if not wanted:  # less than one unit of the drive, and to some drives 0 is no limit
+    if not wanted:  # less than one unit of the drive; for some drives 0 is no limit
         return False
     try:
         written(drive, item, wanted)
     except DriveError as error:
         if error.silent:
             raise
-        found = present(drive, item)
-        return found is not None and 0 < abs(found) <= abs(most)
+        value_read = present(drive, item)
+        return value_read is not None and 0 < abs(value_read) <= abs(most)
     return True
 
 
 LARGEST = 0.5
-"""Of the bus. The rest is for SDO, emergency messages, and other nodes."""
+"""Largest load as a share of the bus. The rest is for SDO, emergency messages, other nodes."""
 PROMISED = 100.0
-"""Hz that are recorded without a measurement of the jitter."""
+"""Hz; largest sample rate without a measurement of the jitter."""
 
 
 def frame_bits(size: int) -> int:
-    """Of a data frame with 11-bit identifier and `size` bytes, the 3 bits between frames included.
+    """Bits of a data frame with 11-bit identifier and `size` bytes, with 3 bits between frames.
 
     34 + 8 size bits are subject to stuffing, at worst one bit in each four after the first
     (R. I. Davis et al., Controller Area Network schedulability analysis, 2007, eq. 1).
@@ -228,9 +228,9 @@ def frame_bits(size: int) -> int:
 
 
 def bus_load(sample_rate: float, bitrate: int, heartbeat: float) -> float:
-    """Share of the bus: SYNC, target and answers of each sample, and both heartbeats.
+    """Load as a share of the bus: SYNC, target and answers of each sample, and both heartbeats.
 
-    `sample_rate` in Hz, `bitrate` in bit/s; `heartbeat` (s) is the time that the drive waits.
+    `sample_rate` in Hz, `bitrate` in bit/s; `heartbeat` (s): the drive's time limit for one.
     """
     answers = sum(frame_bits(sum(item.bits for item in pdo) // 8) for pdo in MAPPED)
     each = frame_bits(1) + frame_bits(TARGET_VELOCITY.bits // 8) + answers
@@ -239,7 +239,7 @@ def bus_load(sample_rate: float, bitrate: int, heartbeat: float) -> float:
 
 
 def beyond_bus(sample_rate: float, bitrate: int, heartbeat: float) -> str | None:
-    """Why a bus cannot carry a trial; arguments as of `bus_load`."""
+    """Why a bus cannot carry a trial, or None; arguments as of `bus_load`."""
     try:
         cycle(1 / sample_rate)
     except ValueError as error:

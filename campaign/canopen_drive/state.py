@@ -1,7 +1,7 @@
-"""State machine of CiA 402: what a statusword says, and which controlword may follow.
+"""State machine of CiA 402: states from statuswords, and permitted controlwords.
 
-`canopen.profiles.p402` is not used: on its way to a state it enables the drive. Here a stop is one
-word that enables nothing in any state, so it is right also when the state has changed since the
+`canopen.profiles.p402` is not used: it may enable the drive to reach a state. Here a stop is one
+controlword that enables nothing in any state. It is also valid if the state has changed since the
 statusword was read.
 """
 
@@ -24,29 +24,29 @@ class State(Enum):
 
     @property
     def text(self) -> str:
-        """For people."""
+        """Name of the state for messages."""
         return self.name.lower().replace("_", " ")
 
     @property
     def off(self) -> bool:
-        """Whether the power stage gives no torque."""
+        """Whether the power stage produces no torque."""
         return self in (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
 
 
 QUICK_STOP = 0x0002
-"""Voltage stays, quick stop bit 0. In every state but `ENABLED` and `QUICK_STOP` it leads to
-`SWITCH_ON_DISABLED` or nowhere."""
+"""Voltage enabled, quick stop bit 0. In all states except `ENABLED` and `QUICK_STOP` it leads to
+`SWITCH_ON_DISABLED` or has no effect."""
 DISABLE_VOLTAGE = 0x0000
 FAULT_RESET = 0x0080
-"""All other bits 0: in a state that is no fault it disables the voltage."""
+"""All other bits 0: without a fault it disables the voltage."""
 ENABLING = {State.SWITCH_ON_DISABLED: 0x0006, State.READY: 0x0007, State.SWITCHED_ON: 0x000F}
-"""What leads nearer to `ENABLED`. From `QUICK_STOP` and from a fault nothing does."""
+"""Controlwords toward `ENABLED`; none from `QUICK_STOP` and from a fault."""
 INTERNAL_LIMIT = 0x0800
 """Bit 11 of the statusword."""
 
 
 def state_of(statusword: int) -> State | None:
-    """None of a word that no state has."""
+    """State of a statusword; None for an invalid word."""
     for state in State:
         mask, value = state.value
         if statusword & mask == value:
@@ -55,15 +55,15 @@ def state_of(statusword: int) -> State | None:
 
 
 def stop_word(state: State | None, *, at_rest: bool) -> int:
-    """What is commanded on the way to rest with the drive off.
+    """Controlword to bring the drive to rest and switch it off.
 
-    A drive that keeps `QUICK_STOP` (605Ah of 5 to 8) is switched off once it stands. Until then the
-    word is the quick stop, whatever the state was: a drive read as `SWITCHED_ON` may be `ENABLED`
-    by now, and without voltage it would coast.
+    A drive that stays in `QUICK_STOP` (605Ah from 5 to 8) is switched off at rest. Before, the word
+    is the quick stop for any state: a drive read as `SWITCHED_ON` may be `ENABLED` now, and would
+    coast without voltage.
     """
     return DISABLE_VOLTAGE if state is State.QUICK_STOP and at_rest else QUICK_STOP
 
 
 def reset_words(state: State | None) -> tuple[int, ...]:
-    """What clears a fault: bit 7 has to rise. Nothing where there is no fault."""
+    """Controlwords that clear a fault by a rising bit 7; none without a fault."""
     return (DISABLE_VOLTAGE, FAULT_RESET, DISABLE_VOLTAGE) if state is State.FAULT else ()

@@ -1,4 +1,4 @@
-"""Targets of a trial, one for each SYNC, and the ramp between them that the drive makes itself."""
+"""Targets of a trial, one per SYNC, and the ramp that the drive generates between them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from campaign.signals import Polyline
 from campaign.trial import Task
 
 SAME = 1e-6
-"""Relative: slopes of one profile."""
+"""Relative tolerance for equal slopes of a profile."""
 FASTER = 1.05
-"""times the steepest step from sample to sample: the drive is there at the next SYNC."""
+"""Slope as a multiple of the steepest step: the drive reaches each target by the next SYNC."""
 
 
 @dataclass(frozen=True)
 class Targets:
-    """What the drive is to reach, and how fast.
+    """Targets and slope of a trial.
 
     Attributes:
-        values: shape (n,), rad/s or N m, of each SYNC.
-        slope: rad/s^2 or N m/s, of 6083h and 6084h, or of 6087h.
+        values: shape (n,), rad/s or N m, at each SYNC.
+        slope: rad/s^2 or N m/s, for 6083h and 6084h, or for 6087h.
     """
 
     values: np.ndarray
@@ -30,7 +30,7 @@ class Targets:
 
 
 def targets_of(task: Task) -> Targets:
-    """Of a command with one slope the ends of its ramps: the drive makes them. Else each sample."""
+    """Ends of the ramps if all have one slope (the drive generates them); else each sample."""
     count = max(1, round(task.duration * task.sample_rate))
     time = np.arange(count + 1) / task.sample_rate
     command = task.command
@@ -44,7 +44,7 @@ def targets_of(task: Task) -> Targets:
 
 
 def _one_slope(times: Sequence[float], values: Sequence[float]) -> float:
-    """The magnitude of all ramps; 0 where they differ, or one is a jump."""
+    """Common magnitude of all slopes; 0 if they differ, or for a step."""
     step, change = np.diff(times), np.abs(np.diff(values))
     ramps = change > 0
     if not ramps.any() or not step[ramps].all():

@@ -1,4 +1,4 @@
-"""Units of a drive: what its numbers are at the load, in SI."""
+"""Scale between numbers of a drive and SI values at the load."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ INCREMENTS, TURNS, RADIANS, DEGREES = 0xB5, 0xB4, 0x10, 0x41
 """Codes of units in 60A8h and 60A9h (CiA 303-2 and its use in CiA 402)."""
 PER_TURN = {TURNS: 1.0, RADIANS: 2 * math.pi, DEGREES: 360.0}
 SECONDS = {0x03: 1.0, 0x47: 60.0}
-"""Codes of 1/s and 1/min, as the time in s."""
+"""Time in s by the codes of 1/s and 1/min."""
 PER_MILLE = 1e-3
 
 Read = Callable[[Item], int | None]
-"""An object of the drive; None of one that it lacks. Raises DriveError."""
+"""Reads an object of the drive; None for a missing one. Raises DriveError."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Numbers of the drive for one of the load; negative where its direction is the other one.
+    """Numbers of the drive per SI unit at the load; negative for the opposite direction.
 
     Attributes:
-        position: of 6064h per rad.
-        rate: of 606Ch and 60FFh per rad/s; accelerations are this per rad/s^2.
-        torque: of 6077h and 6071h per N m at the load.
-        current: of 6078h per A.
-        motor_rate: of 6080h (1/min at the motor) per rad/s of the load.
+        position: 6064h per rad.
+        rate: 606Ch and 60FFh per rad/s; also accelerations per rad/s^2.
+        torque: 6077h and 6071h per N m at the load.
+        current: 6078h per A.
+        motor_rate: 6080h (1/min at the motor) per rad/s of the load.
     """
 
     position: float
@@ -50,16 +50,16 @@ def scale_of(
     rated_torque: float | None,
     rated_current: float | None,
 ) -> Scale:
-    """From the drive's factors, or from options.
+    """Scale from the drive's factors, or from options.
 
     Args:
-        ratio: motor rate over load rate, of the bench.
-        reverse: whether positive is negative at the drive.
+        ratio: motor rate divided by load rate, of the bench.
+        reverse: whether the drive's direction is opposite.
         units_per_turn: units of 6064h per turn of the load.
         rate_units: units of 606Ch at one turn of the load per second.
-        rated_torque, rated_current: N m of the motor and A, for 6076h and 6075h.
+        rated_torque, rated_current: N m of the motor and A; they replace 6076h and 6075h.
 
-    Raises DriveError naming what is missing, with the option that states it.
+    Raises DriveError that names a missing object and the option that replaces it.
     """
     sign = -1.0 if reverse else 1.0
     turn = units_per_turn or _units_per_turn(read, ratio)
@@ -76,7 +76,7 @@ def scale_of(
 
 
 def _shaft_turns(read: Read, ratio: float) -> float:
-    """Turns of the drive's shaft per turn of the load: its own gear may be the bench's, or none."""
+    """Turns of the drive's shaft per turn of the load: the drive may include the gear or not."""
     own = _quotient(read, od.GEAR_MOTOR, od.GEAR_SHAFT) or 1.0
     if math.isclose(own, ratio, rel_tol=1e-3):
         return 1.0
@@ -106,7 +106,7 @@ def _units_per_turn(read: Read, ratio: float) -> float:
 
 
 def _rate_units(read: Read, turn: float, ratio: float) -> float:
-    """Units of velocity at one turn of the load per second; `turn` is in units of position."""
+    """Units of velocity at one turn of the load per second; `turn`: units of position per turn."""
     unit = read(od.VELOCITY_UNIT)
     if not unit:
         factor = _quotient(read, od.VELOCITY_NUMERATOR, od.VELOCITY_DIVISOR)
@@ -123,7 +123,7 @@ def _rate_units(read: Read, turn: float, ratio: float) -> float:
 
 
 def _prefix(unit: int) -> float:
-    """Ten to the power of the first byte, which has a sign."""
+    """Ten to the power of the first byte (signed)."""
     exponent = unit >> 24
     return 10.0 ** (exponent - 256 if exponent > 127 else exponent)
 

@@ -1,4 +1,4 @@
-"""One attempt at trials, in a worker thread, each into its own file."""
+"""One attempt at one or more trials in a worker thread, each trial into its own file."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from campaign.trial import Trial
 
 @dataclass(frozen=True)
 class AttemptEnd:
-    """How an attempt ended.
+    """End of an attempt.
 
     Attributes:
-        bug: an exception that no backend should raise.
-        gave_up: whether the backend cannot execute any other trial.
-        remarks: what somebody at the screen should know of its channels.
-        unmeasured: why nothing was measured in its recording, where something should have been.
+        bug: an exception that a backend must not raise.
+        gave_up: whether the backend cannot execute another trial.
+        remarks: remarks on its channels, for the operator.
+        unmeasured: why the expected metrics of the recording are missing.
     """
 
     ending: Ending
@@ -41,12 +41,12 @@ class AttemptEnd:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What is the same for every attempt of a run.
+    """Conditions common to all attempts of a run.
 
     Attributes:
         halted: whether the run is to end.
-        measure: what a recording says by itself; None: nobody looks.
-        keeping: whose samples are archived.
+        measure: computes the metrics of a recording; None for no metrics.
+        keeping: which trials' samples are archived.
     """
 
     backend: Backend
@@ -58,9 +58,9 @@ class Conditions:
 
 
 def execute_once(trial: Trial, conditions: Conditions) -> AttemptEnd:
-    """One attempt at `trial`, archived however it ends. Raises only what the archive raises."""
+    """Execute `trial` once and archive it, however it ends. Raises only errors of the archive."""
     supervision = conditions.supervision
-    with supervision.timing.span(Work.SAMPLES):  # less what is told to be something else
+    with supervision.timing.span(Work.SAMPLES):  # less the spans of other kinds of work
         attempt = _Attempt.begin(trial, conditions)
         if not supervision.live:
             return attempt.archive(attempt.concluded(attempt.execute()))
@@ -74,9 +74,9 @@ def execute_together(
     conditions: Conditions,
     tell: Callable[[Trial, AttemptEnd], None],
 ) -> None:
-    """One attempt at each of `trials`, together; `tell` is told of each once it is archived.
+    """Execute `trials` once, together; call `tell` for each after it is archived.
 
-    For backends that move nothing and are `ExecutesTogether`. Raises only what the archive raises.
+    For backends that move nothing and are `ExecutesTogether`. Raises only errors of the archive.
     """
     backend = conditions.backend
     if not isinstance(backend, ExecutesTogether):
@@ -99,8 +99,10 @@ def _execute_together(
 
     recorders = [attempt.recorder for attempt in attempts.values()]
     stops = [attempt.stop for attempt in attempts.values()]
-    untold = Ending(Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED)
-    left = AttemptEnd(untold, gave_up=True)
+    unreported = Ending(
+        Outcome.FAULT, "the backend did not say how it ended", SafeState.NOT_CONFIRMED
+    )
+    left = AttemptEnd(unreported, gave_up=True)
     try:
         for place, ending in calls.called(backend, "execute_together", trials, recorders, stops):
             if place not in attempts:
@@ -115,7 +117,7 @@ def _execute_together(
 
 
 class _Attempt:
-    """One trial that is being executed, and what came of it."""
+    """One trial under execution, with its recorder, stop flag and file."""
 
     def __init__(
         self,
@@ -140,19 +142,19 @@ class _Attempt:
         return cls(trial, conditions.backend, file, recorder, stop, conditions.measure)
 
     def execute(self) -> AttemptEnd:
-        """What the backend says of it. Raises what the archive raises."""
+        """Execute on the backend, and return its ending. Raises errors of the archive."""
         try:
             return AttemptEnd(calls.execute(self.backend, self.trial, self.recorder, self.stop))
-        except Exception as error:  # noqa: BLE001 - likewise
+        except Exception as error:  # noqa: BLE001 - a bug in a backend must not cost the archive
             return _failed(error)
 
     def concluded(self, executed: AttemptEnd, *, forced: bool = False) -> AttemptEnd:
-        """How it ended as the recorder has seen it."""
+        """The end with the recorder's verdict."""
         ending = self.recorder.conclude(executed.ending, forced=forced)
         return replace(executed, ending=ending)
 
     def archive(self, executed: AttemptEnd) -> AttemptEnd:
-        """Keep the trial, then what its recording says. Raises what the archive raises."""
+        """Archive the trial, then its metrics. Raises errors of the archive."""
         executed = replace(executed, remarks=self.recorder.remarks)
         self._file.finish(executed.ending, self._started, utc_now())
         if self._measure is None:
@@ -160,13 +162,13 @@ class _Attempt:
         return replace(executed, unmeasured=self._file.measure(self._measure))
 
     def abandoned(self, safe_state: SafeState) -> AttemptEnd:
-        """It did not come back, although the bench was made safe over its head."""
+        """The end of a trial that did not return in spite of `make_safe`."""
         ending = Ending(Outcome.FAULT, "it did not come back from the trial", safe_state)
         return AttemptEnd(self.recorder.conclude(ending, forced=True), gave_up=True)
 
 
 def _failed(error: BaseException) -> AttemptEnd:
-    """A backend that cannot go on, or has a bug. Raises what the recorder raised."""
+    """The end for an error of the backend, bug or not. Re-raises an ArchiveError."""
     if isinstance(error, ArchiveError):
         raise error  # from the recorder: the archive cannot be written
     bug = None if isinstance(error, CampaignError) else error
@@ -176,17 +178,17 @@ def _failed(error: BaseException) -> AttemptEnd:
 
 
 def _attended(attempt: _Attempt, supervision: Supervision) -> AttemptEnd:
-    """Execute on a bench that really moves: somebody looks at the clock all the while.
+    """Execute on a live bench with a watchdog.
 
-    The backend has a thread of its own, which this one does not depend on: when it does not end a
-    trial that is over, the bench is made safe from here, and it is left behind at last.
+    The backend runs in its own thread. If it does not end a trial that is over, this thread makes
+    the bench safe, and finally abandons the backend's thread.
     """
     patience, clock = supervision.patience, supervision.clock
     recorder = attempt.recorder
     silence = SilenceWatch(patience.asleep, clock())
     call = Call(attempt.execute, "bench")
-    found: float | None = None  # when the trial turned out to be over
-    given_up: float | None = None  # when it is left behind: make_safe was called over its head
+    ended_at: float | None = None  # clock time of the verdict
+    given_up: float | None = None  # clock time of abandoning; set with the call of make_safe
     safe_state = SafeState.NOT_CONFIRMED
     while not call.has_ended(patience.tick):
         HEARTBEAT.beat()
@@ -195,9 +197,9 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> AttemptEnd:
             recorder.silent(silent)
         if recorder.verdict is None:
             continue
-        found = clock() if found is None else found
+        ended_at = clock() if ended_at is None else ended_at
         waited = 0.0 if recorder.verdict.kind == "silence" else patience.grace
-        if given_up is None and clock() - found >= waited:
+        if given_up is None and clock() - ended_at >= waited:
             given_up = clock() + patience.giving_up
             safe_state = _made_safe(attempt.backend)
             given_up = max(given_up, clock() + patience.grace)
@@ -206,8 +208,8 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> AttemptEnd:
     executed = attempt.concluded(call.answer(), forced=given_up is not None)
     if recorder.verdict is None:
         if executed.ending.safe_state is not SafeState.CONFIRMED:
-            # Measuring and archiving take their time. The ending stays as the backend told it:
-            # the runner asks once more, and keeps the answer in the journal.
+            # Measuring and archiving take time. The ending stays as the backend reported it: the
+            # runner calls make_safe again and journals the answer.
             _made_safe(attempt.backend)
         return executed
     safe_state = _made_safe(attempt.backend)
@@ -215,7 +217,7 @@ def _attended(attempt: _Attempt, supervision: Supervision) -> AttemptEnd:
 
 
 def _allowed(attempt: _Attempt, supervision: Supervision) -> float:
-    """How long (s) nothing may be heard now."""
+    """Permitted silence (s) in the present phase of the trial."""
     patience = supervision.patience
     if attempt.stop.halted or attempt.recorder.is_complete:
         return patience.closing
@@ -225,5 +227,5 @@ def _allowed(attempt: _Attempt, supervision: Supervision) -> float:
 def _made_safe(backend: Backend) -> SafeState:
     try:
         return calls.make_safe(backend)
-    except Exception:  # noqa: BLE001 - not seen safe; the runner asks again, and says why
+    except Exception:  # noqa: BLE001 - not confirmed; the runner calls again, and reports the reason
         return SafeState.NOT_CONFIRMED

@@ -1,4 +1,4 @@
-"""Trials that are executed together: one group within the lookahead."""
+"""Batches of trials that are executed together: one group within the lookahead."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from campaign.backends.interface import Backend, ExecutesTogether
 from campaign.trial import Trial
 
 LOOK_AHEAD = 512
-"""Trials of the plan among which companions are looked for."""
+"""Number of trials of the plan that are searched for companions."""
 
 
 class Batches:
-    """The trials that wait, handed out one by one or, where the backend gains by it, several.
+    """Queue of trials, taken singly, or in batches if the backend executes trials together.
 
-    A trial may come before others of the plan then. It does not where the order means something:
-    no trial is taken over one that `stays`, and none of those is.
+    A batch may change the order of the plan. A trial that `stays` keeps its place: neither it nor
+    a later trial is moved forward past it.
     """
 
     def __init__(
         self, trials: Iterable[Trial], backend: Backend, workers: int, *, live: bool = False
     ) -> None:
-        """`live`: whether something moves: each trial then has somebody who watches it alone."""
+        """`live`: whether a bench moves; each trial is then supervised and executed alone."""
         self._waiting = deque(trials)
         self._together: ExecutesTogether | None = None
         if isinstance(backend, ExecutesTogether) and not live:
@@ -33,38 +33,38 @@ class Batches:
 
     @property
     def first(self) -> Trial | None:
-        """The next one in the order of the plan; None when there are no more."""
+        """The next trial; None if none are left."""
         return self._waiting[0] if self._waiting else None
 
     def again(self, trial: Trial) -> None:
-        """It is the next one once more."""
+        """Put `trial` first again."""
         self._waiting.appendleft(trial)
 
     def insert(self, trials: Sequence[Trial]) -> None:
-        """They are the next ones, in that order."""
+        """Put `trials` first, in their order."""
         self._waiting.extendleft(reversed(trials))
 
     def take(self, seconds: float, stays: Callable[[Trial], bool]) -> tuple[Trial, ...]:
-        """The next trial, and those that are executed together with it, in plan order.
+        """Take the next trial and those that are executed together with it, in plan order.
 
         Args:
-            seconds: of bench time that there are for them; one trial is taken in any case.
-            stays: whether something has to be done before a trial.
+            seconds: available bench time; one trial is taken in any case.
+            stays: whether an operator step is due before a trial.
         """
         first = self._waiting.popleft()
         together = self._together
         if together is None or (group := _group(together, first)) is None:
             return (first,)
-        found = []
+        companions = []
         for trial in islice(self._waiting, LOOK_AHEAD):
             if stays(trial):
                 break
             if _group(together, trial) == group:
-                found.append(trial)
-        # As many as every worker gets of these, unless alone would cost less.
-        share = -(-(1 + len(found)) // self._workers)
+                companions.append(trial)
+        # An equal share per worker, unless single execution costs less.
+        share = -(-(1 + len(companions)) // self._workers)
         batch, left = [first], seconds - first.task.duration
-        for trial in found[: min(share, together.most_together) - 1]:
+        for trial in companions[: min(share, together.most_together) - 1]:
             left -= trial.task.duration
             if left < 0.0:
                 break
@@ -78,7 +78,7 @@ class Batches:
 
 
 def _group(backend: ExecutesTogether, trial: Trial) -> Hashable | None:
-    """None for a trial that the backend cannot place: it goes alone, and what is wrong is said."""
+    """Group of a trial; None on an error: it is then executed alone, which reports the error."""
     try:
         group: Hashable = called(backend, "group", trial)
         return group

@@ -1,8 +1,8 @@
 """Batches executed by the workers of a Dask cluster (dask.distributed, an extra).
 
-The cluster executes, and nothing else: trials go to a worker, and their files, journal entries and
-endings come back. This process alone writes the run: it puts the files of a batch on the disk
-before it tells of any of its trials.
+The cluster only executes: a worker receives trials and returns their files, journal entries and
+endings. Only this process writes the run. It writes the files of a batch to the disk before it
+reports any of its trials.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOCAL = "dask"
-"""`--executor` for a cluster of this machine's own processes."""
+"""`--executor` value for a cluster of local processes."""
 _ADDRESS = re.compile(r"dask://(\[[0-9a-fA-F:]+\]|[A-Za-z0-9.-]+):([0-9]{1,5})")
 _LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
 CERTIFICATES = ("ca.pem", "cert.pem", "key.pem")
 """Files in the folder of `--executor-tls`."""
 CONNECTING = 20.0
-"""s until a scheduler that does not answer is not there."""
+"""s; timeout of the connection to a scheduler."""
 GONE = 10.0
-"""s that the scheduler may be away before the run ends; a resume goes on with it."""
+"""s without scheduler or workers until the run ends; it can be resumed."""
 PROCESSOR = "processor"
 LOOK = 2.0
-"""s between two looks for workers that have joined."""
+"""s between two checks for new workers."""
 
 
 @contextmanager
@@ -70,17 +70,16 @@ def cluster(
     trials: Sequence[Trial],
     tls: Path | None = None,
 ) -> Iterator[Cluster]:
-    """The cluster that `--executor` names, with the workers that may execute these trials.
+    """Connect to the cluster of `--executor` and admit the workers that may execute these trials.
 
     Args:
         address: `dask`, or `dask://HOST:PORT` of a scheduler.
-        workers: processes of a local cluster; one for each processor when None.
-        backend, trials: what it is to execute.
+        workers: processes of a local cluster; None for one per processor.
+        backend, trials: the work to execute.
         tls: folder with `CERTIFICATES`.
 
     Raises:
-        UsageError: nothing is installed for it, it does not answer, or none of its workers can be
-            used.
+        UsageError: dask.distributed is missing, no scheduler answers, or no worker is usable.
     """
     distributed = _distributed()
     with ExitStack() as stack:
@@ -103,23 +102,23 @@ def cluster(
         except OSError:
             raise UsageError(f"--executor {address}: no scheduler answers there") from None
         stack.callback(_close, client)
-        found = Cluster(client, address, backend, trials)
+        connected = Cluster(client, address, backend, trials)
         if address == LOCAL:
             client.wait_for_workers(workers or 1, timeout=CONNECTING)
-        found.join()
-        found.need_workers()
-        yield found
+        connected.join()
+        connected.need_workers()
+        yield connected
 
 
 class Cluster:
     """A connected cluster.
 
-    A worker that has other versions than this process is refused. One that has another processor
-    executes the shortest trial first, and is refused when its samples are others.
+    A worker with other versions than this process is refused. A worker with another processor
+    first executes the shortest trial; it is refused if its samples differ.
 
     Attributes:
-        usable: addresses of the workers that may execute, with their threads.
-        refused: why others may not, by address.
+        usable: threads by address of the workers that may execute.
+        refused: reasons of refusal by worker address.
     """
 
     def __init__(
@@ -140,26 +139,26 @@ class Cluster:
         return sum(self.usable.values())
 
     def join(self) -> None:
-        """Look for workers that have come or gone."""
-        there = {
+        """Update the lists of workers: new ones, lost ones."""
+        present = {
             name: int(each["nthreads"])
             for name, each in self._client.scheduler_info(n_workers=-1)["workers"].items()
         }
-        self.usable = {name: threads for name, threads in self.usable.items() if name in there}
-        new = [name for name in there if name not in self.usable and name not in self.refused]
+        self.usable = {name: threads for name, threads in self.usable.items() if name in present}
+        new = [name for name in present if name not in self.usable and name not in self.refused]
         if not new:
             return
         self._client.run(_ignore_interrupts, workers=new)
-        told = self._client.run(identity, self._plug_ins, workers=new)
-        why = {name: self._differences(own) for name, own in told.items()}
-        others = [n for n in new if not why[n] and told[n][PROCESSOR] != self._expected[PROCESSOR]]
+        ids = self._client.run(identity, self._plug_ins, workers=new)
+        why = {name: self._differences(own) for name, own in ids.items()}
+        others = [n for n in new if not why[n] and ids[n][PROCESSOR] != self._expected[PROCESSOR]]
         for name in self._with_other_samples(others):
-            why[name] = f"on its processor ({told[name][PROCESSOR]}) a trial has other samples"
+            why[name] = f"on its processor ({ids[name][PROCESSOR]}) a trial has other samples"
         for name in new:
             if why[name]:
                 self.refused[name] = f"the worker {name} is not used: {why[name]}"
             else:
-                self.usable[name] = there[name]
+                self.usable[name] = present[name]
 
     @contextmanager
     def executor(self, conditions: Conditions, writer: PlanWriter) -> Iterator[DaskExecutor]:
@@ -171,7 +170,7 @@ class Cluster:
             executor.close()
 
     def need_workers(self) -> None:
-        """Raises UsageError where there is none, or none that may execute."""
+        """Raise UsageError if no worker is usable."""
         if not self.usable:
             why = "; ".join(self.refused.values()) or "the scheduler has no worker"
             raise UsageError(f"--executor {self._address}: {why}")
@@ -187,8 +186,8 @@ class Cluster:
         if not names:
             return []
         self._samples = self._samples or samples_digest(*self._reference)
-        told = self._client.run(samples_digest, *self._reference, workers=list(names))
-        return [name for name, samples in told.items() if samples != self._samples]
+        digests = self._client.run(samples_digest, *self._reference, workers=list(names))
+        return [name for name, samples in digests.items() if samples != self._samples]
 
 
 class DaskExecutor:
@@ -204,7 +203,7 @@ class DaskExecutor:
         self._run = uuid.uuid4().hex
         self._lost = 0
         self._looked = self._heard = time.monotonic()
-        self._pending: dict[Future[None], tuple[Any, frozenset[str]]] = {}  # and who may do it
+        self._pending: dict[Future[None], tuple[Any, frozenset[str]]] = {}  # with usable workers
         self._lock = threading.Lock()
 
     def submit(self, batch: Sequence[Trial], on_end: OnEnd) -> Future[None]:
@@ -223,8 +222,8 @@ class DaskExecutor:
             pure=False,
         )
         self._pending[future] = result, usable
-        told = partial(self._on_result, batch, on_end, future)
-        result.add_done_callback(told)  # type: ignore[no-untyped-call]
+        callback = partial(self._on_result, batch, on_end, future)
+        result.add_done_callback(callback)  # type: ignore[no-untyped-call]
         return future
 
     def look(self) -> None:
@@ -240,7 +239,7 @@ class DaskExecutor:
         if now - self._looked < LOOK or self._client.status != "running":
             return
         self._looked = now
-        with suppress(OSError, RuntimeError):  # it goes right now
+        with suppress(OSError, RuntimeError):  # the connection is being lost
             self._cluster.join()
         self.most_pending = max(1, 2 * self._cluster.threads)
         for result, usable in list(self._pending.values()):
@@ -254,7 +253,7 @@ class DaskExecutor:
             self._client.run(_stop, self._run, workers=at, on_error="ignore")
 
     def close(self) -> None:
-        """End what is still under way."""
+        """End all pending batches."""
         if self._pending:
             self.stop()
             with suppress(Exception):
@@ -269,25 +268,25 @@ class DaskExecutor:
         if result.status != "finished":
             self._fail(future, result)
             return
-        found: BatchResult = result.result()
+        outcome: BatchResult = result.result()
         try:
             with self._lock:
-                self._publish(found.files)
+                self._publish(outcome.files)
         except OSError as error:
-            part = self._writer.folder / next(iter(found.files), "trial")
-            future.set_exception(lost_trial(part, error, count=len(found.files)))
+            part = self._writer.folder / next(iter(outcome.files), "trial")
+            future.set_exception(lost_trial(part, error, count=len(outcome.files)))
             return
         trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in found.ended:
+        for number, executed, entries in outcome.ended:
             on_end(trials[number], executed, entries)
-        self._timing.add_worker(found.spent)
-        if found.error is None:
+        self._timing.add_worker(outcome.spent)
+        if outcome.error is None:
             future.set_result(None)
         else:
-            future.set_exception(found.error)
+            future.set_exception(outcome.error)
 
     def _fail(self, future: Future[None], result: Any) -> None:
-        """A worker died, or the scheduler did; or it is a bug."""
+        """Pass on the error of the worker, or WorkerLostError if worker or scheduler is lost."""
         error = None
         with suppress(Exception):
             error = result.exception(timeout=1.0)
@@ -309,7 +308,7 @@ class DaskExecutor:
         publish_all(written)
 
 
-# What a worker does
+# Executed by a worker
 
 _stopped: set[str] = set()
 _workers: dict[str, BatchWorker] = {}
@@ -321,8 +320,8 @@ def execute_remotely(
     """Execute a batch in a worker of a cluster."""
     worker = _workers.get(run)
     if worker is None:
-        told: WorkerSetup = pickle.loads(setup)  # noqa: S301 - from whoever the scheduler serves
-        worker = BatchWorker(told, lambda: run in _stopped)
+        given: WorkerSetup = pickle.loads(setup)  # noqa: S301 - from a client of the scheduler
+        worker = BatchWorker(given, lambda: run in _stopped)
         _workers.clear()
         _workers[run] = worker
     with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
@@ -330,14 +329,14 @@ def execute_remotely(
 
 
 def identity(plug_ins: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """What samples depend on besides their trials: versions, sources, the processor.
+    """Versions, source hashes and processor: what samples depend on besides their trials.
 
-    plug_ins: room and name of those that the trials use.
+    plug_ins: (room, name) of the plug-ins that the trials use.
     """
     from llvmlite import binding
 
     features = hashlib.sha256(binding.get_host_cpu_features().flatten().encode()).hexdigest()
-    found = {
+    versions = {
         **provenance.versions(),
         "sources": digest(sources_of(["campaign"]))[:16],
         PROCESSOR: f"{binding.get_host_cpu_name()} {features[:12]}",
@@ -347,12 +346,12 @@ def identity(plug_ins: Sequence[tuple[str, str]]) -> dict[str, str]:
         plug_in = next(each.plug_in(name) for each in rooms if each.room == room)
         if plug_in is not None:
             sources = digest(sources_of(plug_in.packages))[:16]
-            found[f"{room} {name}"] = f"{plug_in.version} ({sources})"
-    return found
+            versions[f"{room} {name}"] = f"{plug_in.version} ({sources})"
+    return versions
 
 
 def samples_digest(backend: Backend, trial: Trial) -> str:
-    """SHA-256 of all samples of a trial, executed here."""
+    """SHA-256 of all samples of a trial executed in this process."""
     recorder = MemoryRecorder()
     ending = calls.execute(backend, trial, recorder, lambda: False)
     whole = hashlib.sha256()
@@ -367,7 +366,7 @@ def _stop(run: str) -> None:
 
 
 def _ignore_interrupts() -> None:
-    """Ctrl-C at home reaches the processes of a local cluster as well; this program ends them."""
+    """Ignore Ctrl-C, which also reaches local worker processes; this program ends them."""
     import signal
 
     with suppress(ValueError):  # not the main thread
@@ -388,16 +387,16 @@ def _distributed() -> Any:
             "--executor needs dask.distributed: pip install 'campaign[dask]'"
         ) from None
     for name in ("distributed", "distributed.client", "tornado"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what a user must know is said here
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # this program reports errors itself
     return distributed
 
 
 def _scheduler(address: str, tls: Path | None) -> tuple[str, Path | None]:
-    """The scheduler's address as Dask has it. Raises UsageError."""
-    found = _ADDRESS.fullmatch(address)
-    if found is None:
+    """Scheduler address in Dask syntax, and the TLS folder. Raises UsageError."""
+    match = _ADDRESS.fullmatch(address)
+    if match is None:
         raise UsageError(f"--executor {address}: is neither 'dask' nor dask://HOST:PORT")
-    host, port = found.groups()
+    host, port = match.groups()
     if tls is None and host not in _LOOPBACK:
         raise UsageError(
             f"--executor {address}: anyone who reaches a scheduler can execute code; name a "

@@ -15,11 +15,11 @@ from campaign.trial import Trial
 
 @dataclass(frozen=True)
 class Choice:
-    """What is done about a failed trial.
+    """Decision about a failed trial.
 
     Attributes:
-        pause: what is waited before a retry (s).
-        reason: why the trial failed, and which retry this is or that it was the last.
+        pause: waiting time before a retry (s).
+        reason: cause of the failure, and the number of the retry or of retries made.
     """
 
     do: Literal["retry", "skip", "abort"]
@@ -28,14 +28,14 @@ class Choice:
 
 
 class Responses:
-    """Applies a policy; remembers how often each trial was executed again in this session."""
+    """Applies a policy; counts the retries of each trial in this session."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
         self._retries: dict[int, int] = {}
 
     def choose(self, trial: Trial, ending: Ending) -> Choice:
-        """What to do about a trial that ended in any way but completed or interrupted."""
+        """Decide about a trial that neither completed nor was interrupted."""
         response = self._policy.response(ending)
         what = str(ending.fault or ending.outcome)
         reason = f"{what}: {ending.reason}" if ending.reason else what
@@ -49,42 +49,42 @@ class Responses:
 
 
 class Rests:
-    """Counts bench time (s) until the bench has to rest."""
+    """Counts bench time (s) until the next rest of the bench."""
 
     def __init__(self, rest: Rest | None) -> None:
         self._rest = rest
         self._since = 0.0
 
     def worked(self, seconds: float) -> None:
-        """The bench was in use for so long."""
+        """Add `seconds` of bench time."""
         self._since += seconds
 
     @property
     def left(self) -> float:
-        """Bench time (s) until the next one."""
+        """Bench time (s) until the next rest; infinite without rests."""
         return math.inf if self._rest is None else self._rest.every - self._since
 
     @property
     def due(self) -> Rest | None:
-        """The rest that has to be taken before the next trial, or None."""
+        """The rest that is due before the next trial, or None."""
         return self._rest if self._rest is not None and self._since >= self._rest.every else None
 
     def taken(self) -> None:
-        """The bench has rested."""
+        """Reset the count after a rest."""
         self._since = 0.0
 
 
 def extremes(trials: Iterable[Trial], metrics: Mapping[int, Sequence[Estimate]]) -> dict[int, str]:
-    """Trials with the smallest or the largest value of a metric of their test, and of which."""
-    found: dict[tuple[str, str], dict[int, float]] = {}
+    """By trial number, the metrics of its test whose smallest or largest value it has."""
+    values_of: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         for each in metrics.get(trial.number, ()):
-            found.setdefault((trial.test, each.name), {})[trial.number] = each.value
-    told: dict[int, list[str]] = {}
-    for (_, name), values in found.items():
+            values_of.setdefault((trial.test, each.name), {})[trial.number] = each.value
+    roles: dict[int, list[str]] = {}
+    for (_, name), values in values_of.items():
         for choose, which in ((min, "smallest"), (max, "largest")):
-            told.setdefault(choose(values, key=values.__getitem__), []).append(f"{which} {name}")
-    return {number: ", ".join(which) for number, which in told.items()}
+            roles.setdefault(choose(values, key=values.__getitem__), []).append(f"{which} {name}")
+    return {number: ", ".join(which) for number, which in roles.items()}
 
 
 def _times(count: int, one: str, many: str) -> str:

@@ -19,24 +19,24 @@ from campaign.recording import Ending
 from campaign.trial import Trial
 
 PLAIN_INTERVAL = 10.0  # s between plain lines, so that a log stays readable
-PATIENCE = 2.0  # s that the archive may take to close before somebody is told
+PATIENCE = 2.0  # s that the archive may take to close before a message is shown
 CLOSING = "closing the archive"
 
 
 class Shown(Protocol):
-    """A display that can get out of the way when a person is asked something."""
+    """A display that can be hidden during a prompt."""
 
     def __call__(self, progress: Progress) -> None: ...
 
     def hidden(self) -> AbstractContextManager[None]:
-        """The terminal belongs to somebody else inside the block."""
+        """Leave the terminal free inside the block."""
 
 
 @contextmanager
 def progress_display(console: Console) -> Iterator[Shown]:
-    """The display that suits `console`, for as long as the block lasts.
+    """The display for the type of `console`, during the block.
 
-    When the terminal closes, what would have been shown is dropped: the run is not to end by it.
+    After the terminal closes, output is dropped: this must not end the run.
     """
     console.file = cast(IO[str], _Droppable(console.file))
     if console.is_terminal and not console.is_dumb_terminal:
@@ -71,7 +71,7 @@ class _Droppable:
 
 @contextmanager
 def live_display(console: Console) -> Iterator[LiveDisplay]:
-    """One line that is redrawn in place, for as long as the block lasts."""
+    """One line that is redrawn in place, during the block."""
     live = Live(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=None),
@@ -86,7 +86,7 @@ def live_display(console: Console) -> Iterator[LiveDisplay]:
 
 
 class LiveDisplay:
-    """Redraws one line; trials that fail and what the run decides are kept above it."""
+    """Redraws one line; failed trials and decisions of the run stay above it."""
 
     def __init__(self, live: Live) -> None:
         self._live = live
@@ -109,7 +109,7 @@ class LiveDisplay:
 
     @contextmanager
     def hidden(self) -> Iterator[None]:
-        """No line, and nothing redrawn, inside the block."""
+        """Draw nothing inside the block."""
         self._live.stop()
         try:
             yield
@@ -118,7 +118,7 @@ class LiveDisplay:
 
 
 class PlainDisplay:
-    """A line when a test begins, when a trial fails, and every `PLAIN_INTERVAL` in between."""
+    """Prints a line when a test begins, when a trial fails, and every `PLAIN_INTERVAL`."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -127,7 +127,7 @@ class PlainDisplay:
         self._patience: threading.Timer | None = None
 
     def __call__(self, progress: Progress) -> None:
-        """Print what there is to say, if anything."""
+        """Print new lines, if any are due."""
         for line in news(progress):
             self._print(line)
         if progress.closing:
@@ -143,11 +143,11 @@ class PlainDisplay:
             self._print(Text(f"{test}: {parts}"))
 
     def hidden(self) -> AbstractContextManager[None]:
-        """Lines are in nobody's way."""
+        """Nothing to hide: plain lines do not disturb a prompt."""
         return nullcontext()
 
     def end(self) -> None:
-        """Say nothing any more."""
+        """Cancel the pending message of a slow archive."""
         if self._patience is not None:
             self._patience.cancel()
             self._patience.join()
@@ -158,7 +158,7 @@ class PlainDisplay:
 
 
 def news(progress: Progress) -> Iterator[Text]:
-    """Lines that stay: a trial that failed, and what the run has decided."""
+    """Lines that stay: a failed trial, a decision of the run."""
     if (failure := _failure(progress.ended)) is not None:
         yield failure
     if progress.remark:
@@ -166,7 +166,7 @@ def news(progress: Progress) -> Iterator[Text]:
 
 
 def current_test(progress: Progress) -> str:
-    """The test of the first running trial, else of the one that has just ended."""
+    """Test of the first running trial, else of the trial that has just ended."""
     if progress.running:
         return progress.running[0].test
     return progress.ended[0].test if progress.ended else ""
@@ -175,12 +175,12 @@ def current_test(progress: Progress) -> str:
 def counts(progress: Progress) -> str:
     """`37 done, 1 failed, 2 interrupted, 122 left`."""
     others = {"failed": progress.failed, "interrupted": progress.interrupted}
-    told = "".join(f", {number} {way}" for way, number in others.items() if number)
-    return f"{progress.done} done{told}, {progress.left} left"
+    other_counts = "".join(f", {number} {name}" for name, number in others.items() if number)
+    return f"{progress.done} done{other_counts}, {progress.left} left"
 
 
 def time_left(progress: Progress) -> str:
-    """`about 1:05 left`, or nothing while there is nothing to go by."""
+    """`about 1:05 left`; empty without a forecast."""
     if progress.time_left is None or not progress.left:
         return ""
     return f"about {clock(progress.time_left)} left"
@@ -194,10 +194,10 @@ def clock(seconds: float) -> str:
 
 
 def _failure(ended: tuple[Trial, Ending] | None) -> Text | None:
-    # How many trials a stop has interrupted, and who stopped them, is said once: at the end.
+    # The end of the run reports interrupted trials and the source of the stop once.
     if ended is None or not ended[1].outcome.failed:
         return None
     trial, ending = ended
     reason = f": {ending.reason}" if ending.reason else ""
-    told = f"{trial.name} {trial.label} {ending.outcome.value}{reason}"
-    return Text(printable(told), style="yellow")
+    line = f"{trial.name} {trial.label} {ending.outcome.value}{reason}"
+    return Text(printable(line), style="yellow")

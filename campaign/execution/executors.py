@@ -38,9 +38,9 @@ from campaign.stopwatch import UNTIMED, Spent, Stopwatch, Work
 from campaign.trial import Trial
 
 FORGOTTEN = 5.0
-"""s after the death of a worker process, in which its pool says so of each of its batches."""
+"""s after the death of a worker process until the pool must have reported each of its batches."""
 FEWEST_FOR_PROCESSES = 300
-"""Trials from which on processes save more time than they take to start."""
+"""Least number of trials for which processes save more time than their start costs."""
 PRELOADED = (
     "campaign.archive.writing.trial_file",
     "campaign.backends.sim",
@@ -50,37 +50,37 @@ PRELOADED = (
 )
 """Modules that the fork server imports once for all worker processes."""
 OnEnd = Callable[[Trial, AttemptEnd, Sequence[Entry]], None]
-"""Receives how a trial ended and its journal entries still to be written; from any thread."""
+"""Receives a trial's end and the journal entries to be written; called from any thread."""
 
 
 class BatchExecutor(Protocol):
-    """Executes batches in parallel; a batch is trials that go through the backend together.
+    """Executes batches in parallel; a batch is a group of trials that are executed together.
 
     Attributes:
-        most_pending: batches to submit before any of them has ended.
+        most_pending: maximum number of submitted batches that have not ended.
     """
 
     most_pending: int
 
     def submit(self, batch: Sequence[Trial], on_end: OnEnd) -> Future[None]:
-        """Execute a batch. The future raises what the archive raised, or WorkerLostError."""
+        """Execute a batch. The future raises errors of the archive, or WorkerLostError."""
 
     def stop(self) -> None:
         """End the trials that are being executed, as soon as possible."""
 
     def look(self) -> None:
-        """Called while nothing is heard of any batch."""
+        """Check the workers; called while no batch reports."""
 
 
 OpenExecutor = Callable[[Conditions, PlanWriter], AbstractContextManager[BatchExecutor]]
-"""Begins to execute batches under these conditions, for the writer of the run."""
+"""Opens an executor of batches under these conditions, for the writer of the run."""
 
 
 class WorkerLostError(Exception):
     """A worker process died; trials of the batch that have not been reported must be repeated.
 
     Attributes:
-        times: how often this has happened in this run.
+        times: number of losses in this run.
     """
 
     def __init__(self, times: int) -> None:
@@ -90,7 +90,7 @@ class WorkerLostError(Exception):
 
 @dataclass
 class ThreadExecutor:
-    """Daemon threads: none of them keeps the program from exiting."""
+    """Executor with daemon threads, which do not prevent the exit of the program."""
 
     most_pending: int
     conditions: Conditions
@@ -103,7 +103,7 @@ class ThreadExecutor:
         def task() -> None:
             try:
                 execute(batch, self.conditions, lambda trial, executed: on_end(trial, executed, ()))
-            except BaseException as error:  # noqa: BLE001 - the archive's, raised by the future
+            except BaseException as error:  # noqa: BLE001 - an error of the archive, raised by the future
                 future.set_exception(error)
             else:
                 future.set_result(None)
@@ -115,7 +115,7 @@ class ThreadExecutor:
         """See `BatchExecutor`; a thread does not die."""
 
     def stop(self) -> None:
-        """Nothing to do: threads ask whether the run is to end."""
+        """Nothing to do: threads poll whether the run is to end."""
 
 
 @contextmanager
@@ -136,13 +136,13 @@ def thread_executor(count: int, conditions: Conditions) -> Iterator[ThreadExecut
         for _ in threads:
             tasks.put(None)
     for thread in threads:
-        thread.join()  # nothing hangs: all trials have ended
+        thread.join()  # immediate: all trials have ended
 
 
 def execute(
     batch: Sequence[Trial], conditions: Conditions, on_end: Callable[[Trial, AttemptEnd], None]
 ) -> None:
-    """Execute a batch; report each trial once it is archived. Raises what the archive raises."""
+    """Execute a batch; report each archived trial. Raises errors of the archive."""
     if len(batch) == 1:
         on_end(batch[0], execute_once(batch[0], conditions))
     else:
@@ -151,7 +151,7 @@ def execute(
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What another process needs to execute batches."""
+    """Data that another process needs to execute batches."""
 
     backend: Backend
     supervision: Supervision
@@ -161,7 +161,7 @@ class WorkerSetup:
 
     @classmethod
     def of(cls, conditions: Conditions) -> Self:
-        """The same conditions, without what only this process has."""
+        """The same conditions, without subscribers and timing of this process."""
         supervision = conditions.supervision
         return cls(
             conditions.backend,
@@ -174,13 +174,13 @@ class WorkerSetup:
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What another process returns of a batch.
+    """Result of a batch from another process.
 
     Attributes:
-        ended: of each archived trial: number, how it ended, journal entries.
-        error: what the archive raised; later trials of the batch are missing then.
-        spent: time by kind of work; empty when not measured.
-        files: content of trial files by name, of a process that has not the folder of the run.
+        ended: (number, end, journal entries) of each archived trial.
+        error: exception of the archive; later trials of the batch are then missing.
+        spent: time by kind of work; empty if not measured.
+        files: content of trial files by name, from a process without access to the run's folder.
     """
 
     ended: tuple[tuple[int, AttemptEnd, tuple[Entry, ...]], ...]
@@ -190,7 +190,7 @@ class BatchResult:
 
 
 class BatchWorker:
-    """Executes batches in another process than the one that has the run's journal."""
+    """Executes batches in a process without the run's journal."""
 
     def __init__(self, setup: WorkerSetup, stopped: Callable[[], bool]) -> None:
         self._setup, self._stopped = setup, stopped
@@ -233,7 +233,7 @@ class BatchWorker:
 
 
 class ProcessExecutor:
-    """A pool of processes on this machine. When one dies, a new pool takes the next batches."""
+    """A pool of local processes. After the death of one, a new pool takes the next batches."""
 
     def __init__(self, count: int, conditions: Conditions, writer: PlanWriter) -> None:
         self.most_pending = count + 1  # no worker waits while the parent writes the journal
@@ -243,7 +243,7 @@ class ProcessExecutor:
         setup = WorkerSetup.of(conditions), writer.folder.absolute()
         self._setup = pickle.dumps(setup, pickle.HIGHEST_PROTOCOL)
         self._context = processes.process_context(PRELOADED)
-        # No Event: a worker that dies while it asks would keep the lock of one for ever.
+        # No Event: a worker that dies while it reads an Event would hold its lock forever.
         self._stopped = self._context.RawValue(ctypes.c_bool, False)
         self._pool: ProcessPoolExecutor | None = None
         self._pending: dict[Future[None], ProcessPoolExecutor] = {}
@@ -261,7 +261,7 @@ class ProcessExecutor:
         self._pending[future] = pool
         try:
             result = pool.submit(_execute_batch, batch, attempts)
-        except (BrokenProcessPool, OSError):  # the latter of a pool that breaks meanwhile
+        except (BrokenProcessPool, OSError):  # OSError: the pool breaks during the call
             self._on_loss(pool, future)
         else:
             result.add_done_callback(partial(self._on_result, pool, batch, on_end, future))
@@ -269,10 +269,10 @@ class ProcessExecutor:
         return future
 
     def look(self) -> None:
-        """See `BatchExecutor`. A pool that breaks while it is given work may forget that work."""
+        """See `BatchExecutor`. A pool that breaks during a submission may lose the batch."""
         alive = set(multiprocessing.active_children())
         broken = not self._workers <= alive
-        pending = list(self._pending.items())  # a thread of the pool takes from it
+        pending = list(self._pending.items())  # a copy: a thread of the pool removes items
         lost = [(f, pool) for f, pool in pending if broken or pool is not self._pool]
         if not lost:
             self._died = None
@@ -290,7 +290,7 @@ class ProcessExecutor:
         self._stopped.value = True
 
     def close(self, *, at_once: bool) -> None:
-        """Wait for the batches that are being executed, or kill their processes."""
+        """Wait for the running batches, or kill their processes."""
         if self._pool is None:
             return
         if at_once:
@@ -314,7 +314,7 @@ class ProcessExecutor:
     ) -> None:
         """Called in a thread of the pool."""
         try:
-            found = result.result()
+            returned = result.result()
         except BrokenProcessPool:
             self._on_loss(pool, future)
             return
@@ -322,16 +322,16 @@ class ProcessExecutor:
             if self._pending.pop(future, None) is not None:
                 future.set_exception(error)
             return
-        if self._pending.pop(future, None) is None:  # it was taken for lost
+        if self._pending.pop(future, None) is None:  # already treated as lost
             return
         trials = {trial.number: trial for trial in batch}
-        for number, executed, entries in found.ended:
+        for number, executed, entries in returned.ended:
             on_end(trials[number], executed, entries)
-        self._timing.add_worker(found.spent)
-        if found.error is None:
+        self._timing.add_worker(returned.spent)
+        if returned.error is None:
             future.set_result(None)
         else:
-            future.set_exception(found.error)
+            future.set_exception(returned.error)
 
     def _on_loss(self, pool: ProcessPoolExecutor, future: Future[None]) -> None:
         """The death of one process ends its pool and every batch submitted to it."""
@@ -340,7 +340,7 @@ class ProcessExecutor:
                 self._pool = None
                 self._lost += 1
             error = WorkerLostError(self._lost)
-            if self._pending.pop(future, None) is None:  # it was lost before
+            if self._pending.pop(future, None) is None:  # already lost
                 return
         future.set_exception(error)
 
@@ -349,7 +349,7 @@ class ProcessExecutor:
 def process_executor(
     conditions: Conditions, writer: PlanWriter, *, count: int
 ) -> Iterator[ProcessExecutor]:
-    """An executor with `count` processes, which start with the first batch."""
+    """Executor with `count` processes, which start with the first batch."""
     executor = ProcessExecutor(count, conditions, writer)
     try:
         yield executor

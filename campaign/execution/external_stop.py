@@ -12,17 +12,17 @@ from campaign.execution.stop import StopSwitch
 from campaign.recording import PanicStop
 
 INTERVAL = 0.1
-"""s between two questions to the bench."""
+"""s between two polls of the bench."""
 
 
 class OutsideWatch:
-    """The stop switch of a run, whose asking asks the bench as well: for between trials only.
+    """Stop switch of a run that also polls the bench; for use between trials only.
 
-    Rests, pauses before a retry, and prompts ask it instead of the switch; a running trial finds a
-    stop by itself. A stop that nobody asks about in time keeps the next trial from moving.
+    Rests, pauses before a retry, and prompts call it instead of the switch. A running trial detects
+    a stop itself. A stop between two polls prevents the motion of the next trial.
 
     Attributes:
-        stop: the panic stop that was found, or None.
+        stop: the detected panic stop, or None.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class OutsideWatch:
         found: Callable[[PanicStop], None] = lambda stop: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`found` is told once, before the run is asked to stop."""
+        """`found` is called once with the stop, before the run is requested to stop."""
         self._bench = backend if isinstance(backend, SupportsExternalStop) else None
         self._switch = switch
         self._found = found
@@ -46,12 +46,12 @@ class OutsideWatch:
         return self._switch()
 
     def look(self) -> None:
-        """Ask the bench now, also after the run was asked to stop."""
+        """Poll the bench now, also after a stop request to the run."""
         if self._bench is None or self.stop is not None:
             return
         try:
             stop = calls.panic_stop(self._bench)
-        except Exception as error:  # noqa: BLE001 - who cannot be asked may have been stopped
+        except Exception as error:  # noqa: BLE001 - a bench without answer may be stopped
             self._switch.request(f"the bench, which cannot be asked: {describe(error)}")
             return
         self._due = self._now() + INTERVAL

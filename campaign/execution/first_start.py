@@ -1,7 +1,7 @@
 """Compiling the engine once per installation.
 
-In one process numba compiles one function at a time, so what is made beside that has a process of
-its own, which fills the cache: `python -m campaign.execution.first_start WIDTH [engine]`.
+In one process numba compiles one function at a time. Parallel compilation uses further processes
+that fill the cache: `python -m campaign.execution.first_start WIDTH [engine]`.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from campaign.resources import shipped_benches
 
 Told = Callable[[CompiledPart], None]
 LONGEST = 600.0
-"""s; longer nothing compiles, even on a machine that has much else to do."""
+"""s; time limit of the compilation, also for a busy machine."""
 
 
 def make_all(told: Told, helpers: Helpers | None = None) -> None:
-    """Make all that the shipped benches need: what is kept is loaded, the rest is compiled.
+    """Load or compile all machine code that the shipped benches need.
 
-    `told` of each part once it is there, with what it took wherever it was compiled.
+    `told` is called for each part when it is ready, with its times in the process that compiled it.
     """
     benches = _benches()
     first, *others = WIDTHS
@@ -56,9 +56,9 @@ def make_all(told: Told, helpers: Helpers | None = None) -> None:
 
 
 class Helpers:
-    """Processes that compile while this one does; a context manager that leaves none behind.
+    """Processes that compile in parallel; a context manager that ends all of them.
 
-    None are started where they could keep nothing for us, or would only wait for our processor.
+    None are started without a cache folder or with a single processor.
     """
 
     def __init__(self, widths: Sequence[int] = WIDTHS[1:], *only: str) -> None:
@@ -76,21 +76,21 @@ class Helpers:
                 stream.close()
 
     def wait(self) -> dict[str, CompiledPart]:
-        """What they have made, by name, when they have ended; one that failed made less."""
+        """Wait for their end; compiled parts by name. A failed process returns fewer parts."""
         for process in self._processes:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(LONGEST)
-            process.kill()  # one that hangs
+            process.kill()  # if it hangs
         lines = [line for each in self._processes for line in each.stdout or ()]
         made = [CompiledPart(**json.loads(line)) for line in lines]
         return {each.name: each for each in made}
 
     @staticmethod
     def _start(width: int, *only: str) -> subprocess.Popen[str]:
-        # -P: nothing in the user's folder can stand in for a module of ours.
+        # -P: a file in the user's folder cannot replace a module of the program.
         return subprocess.Popen(  # noqa: S603 - our own program, no shell
             [sys.executable, "-P", "-m", __name__, str(width), *only],
-            stdin=subprocess.PIPE,  # which closes, however we end
+            stdin=subprocess.PIPE,  # closes with the end of this process
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             encoding="utf-8",
@@ -98,13 +98,13 @@ class Helpers:
 
 
 class FirstStart:
-    """Makes the engine in another process where it is not there; a context manager.
+    """Compiles a missing engine in another process; a context manager.
 
-    Who simulates needs the same code, and so should `wait` first. What goes wrong here costs time
-    only: what is missing is compiled where it is used, and there it is said what is wrong.
+    Simulations need the same code: call `wait` first. An error here costs only time: missing code
+    is compiled at its use, where errors are reported.
 
     Attributes:
-        processor: what it took in this process, once it is over (s).
+        processor: processor time of `wait` in this process (s), after its end.
     """
 
     def __init__(self) -> None:
@@ -121,19 +121,19 @@ class FirstStart:
         self._leaving.close()
 
     def need(self, width: int) -> None:
-        """Begin to make the engine for so many lanes."""
+        """Begin to compile the engine for `width` lanes, unless it exists."""
         if not is_made(width):
             self._widths.append(width)
-            with suppress(OSError):  # no more processes: this one compiles it
+            with suppress(OSError):  # no process available: this one compiles it
                 self._helpers.append(self._leaving.enter_context(Helpers([width], "engine")))
 
     @property
     def is_busy(self) -> bool:
-        """Whether there is something to wait for."""
+        """Whether `wait` has work to wait for."""
         return bool(self._widths)
 
     def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Until everything is there, or something hangs; `meanwhile` is done first."""
+        """Call `meanwhile`, then wait until all is compiled or a time limit is reached."""
         began = time.thread_time()
         with suppress(Exception):  # see the class
             meanwhile()
@@ -151,7 +151,7 @@ def _benches() -> list[CompleteBench]:
 
 
 def _bench() -> CompleteBench:
-    """Any one: the engine is the same."""
+    """Any shipped bench: the engine is the same for all."""
     return complete(load_bench(shipped_benches()[0]))
 
 
@@ -167,7 +167,7 @@ def _end_with_parent() -> None:
 
 if __name__ == "__main__":
     raise_gc_threshold()  # a tenth of the time
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a word
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a message
     threading.Thread(target=_end_with_parent, daemon=True).start()
     for line in _lines(int(sys.argv[1]), *sys.argv[2:]):
         print(line, flush=True)  # noqa: T201

@@ -7,24 +7,24 @@ from dataclasses import dataclass
 from campaign.trial import Trial
 
 SURE_AFTER = 2.0
-"""Seconds of work behind a forecast, or else"""
+"""s of work required for a forecast, or alternatively"""
 SURE_SHARE = 0.05
-"""this share of all that is to be done."""
+"""this share of all work."""
 UNEVEN_SHARE = 0.2
-"""The same where work halts: a halt counts as five times its length at most."""
+"""Required share if work pauses: a pause then counts at most five times its length."""
 PER_TRIAL = 20.0
-"""Seconds of bench time that a computed trial costs besides its own: being begun, archived, read
-and measured. Of the thesis' 1 712 trials, of 1 to 120 s, it makes the worst forecast best."""
+"""s of bench time that a computed trial costs additionally, to begin, archive, read and measure it.
+This value minimizes the largest forecast error over the thesis' 1 712 trials of 1 to 120 s."""
 
 BYTES = 8
-"""of a sample of one channel."""
+"""Bytes per sample of one channel."""
 
 
 def worth(trial: Trial, *, computed: bool) -> float:
-    """What a trial costs, in seconds of bench time; `computed`: nobody waits for a bench.
+    """Cost of a trial in s of bench time; `computed`: the backend computes its samples.
 
-    Of a trial that is read from files it is the bytes of its samples: how long it once took says
-    nothing of how long it takes to read.
+    For a trial that is read from files it is the number of sample bytes: the duration of a
+    recording does not determine the time to read it.
     """
     if trial.recording:
         return BYTES * trial.task.duration * trial.task.sample_rate * _channels(trial)
@@ -32,27 +32,27 @@ def worth(trial: Trial, *, computed: bool) -> float:
 
 
 def _channels(trial: Trial) -> int:
-    told = trial.recording.get("channels")
-    return max(1, len(told)) if isinstance(told, list) else 1
+    channels = trial.recording.get("channels")
+    return max(1, len(channels)) if isinstance(channels, list) else 1
 
 
 @dataclass
 class Forecast:
-    """The pace since the first sign of work: what came before was compiling, or connecting.
+    """Forecast from the rate since the first work; time before was for compiling or connecting.
 
-    `uneven`: work halts for seconds, as where a file is opened and looked through before the first
-    of its samples comes; then only a share of it tells a pace, and time that has passed does not.
+    `uneven`: work pauses for seconds, e.g. while a file is opened and checked before its first
+    sample. The forecast then requires a share of the work, not an elapsed time.
     """
 
     uneven: bool = False
-    _begin: tuple[float, float] | None = None  # wall clock, what was done by then
+    _begin: tuple[float, float] | None = None  # wall clock, cost done until then
 
     def time_left(self, now: float, done: float, left: float) -> float | None:
-        """Wall-clock time to the end (s); None while there is too little to go by.
+        """Remaining wall-clock time (s); None without sufficient data.
 
         Args:
-            now: a clock (s).
-            done, left: what trials cost (`worth`) that is behind and before the run.
+            now: time of a clock (s).
+            done, left: completed and remaining cost of trials (`worth`).
         """
         if done <= 0.0:
             return None

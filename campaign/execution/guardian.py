@@ -1,17 +1,16 @@
 """The guardian: the parent process of a program that moves a bench.
 
-Run by its path, with nothing but the standard library: `guardian.py COMMAND...`. It starts the
-command with three pipe ends, which `VARIABLE` names: where signals are read, where they are
-written, and where the program writes to us. Until the program is connected to a bench, it is left
-alone. From then on the guardian
+It is run by its path and uses only the standard library: `guardian.py COMMAND...`. It starts the
+command with three pipe ends, numbered in `VARIABLE`: to read signals, to write signals, and to
+write to the guardian. It acts only while the program is connected to a bench. Then the guardian
 
-- hands on the signals that it is sent. The C handler of Python writes the program's own ones to
-  us, also inside a call that lets none of its threads run: we count both, and kill a program that
-  does not obey the second one;
-- kills a program that owes a sign of life for `SILENCE`;
-- says, when the program has died, that nobody saw the bench at rest, and ends with exit code 5.
+- passes on the signals that it receives. Python's C handler writes the program's own signals to
+  the guardian, also during a call that blocks all threads. The guardian counts both, and kills a
+  program that does not obey the second signal;
+- kills a program whose sign of life is overdue by `SILENCE`;
+- reports, after the program dies, that the safe state is not confirmed; exit code 5.
 
-No method of a plug-in can be called from here. A command that stops the controller can.
+It cannot call a method of a plug-in, but can run a command that stops the controller.
 """
 
 from __future__ import annotations
@@ -26,45 +25,45 @@ from contextlib import suppress
 
 VARIABLE = "CAMPAIGN_GUARDIAN"
 NOTE, STOPPER = 0xFE, 0xFC
-"""First bytes of texts that the program sends: what is said if it dies, and the command that stops
-its controller, arguments separated by NUL. The length follows (two bytes)."""
+"""First bytes of the program's texts: message if it dies; command that stops its controller, with
+arguments separated by NUL. The length follows (two bytes)."""
 MAKING_SAFE, CONNECTED, LEAVING, BEAT, REST = 0xFD, 0xFB, 0xFA, 0xF9, 0xF8
-"""Single bytes: the bench is being made safe as somebody insists; a bench is connected; all is said
-and the program only ends; a sign of life, another of which follows; none follows."""
+"""Single bytes: the bench is being made safe after a second stop request; a bench is connected; the
+program only exits; a sign of life, with another to follow; a last sign of life."""
 OURS = 64
 """Added to the number of a signal that was sent to the guardian itself."""
 STUCK, SAFE = 1.5, 30.0
-"""s in which a program begins to leave once somebody insists, and may then make the bench safe."""
+"""s from a second stop request until the program must react; s that making safe may then take."""
 SILENCE = 30.0
-"""s without a sign of life that is owed."""
+"""s until an expected sign of life is overdue."""
 TURN = 1.0
-"""s between two looks; when it becomes three of them, the guardian itself did not run."""
+"""s between two polls; after three times as long the guardian itself did not run."""
 STOPPING = 8.0
-"""s that the command may take that stops the controller."""
-NOT_SAFE = 5  # the exit code
+"""s; time limit of the command that stops the controller."""
+NOT_SAFE = 5  # exit code
 ASKING = (signal.SIGINT, signal.SIGTERM)
 HANG_UP = getattr(signal, "SIGHUP", None)
 
 
 class StopRequests:
-    """Counts who asked the program to stop: a hang-up only asks, it does not insist."""
+    """Counts stop requests; a hang-up counts only as the first one."""
 
     def __init__(self) -> None:
         self.times = 0
 
     def add(self, number: int) -> None:
-        """A signal came."""
+        """Count signal `number`."""
         if number in ASKING or (number == HANG_UP and not self.times):
             self.times += 1
 
 
 class Guardian:
-    """What is known of the program; fed with the bytes of its pipe.
+    """State of the program, from the bytes of its pipe.
 
     Attributes:
-        note, stopper: the last of each that was sent.
+        note, stopper: the last text of each kind.
         moves: whether a bench is connected.
-        deadline: when the program is killed unless something changes; None for never.
+        deadline: monotonic time (s) at which the program is killed; None for never.
     """
 
     def __init__(self) -> None:
@@ -80,19 +79,19 @@ class Guardian:
         return min(filter(None, (self._insisted, self._silent)), default=None)
 
     def why(self) -> str:
-        """It was killed at its deadline."""
+        """Reason for killing the program at its deadline."""
         silent = f"gave no sign of life for {SILENCE:g} s"
         return f"{'did not obey' if self._insisted else silent} and was killed"
 
     def feed(self, data: bytes, now: float) -> bytes:
-        """The signals in `data`, to be handed on."""
+        """Update the state from `data`; the signals in it, to be passed on."""
         data, signals = self._left + data, b""
         while data:
             kind = data[0]
             if kind in (NOTE, STOPPER):
                 end = 3 + int.from_bytes(data[1:3])
                 if len(data) < end:
-                    break  # the rest is still to come
+                    break  # incomplete
                 setattr(self, "note" if kind == NOTE else "stopper", data[3:end])
                 data = data[end:]
                 continue
@@ -109,7 +108,7 @@ class Guardian:
         return signals
 
     def hear(self, byte: int, now: float) -> bytes:
-        """A signal came to the program, or with `OURS` added to the guardian."""
+        """Count a signal to the program, or, with `OURS` added, to the guardian."""
         asked = self._asked[byte & OURS]
         asked.add(byte % OURS)
         if asked.times > 1 and self._insisted is None:
@@ -117,35 +116,35 @@ class Guardian:
         return bytes((byte,))
 
     def slept(self, now: float) -> None:
-        """The guardian did not run for some time: what came meanwhile was not read."""
+        """Restart the silence time: the guardian did not run and did not read the pipe."""
         if self._silent is not None:
             self._silent = now + SILENCE
 
 
 def main(command: list[str]) -> int:
-    """Start `command` and watch until it has ended; the exit code. POSIX only."""
+    """Start `command`, watch it until its end, and return the exit code. POSIX only."""
     come, back = os.pipe()
-    told, tell = os.pipe()
+    inbox, outbox = os.pipe()
     heard = _signals()
-    for end in (back, told):
+    for end in (back, inbox):
         os.set_blocking(end, False)
-    ends = (come, back, tell)
+    ends = (come, back, outbox)
     program = subprocess.Popen(  # noqa: S603 - the command that was typed, no shell
         command, pass_fds=ends, env={**os.environ, VARIABLE: ",".join(map(str, ends))}
     )
-    os.close(tell)
+    os.close(outbox)
     guardian, looked, killed = Guardian(), time.monotonic(), ""
     while program.poll() is None:
-        select.select([told, heard], [], [], TURN)
+        select.select([inbox, heard], [], [], TURN)
         now = time.monotonic()
         if now - looked > 3 * TURN:
             guardian.slept(now)
         looked = now
-        # Signals first: what the program told before one of them is then among what is read next.
+        # Signals first: the next read then contains all that the program sent before a signal.
         sent = [number for number in _read(heard) if number != signal.SIGCHLD]
-        moved, signals = guardian.moves, guardian.feed(_read(told), now)
+        moved, signals = guardian.moves, guardian.feed(_read(inbox), now)
         if moved and not guardian.moves:
-            os.close(back)  # the end of what is handed on
+            os.close(back)  # no more signals are passed on
         if guardian.moves:
             signals += b"".join(guardian.hear(OURS + number, now) for number in sent)
             with suppress(OSError):
@@ -153,18 +152,18 @@ def main(command: list[str]) -> int:
             if guardian.deadline is not None and now >= guardian.deadline:
                 killed = guardian.why()
                 program.kill()
-                with suppress(subprocess.TimeoutExpired):  # a disk may hold it
+                with suppress(subprocess.TimeoutExpired):  # a disk access may block it
                     program.wait(TURN)
                 break
         else:
-            for number in sent:  # of a terminal's Ctrl-C it hears twice, and leaves at the first
+            for number in sent:  # a terminal's Ctrl-C arrives twice; the program exits at the first
                 program.send_signal(number)
-    guardian.feed(_read(told), looked)
+    guardian.feed(_read(inbox), looked)
     return _ended(program.returncode, guardian, killed)
 
 
 def _signals() -> int:
-    """Where the numbers of signals can be read from now on. POSIX: Windows has no SIGCHLD."""
+    """Descriptor from which signal numbers can be read. POSIX: Windows has no SIGCHLD."""
     numbers = [*ASKING, signal.SIGCHLD, signal.SIGQUIT]  # Ctrl-\ ends the program, and not us
     if HANG_UP is not None and signal.getsignal(HANG_UP) is not signal.SIG_IGN:
         numbers.append(HANG_UP)
@@ -178,7 +177,7 @@ def _signals() -> int:
 
 
 def _read(pipe: int) -> bytes:
-    """All that there is."""
+    """All available bytes of a non-blocking pipe."""
     data = b""
     with suppress(BlockingIOError):
         while piece := os.read(pipe, 65536):
@@ -187,7 +186,7 @@ def _read(pipe: int) -> bytes:
 
 
 def _ended(status: int | None, guardian: Guardian, killed: str) -> int:
-    """Say what there is to say of a program that has ended; the exit code."""
+    """Report the end of the program, run its stopper, and return the exit code."""
     if status is not None and not guardian.moves:
         if status < 0:
             with suppress(OSError):  # SIGKILL has no handler
@@ -212,7 +211,7 @@ def _ended(status: int | None, guardian: Guardian, killed: str) -> int:
 
 
 def _say(line: bytes) -> None:
-    with suppress(OSError):  # nobody may be there to read it
+    with suppress(OSError):  # stderr may be closed
         os.write(2, line + b"\n")
 
 

@@ -13,34 +13,34 @@ from campaign.trial import Trial
 Stop = Callable[[], bool]
 """Whether the run is to stop."""
 GLANCE = 0.1
-"""s between two looks at the stop switch during a pause."""
+"""s between two checks of the stop switch during a pause."""
 
 
 class Operator(Protocol):
-    """A person, or what stands in for one."""
+    """A person, or a substitute."""
 
     def confirm(self, trial: Trial, step: str, stop: Stop) -> str | None:
-        """Show what has to be done to the bench before `trial`, and wait until it is.
+        """Show the operator step before `trial`, and wait for its confirmation.
 
-        Returns the answer for the record, or None when the run is to stop instead, also because
-        `stop()`: it is asked again and again, for whoever has switched the bench off meanwhile.
+        Returns the answer for the record, or None if the run is to stop instead. `stop()` is polled
+        to detect a bench that is switched off during the prompt.
         """
 
 
 class SimulatedOperator:
-    """Does everything at once; for benches that nobody can touch."""
+    """Confirms every step immediately; for benches without an operator."""
 
     def confirm(self, trial: Trial, step: str, stop: Stop) -> str | None:
-        """Nobody is asked."""
+        """Answer without a prompt."""
         return "simulated"
 
 
 def no_wait(seconds: float, stop: Stop) -> None:
-    """The pause of a bench that does not get warm."""
+    """Pause of a bench without thermal effects: none."""
 
 
 def wait_unless(seconds: float, stop: Stop) -> None:
-    """A pause on the wall clock (s) that ends at once when the run is stopped."""
+    """Pause in wall-clock time (s) that ends immediately at a stop."""
     end = time.monotonic() + seconds
     while not stop() and (left := end - time.monotonic()) > 0:
         time.sleep(min(left, GLANCE))
@@ -48,10 +48,10 @@ def wait_unless(seconds: float, stop: Stop) -> None:
 
 @dataclass(frozen=True)
 class Attendance:
-    """What differs between a bench with a person beside it and one without.
+    """Operator and pauses of a run.
 
     Attributes:
-        wait: lets the given time (s) pass, or less when the run is to stop.
+        wait: waits the given time (s), or less at a stop.
     """
 
     operator: Operator
@@ -62,7 +62,7 @@ UNATTENDED = Attendance(SimulatedOperator(), no_wait)
 
 
 class SetUp:
-    """What has been confirmed of the bench's state, so that nothing is asked twice."""
+    """Confirmed setup of the bench, to avoid repeated prompts."""
 
     def __init__(self, operator: Operator, writer: PlanWriter) -> None:
         self._operator = operator
@@ -70,13 +70,11 @@ class SetUp:
         self._confirmed: tuple[str, ...] = ()
 
     def is_due(self, trial: Trial) -> bool:
-        """Whether somebody has to do something before `trial`; one that asks for nothing may
-        find the bench as it is.
-        """
+        """Whether `trial` has setup steps that differ from the confirmed ones."""
         return bool(trial.setup) and trial.setup != self._confirmed
 
     def confirm(self, trial: Trial, stop: Stop) -> bool:
-        """Ask for every step, in order; False when the run is to stop instead."""
+        """Prompt for every step, in order; False if the run is to stop instead."""
         for step in trial.setup:
             answer = self._operator.confirm(trial, step, stop)
             self._writer.operator_step(trial.number, step, "stop" if answer is None else answer)

@@ -15,7 +15,7 @@ _TRIAL_CODES = {
     Outcome.DIVERGED: ExitCode.TRIALS_FAILED,
     Outcome.LIMIT: ExitCode.LIMIT_OR_FAULT,
     Outcome.FAULT: ExitCode.LIMIT_OR_FAULT,
-    Outcome.INTERRUPTED: ExitCode.TRIALS_FAILED,  # whether by somebody, the run's status says
+    Outcome.INTERRUPTED: ExitCode.TRIALS_FAILED,  # the run's status states by whom
 }
 _STATUS_CODES = {
     RunStatus.COMPLETE: ExitCode.DONE,
@@ -27,13 +27,13 @@ _STATUS_CODES = {
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """How a run ended.
+    """Outcome of a run.
 
     Attributes:
-        reason: empty when completed; else why it ended early or is not known to be safe.
-        safe_state: of the bench, after the last trial.
-        outcomes: how many trials ended how.
-        archive: the sealed file.
+        reason: why it ended early or is not confirmed safe; empty if complete.
+        safe_state: state of the bench after the last trial.
+        outcomes: number of trials by outcome.
+        archive: path of the sealed file.
     """
 
     status: RunStatus
@@ -44,7 +44,7 @@ class RunOutcome:
 
     @property
     def exit_code(self) -> ExitCode:
-        """The documented code: the worst of what the run and its trials say."""
+        """Documented exit code: the worst of those of the run and its trials."""
         codes = [_TRIAL_CODES[outcome] for outcome, count in self.outcomes.items() if count]
         codes.append(_STATUS_CODES[self.status])
         if self.safe_state is not SafeState.CONFIRMED:

@@ -18,18 +18,18 @@ class Progress:
     """The state of a run at one moment.
 
     Attributes:
-        total: trials that are known by now: those of the plan, and what has followed from them.
-        done, failed, interrupted: trials that completed, that did not, and that somebody stopped.
+        total: number of trials of the plan and of evaluated stages.
+        done, failed, interrupted: number of completed, failed and stopped trials.
         running: trials being executed, in plan order.
-        started: when the run began, on `time.monotonic` (s).
+        started: begin of the run on `time.monotonic` (s).
         elapsed: wall-clock time since then (s).
-        bench_time: of the trials that have ended, and so far of those that run (s).
-        bench_time_left: of all the others, and the rest of those (s).
-        ended: the trial that has just ended, and how.
-        remark: what the run has just decided, for people.
+        bench_time: bench time of ended trials and completed part of running ones (s).
+        bench_time_left: remaining bench time (s).
+        ended: the trial that has just ended, and its ending.
+        remark: latest decision of the run, as text.
         closing: whether all trials have ended and the archive is being closed.
-        under_way: how much of the running trials is done, in trials.
-        time_left: wall-clock time to the end (s); None before it can be told.
+        under_way: completed part of the running trials, in trials.
+        time_left: remaining wall-clock time (s); None without a forecast.
     """
 
     total: int
@@ -57,11 +57,11 @@ Display = Callable[[Progress], None]
 
 
 class Ledger:
-    """Counts what a run has done and tells its display. Used from one thread, but for `reached`.
+    """Counts the trials of a run and updates its display. Used from one thread, except `reached`.
 
-    A trial counts once, by how its last attempt ended. `finished` are trials of an earlier session:
-    they count as done, and say nothing about today's pace. `computed`: the backend computes its
-    samples, and no bench takes its time.
+    A trial counts once, by the outcome of its last attempt. `finished`: trials of an earlier
+    session; they count as done, but not for the forecast. `computed`: the backend computes its
+    samples, without a bench.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Ledger:
 
     @property
     def outcomes(self) -> dict[Outcome, int]:
-        """How many trials ended how."""
+        """Number of trials by outcome."""
         return dict(self._outcomes)
 
     @property
@@ -98,13 +98,13 @@ class Ledger:
         return self._total - sum(self._outcomes.values())
 
     def add(self, trials: Sequence[Trial]) -> None:
-        """Further trials follow from what was found."""
+        """Add the trials of a stage."""
         self._total += len(trials)
         self._bench_time_left += sum(trial.task.duration for trial in trials)
         self._worth_left += sum(map(self._worth, trials))
 
     def begin(self, *trials: Trial) -> None:
-        """Trials are about to be executed together."""
+        """Note the begin of trials that are executed together."""
         for trial in trials:
             self._running[trial.number] = trial
             self._reached[trial.number] = 0.0
@@ -113,17 +113,17 @@ class Ledger:
     def reached(
         self, trial: Trial, channels: tuple[ChannelInfo, ...], time: Array, block: Array
     ) -> None:
-        """A `Subscriber`: samples of a running trial have come. From any thread."""
+        """Note new samples of a running trial; a `Subscriber`. From any thread."""
         if len(time):
             self._reached[trial.number] = min(float(time[-1]), trial.task.duration)
 
     def look(self) -> None:
-        """Tell how far the running trials are, when they are any further."""
+        """Update the display if the running trials have progressed."""
         if self._running and self._of_running() > self._told:
             self._tell(None)
 
     def end(self, trial: Trial, ending: Ending) -> None:
-        """A trial has ended and is archived."""
+        """Count a trial that has ended and is archived."""
         self._running.pop(trial.number, None)
         self._reached.pop(trial.number, None)
         self._outcomes[ending.outcome] = self._outcomes.get(ending.outcome, 0) + 1
@@ -134,7 +134,7 @@ class Ledger:
         self._tell((trial, ending))
 
     def take_back(self, trial: Trial) -> None:
-        """A trial that completed is executed once more, and counts when it has ended again."""
+        """Uncount a completed trial that is executed again."""
         self._outcomes[Outcome.COMPLETED] -= 1
         self._bench_time -= trial.task.duration
         self._bench_time_left += trial.task.duration
@@ -142,17 +142,17 @@ class Ledger:
         self._worth_left += self._worth(trial)
 
     def repeat(self, trial: Trial, ending: Ending) -> None:
-        """An attempt has ended, and the trial will be executed again."""
+        """Note the end of an attempt; the trial will be executed again."""
         self._running.pop(trial.number, None)
         self._reached.pop(trial.number, None)
         self._tell((trial, ending))
 
     def remark(self, text: str) -> None:
-        """The run has decided something."""
+        """Display a decision of the run."""
         self._tell(None, remark=text)
 
     def close(self) -> None:
-        """All trials have ended; the archive is being closed."""
+        """Display that the archive is being closed, after all trials."""
         self._tell(None, closing=True)
 
     def _tell(
@@ -187,5 +187,5 @@ class Ledger:
         )
 
     def _of_running(self) -> float:
-        """Bench time (s) that the running trials have behind them."""
+        """Bench time (s) that the running trials have completed."""
         return sum(self._reached.get(number, 0.0) for number in self._running)

@@ -28,11 +28,11 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic")
 
 
 SHAPING = ("campaign", "python", "engine", *LIBRARIES)
-"""What may change a sample when it changes; a resumed run is asked about these."""
+"""Components whose version may change samples; compared when a run is resumed."""
 
 
 def own_versions() -> dict[str, str]:
-    """What of this program is numbered for itself; each rises with what changes in it."""
+    """Version numbers of the program's parts, each independent of the others."""
     numbers = {
         "engine": ENGINE,
         "format": FORMAT,
@@ -44,31 +44,31 @@ def own_versions() -> dict[str, str]:
 
 
 def shaping(versions: Mapping[str, str]) -> dict[str, str]:
-    """Those of `versions` that may change a sample."""
+    """The entries of `versions` that may change samples."""
     return {name: versions[name] for name in SHAPING if name in versions}
 
 
 def versions() -> dict[str, str]:
-    """Versions of this program and its parts, Python, and the libraries that shape the samples."""
-    found = {
+    """Versions of this program, its parts, Python, and the libraries that affect samples."""
+    installed = {
         "campaign": campaign.__version__,
         **own_versions(),
         "python": platform.python_version(),
     }
     for name in LIBRARIES:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
             continue
-    return found
+    return installed
 
 
 def plug_ins(
     trials: Iterable[Trial], backend: str, truths: Iterable[Tree] = ()
 ) -> tuple[Tree, ...]:
-    """Every kind of an installed package that trials and backend name, with its sources' hash.
+    """Records of the plug-ins that trials and backend use, with the hash of their sources.
 
-    The friction models and compensation methods are all those of the trials' benches and `truths`.
+    Friction models and compensation methods are those of the trials' benches and of `truths`.
     """
     friction, compensation = friction_models(), compensation_methods()
     benches = bool(friction.plug_ins or compensation.plug_ins)
@@ -87,12 +87,14 @@ def plug_ins(
         (compensation, {word for key, word in named if key == "method"}),
         (backends(), {backend}),
     )
-    found = ((room, room.plug_in(name)) for room, names in rooms for name in sorted(names))
-    return tuple(_record(room.room, plug_in) for room, plug_in in found if plug_in is not None)
+    plug_ins_used = ((room, room.plug_in(name)) for room, names in rooms for name in sorted(names))
+    return tuple(
+        _record(room.room, plug_in) for room, plug_in in plug_ins_used if plug_in is not None
+    )
 
 
 def _words(tree: Any) -> Iterator[tuple[str, str]]:
-    """Every field of nested tables that is a text."""
+    """(key, text) of every text field in nested tables."""
     for key, value in tree.items() if isinstance(tree, dict) else ():
         if isinstance(value, str):
             yield key, value
@@ -112,7 +114,7 @@ def _record(room: str, plug_in: PlugIn) -> Tree:
 
 
 def host() -> dict[str, str]:
-    """The machine that executed the run."""
+    """Name, system and processor of this machine."""
     return {
         "name": platform.node(),
         "system": platform.platform(),
@@ -126,9 +128,9 @@ def command() -> tuple[str, ...]:
 
 
 def git_revision(file: Path) -> str:
-    """Revision of the working tree that `file` is tracked in, `-dirty` when it has changes.
+    """Revision of the working tree that tracks `file`, with `-dirty` if it has changes.
 
-    Empty when there is none, or no git.
+    Empty if `file` is not tracked or git is missing.
     """
     folder = file.resolve().parent
     if not _git(folder, "ls-files", "--error-unmatch", "--", file.name):
@@ -139,7 +141,7 @@ def git_revision(file: Path) -> str:
 def _git(folder: Path, *arguments: str) -> str:
     try:
         done = subprocess.run(  # noqa: S603 - a list, never a shell
-            ["git", "-C", str(folder), *arguments],  # noqa: S607 - whichever git the user has
+            ["git", "-C", str(folder), *arguments],  # noqa: S607 - the user's git
             capture_output=True,
             text=True,
             timeout=10,

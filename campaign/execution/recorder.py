@@ -1,9 +1,9 @@
 """The supervising recorder between a backend and the archive.
 
-The first sample that breaks what a trial promises is kept, as evidence; nothing that comes after it
-is. The trial's own stop flag is set, so that its backend ends it, and how the trial ended is
-decided here, whatever the backend says. What was recorded before, here or elsewhere, cannot be
-stopped: there the same is only said.
+The first sample that violates a condition of the trial is archived as evidence; later samples are
+not. The recorder sets the trial's stop flag, so that the backend ends the trial, and decides the
+outcome independently of the backend. An existing recording cannot be stopped: there the recorder
+only reports violations.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from campaign.recording import Array, ChannelInfo, Ending, Event, Fault, Outcome
 from campaign.trial import Trial
 
 ARCHIVE_PATIENCE = 10.0
-"""s that the archive may take to take a block, once the trial is over."""
+"""s that the archive may take for a block after the end of the trial."""
 _OWN = (Outcome.LIMIT, Outcome.DIVERGED, Outcome.FAULT)
 
 
 class SupervisingRecorder:
-    """The Recorder that a backend is given for one trial.
+    """Recorder of one trial, used by the backend.
 
     Attributes:
-        verdict: why the trial has to end; None while it is good.
-        heard: when (of the supervision's clock) samples last came; None before the first.
-        unwatched: limits of the bench that no recorded channel tells of.
+        verdict: why the trial must end; None without a violation.
+        heard: time of the last samples (supervision's clock); None before the first.
+        unwatched: limits of the bench that no recorded channel shows.
     """
 
     def __init__(
@@ -77,11 +77,11 @@ class SupervisingRecorder:
         self._pace = Pace()
         self._more = False  # samples came after the verdict
         self._closed = False
-        # One for the verdict, which a watchdog gives while the file may be stuck on a disk.
+        # Separate lock for the verdict: a watchdog sets it while the file may be blocked by a disk.
         self._judging = threading.Lock()
         self._writing = threading.Lock()
 
-    # What the backend calls
+    # Called by the backend
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
         with self._writing:
@@ -110,11 +110,11 @@ class SupervisingRecorder:
                 )
 
     def append(self, time: Array, block: Array) -> None:
-        # None stands for lost samples here.
+        # None means lost samples here.
         self._hand_over(time, np.asarray(None) if block is None else block)
 
     def lost(self, time: Array) -> None:
-        """Samples that the backend names as lost: NaN, an event, and no `undefined`."""
+        """Record samples that the backend reports as lost: NaN and an event, no `undefined`."""
         self._hand_over(time, None)
 
     def event(self, event: Event) -> None:
@@ -122,10 +122,10 @@ class SupervisingRecorder:
             if not self._closed:
                 self._note(event)
 
-    # What the runner calls
+    # Called by the runner
 
     def silent(self, seconds: float) -> None:
-        """Nothing came for so long: the trial is over, whatever becomes of its backend."""
+        """End the trial after `seconds` without samples, independently of the backend."""
         what = "no samples came" if self.heard is None else "no samples came any more"
         if self._writing.locked():
             what = "the archive took no samples"
@@ -134,22 +134,22 @@ class SupervisingRecorder:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What somebody at the screen should know of the channels."""
+        """Remarks on the channels for the operator."""
         limits = ", ".join(self.unwatched)
         unwatched = (f"no channel shows these limits: {limits}",) if limits else ()
         return (*unwatched, *self._announced.converted)
 
     @property
     def is_complete(self) -> bool:
-        """Whether all samples of the trial have come."""
+        """Whether all samples of the trial are recorded."""
         task = self._trial.task
         return self._samples >= task.duration * task.sample_rate - 1
 
     def conclude(self, ending: Ending, *, forced: bool = False) -> Ending:
-        """How the trial ended, once the backend has said so; nothing is recorded from here on.
+        """The final ending, from the backend's; nothing is recorded afterwards.
 
-        `forced`: it only ended because its bench was made safe over its head. Raises ArchiveError
-        when the archive has not come back from taking a block.
+        `forced`: the trial ended only because `make_safe` was called during it. Raises ArchiveError
+        if the archive does not return from writing a block.
         """
         if not self._writing.acquire(timeout=ARCHIVE_PATIENCE):
             raise ArchiveError(
@@ -204,44 +204,44 @@ class SupervisingRecorder:
         return self.verdict is not None or self._closed
 
     def _judge(self, time: Array, block: Array, *, was_lost: bool) -> int:
-        """How many samples are archived: all, or those up to the one that ends the trial."""
-        found: list[tuple[int, Verdict]] = []
+        """Check a block; the number of samples to archive: all, or up to the first violation."""
+        problems: list[tuple[int, Verdict]] = []
         if (wrong := wrong_time(self._trial.task, self._samples, time)) is not None:
-            found.append(wrong)
+            problems.append(wrong)
         if was_lost:
             if self._watch is not None:
                 self._watch.skip(len(time))
         else:
             names = [info.name for info in self._channels or ()]
             if (bad := undefined(names, time, block)) is not None:
-                found.append(bad)
+                problems.append(bad)
             if self._watch is not None and "limit" not in self._said:
-                good = min((index for index, _ in found), default=len(time))
+                good = min((index for index, _ in problems), default=len(time))
                 end = good if self._ends_trials else len(time)
                 violation = self._watch.look(time[:end], block[:, :end])
                 if violation is not None:
                     at = float(time[violation.index])
                     verdict = Verdict("limit", Outcome.LIMIT, violation.text, at)
-                    found.append((violation.index, verdict))
-        if not found:
+                    problems.append((violation.index, verdict))
+        if not problems:
             return len(time)
         if not self._ends_trials:
-            for _, verdict in found:
+            for _, verdict in problems:
                 self._say(verdict)
             return len(time)
-        index, verdict = min(found, key=lambda each: each[0])
+        index, verdict = min(problems, key=lambda each: each[0])
         self._give(verdict)
         return index + 1 if np.isfinite(time[index]) else index
 
     # Verdicts
 
     def _new(self, kind: str, reason: str, fault: Fault) -> Verdict:
-        """Of where the recording is now."""
+        """Verdict at the present end of the recording."""
         at = self._samples / self._trial.task.sample_rate
         return Verdict(kind, Outcome.FAULT, reason, at, fault)
 
     def _find(self, kind: str, reason: str) -> None:
-        """What the backend recorded is not what it promised."""
+        """End the trial, or report on a recording: it violates a condition of the trial."""
         verdict = self._new(kind, reason, Fault.RECORDING)
         if self._ends_trials:
             self._give(verdict)
@@ -249,7 +249,7 @@ class SupervisingRecorder:
             self._say(verdict)
 
     def _refuse(self, kind: str, reason: str) -> None:
-        """What cannot be archived ends a recording as well."""
+        """End the trial or recording: its data cannot be archived."""
         self._give(self._new(kind, reason, Fault.RECORDING))
 
     def _give(self, verdict: Verdict) -> None:
@@ -265,7 +265,7 @@ class SupervisingRecorder:
         for subscriber in tuple(self._subscribers):
             try:
                 subscriber(self._trial, self._channels or (), time, block)
-            except Exception:  # noqa: BLE001 - whoever looks on cannot harm the trial
+            except Exception:  # noqa: BLE001 - a subscriber must not harm the trial
                 self._subscribers.remove(subscriber)
 
     # The end
@@ -276,20 +276,20 @@ class SupervisingRecorder:
         if self.verdict is None and ending.outcome is Outcome.COMPLETED:
             self._judge_whole()
         ending = self._with_verdict(ending, forced) if self.verdict is not None else ending
-        said = {} if self._ends_trials else self._judged(ending)
+        judged = {} if self._ends_trials else self._judged(ending)
         telemetry = {}
         if self._supervision.live and self._samples:
             telemetry |= self._timeliness()
         if self.unwatched and self._samples:
             telemetry["unwatched_limits"] = list(self.unwatched)
-        if said:
-            telemetry["judged"] = said
+        if judged:
+            telemetry["judged"] = judged
         if telemetry:
             ending = replace(ending, telemetry={**ending.telemetry, **telemetry})
         return ending
 
     def _judge_whole(self) -> None:
-        """A trial that is said to be whole."""
+        """Check a trial that the backend reports as completed."""
         task = self._trial.task
         if self._lost and self._ends_trials:
             reason = f"{self._lost} samples were lost and are marked"
@@ -305,7 +305,7 @@ class SupervisingRecorder:
             )
 
     def _with_verdict(self, ending: Ending, forced: bool) -> Ending:
-        """The verdict, unless the backend itself ended the trial for good reason where it did."""
+        """Apply the verdict, unless the backend ended the trial by itself at that sample."""
         verdict = self.verdict
         if verdict is None or (ending.outcome in _OWN and not self._more and not forced):
             return ending
@@ -317,32 +317,32 @@ class SupervisingRecorder:
         return replace(ending, outcome=verdict.outcome, reason=reason, fault=verdict.fault)
 
     def _judged(self, ending: Ending) -> dict[str, JsonValue]:
-        """What is said of a recording that was made before, but for what it says itself."""
-        told = [ending.reason, *(event.text for event in self._events)]
-        known = {"undefined"} if tells_of_gaps(ending, told) else set[str]()
+        """Violations of an existing recording that it does not report itself, by kind."""
+        texts = [ending.reason, *(event.text for event in self._events)]
+        known = {"undefined"} if tells_of_gaps(ending, texts) else set[str]()
         if ending.outcome is not Outcome.COMPLETED:  # its last sample is the evidence of that
             known |= {kind for kind, each in self._said.items() if self._is_last(each)}
-        said: dict[str, JsonValue] = {}
+        judged: dict[str, JsonValue] = {}
         for kind, verdict in self._said.items():
-            if kind in known or verdict.reason in told:
+            if kind in known or verdict.reason in texts:
                 continue
-            said[kind] = verdict.reason
+            judged[kind] = verdict.reason
             self._file.event(Event(verdict.time, verdict.reason))
-        return said
+        return judged
 
     def _is_last(self, verdict: Verdict) -> bool:
         return verdict.time * self._trial.task.sample_rate > self._samples - 1 - STEP
 
     def _timeliness(self) -> dict[str, JsonValue]:
         pace = self._pace
-        told: dict[str, JsonValue] = {"longest_gap_s": round(pace.longest, 4)}
+        telemetry: dict[str, JsonValue] = {"longest_gap_s": round(pace.longest, 4)}
         if pace.is_of_the_wall_clock:
-            told["oldest_sample_s"] = round(pace.oldest, 4)
+            telemetry["oldest_sample_s"] = round(pace.oldest, 4)
             if pace.longest > self._supervision.patience.late:
                 text = f"{LATE} {pace.longest:.2g} s after those before"
                 self._file.event(Event(pace.at, text))
-        return told
+        return telemetry
 
 
 LATE = "samples were handed over"
-"""How the event begins that tells of samples which came late."""
+"""First words of the event for late samples."""

@@ -11,19 +11,19 @@ from campaign.recording import Array, Recording
 
 
 def differences(was: Recording, now: Recording) -> list[str]:
-    """What of `now` is not, to the bit, what it is in `was`; empty when all of it is.
+    """Texts of all bitwise differences; empty for identical recordings.
 
-    Channels are compared over the samples that both have; a missing channel, other lengths and
-    another outcome are differences of their own.
+    Channels are compared over the samples that both have. A missing channel, other lengths and
+    another outcome are separate differences.
     """
     return list(_differences(was, now))
 
 
 def changes(was: Recording, now: Recording) -> dict[str, float]:
-    """By channel, the rms of what changed over the rms of what was.
+    """By channel, the RMS of the change divided by the RMS before.
 
-    Infinite for a channel that was zero throughout and is not, that only one of them has, or whose
-    number of samples changed.
+    Infinite for a change of an all-zero channel, for a channel in only one recording, and for
+    another number of samples.
     """
     names = dict.fromkeys((*was.channels, *now.channels))
     both = was.channels.keys() & now.channels.keys()
@@ -58,7 +58,7 @@ def _differences(was: Recording, now: Recording) -> Iterator[str]:
 
 
 def _compare(was: Array, now: Array) -> str:
-    """How many samples differ, from where on, and by how much at most; empty when none does."""
+    """Number of different samples, first index, largest difference, as text; empty if none."""
     length = min(len(was), len(now))
     bits = [np.ascontiguousarray(a[:length], dtype="<f8").view("<u8") for a in (was, now)]
     different = np.flatnonzero(bits[0] != bits[1])

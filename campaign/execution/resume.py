@@ -18,7 +18,7 @@ from campaign.recording import Outcome
 from campaign.trial import Tree, Trial, canonical_json
 
 SHOWN = 20
-"""Differences that are shown one by one."""
+"""Maximum number of listed differences."""
 
 _SETTLED = (Outcome.COMPLETED, Outcome.LIMIT, Outcome.DIVERGED)
 _WIDTH = 60
@@ -27,12 +27,12 @@ _ABSENT = object()
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a run's samples depend on, as trees that can be compared.
+    """Conditions that determine a run's samples, as comparable trees.
 
     Attributes:
-        normalised: the protocol's, as `Plan.normalised`; what else is in it is not compared.
-        versions: of the program and the libraries that make samples.
-        plug_ins: those that are used, as `provenance.plug_ins`.
+        normalised: normalised protocol, as `Plan.normalised`; only its tests are compared.
+        versions: versions of the program and of libraries.
+        plug_ins: plug-ins in use, as from `provenance.plug_ins`.
     """
 
     normalised: Tree
@@ -43,9 +43,10 @@ class Conditions:
 
 
 def check_resumable(run: RunReader) -> None:
-    """UsageError when there is nothing to go on with, ArchiveError when its plan is damaged.
+    """Raise UsageError if the run cannot be resumed, ArchiveError if its plan is damaged.
 
-    A folder always can: if it tells of an end, the program was killed before it was sealed.
+    An unsealed folder with a seed can be resumed, also one with a recorded end: the program was
+    killed before it sealed the run.
     """
     if run.sealed and run.status not in RESUMABLE:
         raise UsageError(
@@ -65,10 +66,10 @@ def check_resumable(run: RunReader) -> None:
 
 
 def not_repeated(run: RunReader) -> dict[int, Outcome]:
-    """The trials that are done, by number, and how they ended.
+    """Outcomes of the trials that are not executed again, by number.
 
-    A fault is done when the policy skipped it; one without such a decision ended the run, or its
-    retry never came.
+    A trial with a fault is among them only if the policy skipped it. Without that decision it ended
+    the run, or its retry is missing.
     """
     skipped = set(_skipped(run))
     return {
@@ -80,7 +81,7 @@ def not_repeated(run: RunReader) -> dict[int, Outcome]:
 
 
 def _skipped(run: RunReader) -> Iterator[int]:
-    """Numbers of the trials whose last attempt was followed by the decision to skip them."""
+    """Numbers of the trials that the policy skipped after their last attempt."""
     skipped: dict[int, bool] = {}
     for entry in parse_journal(run.path, run.story.content).entries:
         if isinstance(entry, TrialFinished):
@@ -91,7 +92,7 @@ def _skipped(run: RunReader) -> Iterator[int]:
 
 
 def archived_conditions(run: RunReader) -> Conditions:
-    """What the run began with."""
+    """Conditions at the begin of the run."""
     header = run.header
     return Conditions(
         header.normalised,
@@ -103,29 +104,29 @@ def archived_conditions(run: RunReader) -> Conditions:
 
 
 def differences(was: Conditions, now: Conditions) -> list[str]:
-    """Every field that differs, as `dotted.path: was → is`, in the paths that `--set` takes.
+    """All differing fields as `dotted.path: was → is`, with the paths of `--set`.
 
-    What several tests share, such as a bench, is named once.
+    A difference that several tests share, e.g. of a bench, is listed once.
     """
-    found = [_line("backend", was.backend, now.backend)] if was.backend != now.backend else []
-    found += [
+    lines = [_line("backend", was.backend, now.backend)] if was.backend != now.backend else []
+    lines += [
         _line(f"backend.{path}", *values)
         for path, *values in _compare(was.backend_options, now.backend_options)
     ]
-    found += _of_tests(_by_name(was.normalised), _by_name(now.normalised))
-    found += [
+    lines += _of_tests(_by_name(was.normalised), _by_name(now.normalised))
+    lines += [
         _line(f"versions.{path}", *values)
         for path, *values in _compare(shaping(was.versions), shaping(now.versions))
     ]
-    found += [
+    lines += [
         _line(f"plugins.{path}", *values)
         for path, *values in _compare(_by_room(was.plug_ins), _by_room(now.plug_ins))
     ]
-    return found
+    return lines
 
 
 def trial_differences(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> list[str]:
-    """Trials that are not what they were although no field says why: the program has changed."""
+    """Trials with a changed fingerprint, as `name.fingerprint: was → is`."""
     return [
         f"{trial.name}.fingerprint: {was.fingerprint[:12]} → {trial.fingerprint[:12]}"
         for was, trial in zip(planned, trials, strict=True)
@@ -136,28 +137,30 @@ def trial_differences(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) 
 def followed(
     run: RunReader, trials: Sequence[Trial], finished: Mapping[int, Outcome]
 ) -> tuple[Trial, ...]:
-    """The trials that followed from what others found, as the journal has them.
+    """The trials of stages, from the journal.
 
-    `trials` are the planned ones as they are today. UsageError when one that is left follows from
-    trials that are others today: what was found on one bench may not move another.
+    `trials`: the present planned trials. Raises UsageError if an unfinished trial of a stage
+    depends on changed trials: results of one bench must not determine motions of another.
     """
     changed = {
         trial.test
         for was, trial in zip(run.first_stage, trials, strict=True)
         if was.fingerprint != trial.fingerprint
     }
-    found = tuple(run.full_plan.trial(each.number) for stage in run.stages for each in stage.trials)
-    for trial in found:
+    followups = tuple(
+        run.full_plan.trial(each.number) for stage in run.stages for each in stage.trials
+    )
+    for trial in followups:
         if trial.number not in finished and trial.test in changed:
             raise UsageError(
                 f"{run.name}: {trial.name} ({trial.label}) follows from what was found before "
                 f"{trial.test} was changed; undo the change, or start a new run"
             )
-    return found
+    return followups
 
 
 def stages_of(header: RunHeader) -> tuple[PlannedStage, ...]:
-    """The stages that were planned, from the header of a run whose protocol is gone."""
+    """Planned stages from the header, for a run without its protocol file."""
     return tuple(
         planned_stage(str(test["name"]), stage)  # type: ignore[arg-type]
         for test in header.tests
@@ -166,7 +169,7 @@ def stages_of(header: RunHeader) -> tuple[PlannedStage, ...]:
 
 
 def same_list(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> bool:
-    """Whether both plans have the same trials in the same order, whatever is in them."""
+    """Whether both plans list the same trials in the same order, regardless of their content."""
 
     def key(trial: PlannedTrial | Trial) -> tuple[object, ...]:
         return (trial.number, trial.test, trial.kind, trial.role, trial.label)
@@ -175,14 +178,14 @@ def same_list(planned: Sequence[PlannedTrial], trials: Sequence[Trial]) -> bool:
 
 
 def listed(lines: Sequence[str]) -> str:
-    """The first of them, one a line, and how many more there are."""
+    """The first `SHOWN` lines, and the number of others."""
     more = len(lines) - SHOWN
     shown = [f"  {line}" for line in lines[:SHOWN]]
     return "\n".join([*shown, *([f"  and {more} more"] if more > 0 else [])])
 
 
 def _by_name(normalised: Tree) -> dict[str, Any]:
-    """The tests by name, their options where `--set` has them, axes by path."""
+    """Tests by name, with options at the paths of `--set` and matrix axes by path."""
     tests: Any = json.loads(canonical_json(normalised.get("tests", [])))
     trees = {}
     for test in tests:
@@ -193,7 +196,7 @@ def _by_name(normalised: Tree) -> dict[str, Any]:
 
 
 def _by_room(plug_ins: Sequence[Tree]) -> dict[str, Any]:
-    """What is known of each plug-in, by `room.name`."""
+    """Plug-in records by `room.name`."""
     return {
         f"{str(each.get('room')).replace(' ', '-')}.{each.get('name')}": {
             key: value for key, value in each.items() if key not in ("room", "name")
@@ -203,12 +206,12 @@ def _by_room(plug_ins: Sequence[Tree]) -> dict[str, Any]:
 
 
 def _of_tests(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    found: dict[tuple[str, str, str], list[str]] = {}
+    tests_by_change: dict[tuple[str, str, str], list[str]] = {}
     for name in dict.fromkeys((*was, *now)):
         for path, before, after in _compare(was.get(name, _ABSENT), now.get(name, _ABSENT)):
-            found.setdefault((path, _short(before), _short(after)), []).append(name)
+            tests_by_change.setdefault((path, _short(before), _short(after)), []).append(name)
     lines = []
-    for (path, before, after), names in found.items():
+    for (path, before, after), names in tests_by_change.items():
         place = ".".join(filter(None, (names[0], path)))
         others = f" (and in {len(names) - 1} other tests)" if len(names) > 1 else ""
         lines.append(f"{place}{others}: {before} → {after}")

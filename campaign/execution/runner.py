@@ -1,9 +1,8 @@
-"""Executing a plan on a backend, trial by trial, into an archive.
+"""Execution of a plan on a backend, trial by trial, into an archive.
 
-A trial that fails is recorded, and the protocol's policy says whether it is executed again, is
-skipped, or ends the run. It ends early, too, when somebody stops it, when the backend gives up, and
-when nobody sees the bench at rest after a trial. However it ends, the bench is brought to rest
-last, and the archive says what happened.
+A failed trial is recorded; the protocol's policy decides whether it is repeated, is skipped, or
+ends the run. A stop request, a backend that gives up, and an unconfirmed safe state after a trial
+also end the run early. At every end the bench is made safe last, and the archive states the cause.
 """
 
 from __future__ import annotations
@@ -55,23 +54,23 @@ def run_plan(
     """Execute `trials` in order on a connected backend and seal the archive.
 
     Args:
-        trials: the whole plan, and what has followed from it in an earlier session.
-        workers: trials executed at once; more than one only where the backend is parallel.
-        display: told whenever a trial begins or ends and now and then, from this thread.
-        stop: asked before every trial, and by the backend during one.
-        policy: what to do about trials that fail, and when to rest; absent: skip, and never.
-        attendance: who is asked, and whether pauses are waited for.
-        supervision: how each trial is watched, and by whom besides.
-        measure: what a recording says by itself, to be archived with it; absent: nothing is.
-        finished: trials of the plan that are not to be executed again, by number.
-        stages: what may follow from the trials.
-        executor: what executes batches; absent: so many threads of this process.
+        trials: the whole plan, and the stages' trials of earlier sessions.
+        workers: number of trials executed at once; more than one only for a parallel backend.
+        display: called at the begin and end of trials and periodically, from this thread.
+        stop: checked before every trial, and by the backend during trials.
+        policy: response to failed trials, and rests; None: skip, no rests.
+        attendance: the operator, and whether pauses take time.
+        supervision: supervision and subscribers of each trial.
+        measure: computes metrics of a recording for the archive; None: no metrics.
+        finished: outcomes of trials that are not executed again, by number.
+        stages: stages whose trials may follow.
+        executor: executor of batches; None: `workers` threads of this process.
 
     Raises:
-        NotSafeError: in place of any of the others, when the bench was not seen safe either.
+        NotSafeError: instead of any other, if the safe state is not confirmed.
         AbortedError: a second Ctrl-C; nothing is sealed.
-        CampaignError: the archive cannot be written any more; nothing is sealed.
-        Exception: a bug in a backend, after the archive has been sealed as a fault.
+        CampaignError: the archive is no longer writable; nothing is sealed.
+        Exception: a bug in a backend, after the archive is sealed as a fault.
     """
     ledger = Ledger(trials, display, finished, computed=isinstance(backend, KnowsCost))
     ended = EarlyEnd(kept=writer.folder)
@@ -104,7 +103,7 @@ def run_plan(
             opened as at_work,
         ):
             sequence.execute(at_work)
-        sequence.outside.look()  # it may have come after the last trial
+        sequence.outside.look()  # a stop may have come after the last trial
         outside = sequence.outside.stop
         status, reason = _verdict(ledger, ended, stop, outside, stages)
         ledger.close()
@@ -117,7 +116,7 @@ def run_plan(
 def _verdict(
     ledger: Ledger, ended: EarlyEnd, stop: StopSwitch, outside: PanicStop | None, stages: Stages
 ) -> tuple[RunStatus, str]:
-    """How the run stands, and every reason there is for it."""
+    """Status of the run, and all its reasons."""
     cut = stop() and (ledger.left or stages.left or Outcome.INTERRUPTED in ledger.outcomes)
     interrupted = cut or outside is not None
     if interrupted:

@@ -20,28 +20,28 @@ NOT_SAFE = "SAFE STATE NOT CONFIRMED: look at the bench before anything else"
 
 
 class AbortedError(CampaignError):
-    """The run was stopped at once, by force: what it had finished is kept, unsealed."""
+    """The run was aborted: its finished trials are kept, unsealed."""
 
     exit_code = ExitCode.INTERRUPTED
 
 
 class NotSafeError(CampaignError):
-    """The run broke off and nobody saw the bench safe: that comes before why it broke off."""
+    """The run broke off and the safe state is not confirmed; this precedes the original error."""
 
     exit_code = ExitCode.NOT_SAFE
 
 
 @dataclass
 class EarlyEnd:
-    """What ended the run early, and how the bench was left.
+    """Cause of an early end of the run, and final state of the bench.
 
     Attributes:
-        kept: where the finished trials are: the open run, and once it is sealed the archive; None
-            when nothing was begun.
-        fault: why the run cannot go on, or empty.
-        bug: an exception that no backend should raise.
-        safe_state: what the backend said last.
-        unsafe: why the safe state could not be confirmed, or empty.
+        kept: path of the finished trials: the open run, later the sealed archive; None if no trial
+            was begun.
+        fault: why the run cannot continue, or empty.
+        bug: an exception that a backend must not raise.
+        safe_state: last answer of the backend.
+        unsafe: why the safe state is not confirmed, or empty.
     """
 
     kept: Path | None = None
@@ -53,7 +53,7 @@ class EarlyEnd:
 
 @contextmanager
 def unsafe_first(ended: EarlyEnd) -> Iterator[None]:
-    """Whatever ends the block: a bench not known to be safe is said first, with its own code."""
+    """Replace any error of the block by NotSafeError if the safe state is not confirmed."""
     try:
         yield
     except BaseException as error:
@@ -65,7 +65,7 @@ def unsafe_first(ended: EarlyEnd) -> Iterator[None]:
 
 @contextmanager
 def safe_afterwards(backend: Backend, ended: EarlyEnd) -> Iterator[None]:
-    """Bring the bench to rest however the block ends, and note whether that was seen."""
+    """Make the bench safe at any end of the block, and note the result in `ended`."""
     try:
         yield
     except KeyboardInterrupt:
@@ -78,7 +78,7 @@ def safe_afterwards(backend: Backend, ended: EarlyEnd) -> Iterator[None]:
 
 @contextmanager
 def safe_when_broken_off(backend: Backend) -> Iterator[None]:
-    """Bring a connected bench to rest when the block raises, before any trial was begun."""
+    """Make a connected bench safe if the block raises, before the first trial."""
     ended = EarlyEnd()
     with unsafe_first(ended):
         try:
@@ -90,10 +90,10 @@ def safe_when_broken_off(backend: Backend) -> Iterator[None]:
 
 @contextmanager
 def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend]:
-    """A connected backend. Letting go of it cannot hide what happened in the block.
+    """Connect the backend, and disconnect it after the block.
 
-    Raises BackendError when letting go fails after a block that did not raise; after one that did,
-    its error goes on and `tell` is told of the other.
+    Raises BackendError if disconnecting fails. If the block raised as well, its error is raised,
+    and `tell` is called with the error of disconnecting.
     """
     try:
         calls.connect(backend)
@@ -105,7 +105,7 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
     except BaseException as error:
         try:
             calls.leave(backend, error)
-        except Exception as second:  # noqa: BLE001 - the first one says more
+        except Exception as second:  # noqa: BLE001 - the first error is the cause
             tell(f"and {LET_GO}: {describe(second)}")
         raise
     try:
@@ -115,16 +115,16 @@ def connected(backend: Backend, tell: Callable[[str], None]) -> Iterator[Backend
 
 
 def safe_at_once(backend: Backend) -> ExitCode:
-    """Bring the bench to rest, whatever other threads do meanwhile, before the program is left."""
+    """Make the bench safe before the program exits, concurrently to other threads."""
     ended = EarlyEnd()
     make_safe(backend, ended)
     return ExitCode.NOT_SAFE if ended.unsafe else ExitCode.INTERRUPTED
 
 
 def make_safe(backend: Backend, ended: EarlyEnd) -> None:
-    """Tell the bench to come to rest; afterwards `ended` says whether it was seen to."""
+    """Call `make_safe` of the backend and note the result in `ended`."""
     ended.safe_state = SafeState.NOT_CONFIRMED
-    ended.unsafe = "making the bench safe did not end"  # until it has, whatever breaks it off
+    ended.unsafe = "making the bench safe did not end"  # valid until it has ended
     try:
         ended.safe_state = calls.make_safe(backend)
     except KeyboardInterrupt:
@@ -138,7 +138,7 @@ def make_safe(backend: Backend, ended: EarlyEnd) -> None:
 
 
 def describe(error: BaseException) -> str:
-    """An exception by its type and what it says; a message for the user as it is."""
+    """Text of an exception: the message of a CampaignError, else type and message on one line."""
     return str(error) if isinstance(error, CampaignError) else one_line(error)
 
 

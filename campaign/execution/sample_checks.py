@@ -18,16 +18,16 @@ from campaign.recording import Array, ChannelInfo, Ending, Fault, Outcome
 from campaign.trial import Task, Trial
 
 STEP = 0.5
-"""Of a sample: further from its place, it could be another one."""
+"""Sample periods; a larger time error could indicate another sample."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Why a trial is ended, or in a recording what is said of it.
+    """Reason to end a trial; for an existing recording, a reported violation.
 
     Attributes:
         kind: `limit`, `undefined`, `time`, `channels`, `shape`, `length`, `lost` or `silence`.
-        time: of the sample at which it was found (s).
+        time: time of the sample with the violation (s).
     """
 
     kind: str
@@ -39,11 +39,11 @@ class Verdict:
 
 @dataclass(frozen=True)
 class ArchivedChannels:
-    """The channels of a trial as they are archived.
+    """Channels of a trial in archived units.
 
     Attributes:
-        factors: (channels, 1), what the samples of each are multiplied by.
-        converted: what is said of each channel whose unit was another one.
+        factors: (channels, 1), unit conversion factors of the samples.
+        converted: a text for each channel with a converted unit.
     """
 
     channels: tuple[ChannelInfo, ...] = ()
@@ -52,9 +52,9 @@ class ArchivedChannels:
 
 
 def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> ArchivedChannels:
-    """`channels` with storable texts, and those of the vocabulary in its units.
+    """`channels` with storable texts; channels of the vocabulary are converted to its units.
 
-    Raises ValueError saying which channel cannot be archived.
+    Raises ValueError that names a channel which cannot be archived.
     """
     if strange := next((each for each in channels if not isinstance(each, ChannelInfo)), None):
         raise ValueError(f"a channel was announced as {type(strange).__name__!r}, no ChannelInfo")
@@ -75,22 +75,22 @@ def announced(trial: Trial, channels: Sequence[ChannelInfo]) -> ArchivedChannels
         if rate is not None and not (isinstance(rate, int | float) and 0.0 < rate < math.inf):
             raise ValueError(f"{channel.name}: its own rate is {storable_tree(rate)!r} Hz")
     sides, mode = sides_in(trial.bench), trial.task.mode
-    found = [in_known_unit(channel, mode, sides) for channel in given]
+    converted = [in_known_unit(channel, mode, sides) for channel in given]
     return ArchivedChannels(
-        tuple(channel for channel, _ in found),
-        np.array([[times] for _, times in found]),
+        tuple(channel for channel, _ in converted),
+        np.array([[times] for _, times in converted]),
         tuple(
             f"{kept.name} was announced in {channel.unit} and is archived in {kept.unit}"
-            for channel, (kept, times) in zip(given, found, strict=True)
+            for channel, (kept, times) in zip(given, converted, strict=True)
             if times != 1.0
         ),
     )
 
 
 def make_watch(trial: Trial, names: Sequence[str]) -> tuple[LimitWatch | None, tuple[str, ...]]:
-    """What watches the limits of the trial's bench, and those that no channel of `names` tells of.
+    """The watch of the bench's limits, and the limits that no channel of `names` shows.
 
-    None for a bench that states no limits, or limits of a program that this one does not know.
+    None for a bench without limits, or with limits that this version cannot read.
     """
     tree = trial.bench.get("limits")
     if tree is None:
@@ -104,9 +104,9 @@ def make_watch(trial: Trial, names: Sequence[str]) -> tuple[LimitWatch | None, t
 
 
 def shaped(time: Array, block: Array | None, channels: int) -> tuple[Array, Array]:
-    """As float64, time (n,) and block (channels, n); without a block all of it is NaN.
+    """Time (n,) and block (channels, n) as float64; NaN for a block of None.
 
-    Raises ValueError saying what else they are.
+    Raises ValueError that states the given shapes or types.
     """
     time = _numbers(time)
     block = np.full((channels, time.size), np.nan) if block is None else _numbers(block)
@@ -119,10 +119,10 @@ def shaped(time: Array, block: Array | None, channels: int) -> tuple[Array, Arra
 
 
 def _numbers(values: Array) -> Array:
-    """As float64. Raises ValueError for what a conversion would change: complex, masked, text."""
+    """Array as float64. Raises ValueError for complex, masked or text data."""
     try:
         given = np.asanyarray(values)
-    except Exception as error:  # noqa: BLE001 - an object may say anything to numpy
+    except Exception as error:  # noqa: BLE001 - an object may raise any exception
         raise ValueError(f"a block is no array of numbers: {type(error).__name__}") from None
     if given.dtype.kind not in "iuf" or isinstance(given, np.ma.MaskedArray):
         masked = "masked " if isinstance(given, np.ma.MaskedArray) else ""
@@ -131,7 +131,7 @@ def _numbers(values: Array) -> Array:
 
 
 def wrong_time(task: Task, first: int, time: Array) -> tuple[int, Verdict] | None:
-    """The first sample that is not where its number puts it, or comes after the last one.
+    """Index and verdict of the first sample with a wrong time or after the trial's end, or None.
 
     `first` is the number of the block's first sample in the trial.
     """
@@ -152,7 +152,7 @@ def wrong_time(task: Task, first: int, time: Array) -> tuple[int, Verdict] | Non
 
 
 def undefined(names: Sequence[str], time: Array, block: Array) -> tuple[int, Verdict] | None:
-    """The first sample that is infinite or no number in any channel."""
+    """Index and verdict of the first sample with an infinite value or NaN, or None."""
     finite = np.isfinite(block)
     if finite.all():
         return None
@@ -163,7 +163,7 @@ def undefined(names: Sequence[str], time: Array, block: Array) -> tuple[int, Ver
 
 
 def tells_of_gaps(ending: Ending, told: Sequence[str]) -> bool:
-    """Whether a recording says itself that samples of it are undefined."""
+    """Whether a recording itself reports undefined samples."""
     if ending.outcome is Outcome.DIVERGED or ending.fault is Fault.LOST_SAMPLES:
         return True
     return any("were lost and are NaN" in text for text in told)

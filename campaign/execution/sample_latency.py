@@ -5,28 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SAME_PACE = 0.05
-"""Share by which the two clocks may differ over a trial that runs at the pace of the wall clock; a
-rehearsal at another speed has no samples that are late."""
+"""Permitted relative difference of the two clocks over a trial in real time; a rehearsal at another
+speed has no late samples."""
 
 
 @dataclass
 class Pace:
-    """Of one trial.
+    """Latency statistics of one trial.
 
     Attributes:
-        longest: between two hand-overs (s of the wall clock).
-        at: bench time (s) of the first sample that was handed over after it.
+        longest: longest gap between two deliveries (s of wall clock).
+        at: bench time (s) of the first sample after it.
     """
 
     longest: float = 0.0
     at: float = 0.0
     _first: tuple[float, float] | None = None  # wall clock, bench time
     _last: tuple[float, float] | None = None
-    _least: float = 0.0  # of wall clock minus bench time, and the most
+    _least: float = 0.0  # minimum and maximum of wall clock minus bench time
     _most: float = 0.0
 
     def handed_over(self, now: float, begin: float, end: float) -> None:
-        """Samples from `begin` to `end` (s of bench time) came at `now` (wall clock)."""
+        """Add samples from `begin` to `end` (s of bench time), delivered at `now` (wall clock)."""
         if self._last is None:
             self._first = (now, end)
             self._least = self._most = now - end
@@ -38,7 +38,7 @@ class Pace:
 
     @property
     def is_of_the_wall_clock(self) -> bool:
-        """Whether a second of the trial took a second, as far as can be told."""
+        """Whether the trial ran in real time, within SAME_PACE and the longest gap."""
         if self._first is None or self._last is None:
             return False
         wall, bench = (self._last[i] - self._first[i] for i in (0, 1))
@@ -46,5 +46,5 @@ class Pace:
 
     @property
     def oldest(self) -> float:
-        """How much later (s) than the timeliest one the latest hand-over was."""
+        """Largest delay (s) of a delivery relative to the earliest delivery."""
         return self._most - self._least

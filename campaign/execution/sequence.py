@@ -1,7 +1,7 @@
 """The sequence of a run: trials, retries, rests, operator steps, stops.
 
-Decisions are made in one thread, between trials; only the trials themselves are executed elsewhere
-(`executors.py`). Each decision is in the journal before it is acted upon.
+One thread makes all decisions, between trials; executors execute the trials (`executors.py`). Each
+decision is journaled before it takes effect.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from campaign.recording import Ending, Outcome, PanicStop, SafeState
 from campaign.trial import Trial
 
 LOOK = 0.25
-"""s between two updates of the display, and before the executor learns that the run is to end."""
+"""s between two updates of the display; longest delay of a stop request to the executor."""
 ENDING = 10.0
-"""s that the other trials may take to end when the run cannot go on."""
+"""s that the other trials may take to end when the run cannot continue."""
 MOST_LOST = 3
-"""Worker processes that may die before the run ends: the trials themselves may be the cause."""
+"""Worker losses before the run ends: the trials themselves may be the cause."""
 _Ended = tuple[Trial, AttemptEnd, Sequence[Entry]]
 
 
 class TrialSequence:
-    """Executes trials until there are none left or the run has to end.
+    """Executes trials until none are left or the run must end.
 
     Attributes:
-        outside: knows of a panic stop.
+        outside: detects a panic stop.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class TrialSequence:
         self._said: set[tuple[str, str]] = set()
 
     def execute(self, executor: BatchExecutor) -> None:
-        """Keep all workers busy. Raises what the archive raises, and KeyboardInterrupt."""
+        """Keep all workers busy. Raises errors of the archive, and KeyboardInterrupt."""
         try:
             while True:
                 while len(self._running) < executor.most_pending and (batch := self._next()):
@@ -101,7 +101,7 @@ class TrialSequence:
             raise
 
     def _hear(self, executor: BatchExecutor) -> None:
-        """Wait for news, and act on all there is."""
+        """Wait for ended trials and batches, and process all of them."""
         try:
             news = [self._news.get(timeout=LOOK)]
         except Empty:
@@ -122,7 +122,7 @@ class TrialSequence:
                 if isinstance(error := each.exception(), WorkerLostError):
                     self._repeat(batch, error)
                 else:
-                    each.result()  # raises what it raised
+                    each.result()  # raises its exception
 
     def _repeat(self, batch: Sequence[Trial], error: WorkerLostError) -> None:
         """Put the trials of a lost batch first, except those that have ended."""
@@ -142,7 +142,7 @@ class TrialSequence:
         self._ended.fault = self._ended.fault or reason
 
     def _next(self) -> Sequence[Trial]:
-        """The trials to begin now; empty when there are none, or not before others have ended."""
+        """The trials to begin now; empty if none are left, or if others must end first."""
         self._follow()
         self._keep_extremes()
         trial = self._batches.first
@@ -151,7 +151,7 @@ class TrialSequence:
         under_way = sum(each.task.duration for each in self._under_way.values())
         if self._rests.left <= under_way or self._set_up.is_due(trial):
             if self._running:
-                return ()  # neither a rest nor a person's hands go with a trial that moves
+                return ()  # a rest or an operator step requires that no trial is running
             self._rest()
             due = not self._is_over() and self._set_up.is_due(trial)
             if due and not self._set_up.confirm(trial, self.outside):
@@ -161,9 +161,9 @@ class TrialSequence:
         return self._batches.take(self._rests.left - under_way, self._set_up.is_due)
 
     def _follow(self) -> None:
-        """Ask every stage whose trials have ended which ones follow; they come next.
+        """Evaluate every stage whose trials have ended; its trials are the next ones.
 
-        Nobody is asked when the run is over: a resume may execute some of those trials again.
+        No stage is evaluated after the end of the run: a resume may repeat some of its trials.
         """
         while self._stages.is_due and not self._is_over():
             trials, remarks = self._stages.ask()
@@ -173,21 +173,21 @@ class TrialSequence:
                 self._ledger.remark(remark)
 
     def _keep_extremes(self) -> None:
-        """Once all have ended: the trials of extreme metrics are executed again, for samples."""
+        """After all trials: repeat the trials with extreme metrics to keep their samples."""
         waits = self._batches.first is not None or self._running or self._is_over()
         if self._policy.keep != "extremes" or waits or self._kept_extremes:
             return
         self._kept_extremes = True
-        found = extremes(self._trials, self._writer.metrics())
-        again = [trial for trial in self._trials if trial.number in found]
+        reasons = extremes(self._trials, self._writer.metrics())
+        again = [trial for trial in self._trials if trial.number in reasons]
         again = [trial for trial in again if self._writer.attempt(trial) == 2]
         for trial in again:
-            self._writer.decision("keep samples", found[trial.number], trial.number)
+            self._writer.decision("keep samples", reasons[trial.number], trial.number)
             self._ledger.take_back(trial)
         self._batches.insert(again)
 
     def _is_over(self) -> bool:
-        """As `halted`, between trials, when the bench can be asked as well."""
+        """Whether the run is to end; between trials this also polls the bench."""
         return self.halted() if self._running else self.outside() or self.halted()
 
     def _stopped_outside(self, stop: PanicStop) -> None:
@@ -205,7 +205,7 @@ class TrialSequence:
         self._rests.taken()
 
     def _settle(self, trial: Trial, executed: AttemptEnd) -> None:
-        """What follows from a trial's end: is the bench safe, is it tried again, does it go on."""
+        """Process a trial's end: make the bench safe, retry, or end the run."""
         ending = executed.ending
         self._under_way.pop(trial.number, None)
         self._rests.worked(trial.task.duration)
@@ -216,7 +216,7 @@ class TrialSequence:
             self._fail(ending.reason)
         elif ending.outcome is Outcome.INTERRUPTED and not self.halted():
             self.outside.look()
-            self._stop.request(ending.reason or "the bench")  # somebody stands there
+            self._stop.request(ending.reason or "the bench")  # a person at the bench stopped it
         elif ending.safe_state is not SafeState.CONFIRMED and not self.halted():
             self._make_safe(trial)
         if self._is_final(trial, ending):
@@ -224,7 +224,7 @@ class TrialSequence:
             self._stages.ended(trial)
 
     def _say_remarks(self, trial: Trial, executed: AttemptEnd) -> None:
-        """Once for each test."""
+        """Report each remark once per test."""
         for remark in executed.remarks:
             if (trial.test, remark) not in self._said:
                 self._said.add((trial.test, remark))
@@ -236,18 +236,18 @@ class TrialSequence:
             self._ledger.remark(f"{trial.name}: no metrics are archived: {executed.unmeasured}")
 
     def _make_safe(self, trial: Trial) -> None:
-        """Nothing moves again after an unconfirmed trial before the bench was seen at rest."""
+        """Make the bench safe after an unconfirmed trial; end the run if it is not confirmed."""
         make_safe(self._backend, self._ended)
-        found = f"now {self._ended.safe_state}"
+        state = f"now {self._ended.safe_state}"
         self._writer.decision(
-            "make safe", f"the safe state was not confirmed; {found}", trial.number
+            "make safe", f"the safe state was not confirmed; {state}", trial.number
         )
-        self._ledger.remark(f"{trial.name}: the safe state was not confirmed; {found}")
+        self._ledger.remark(f"{trial.name}: the safe state was not confirmed; {state}")
         if self._ended.unsafe:
             self._fail(f"{self._ended.unsafe} after {trial.name}")
 
     def _is_final(self, trial: Trial, ending: Ending) -> bool:
-        """Apply the policy; False when the trial will be executed again."""
+        """Apply the policy; False if the trial will be executed again."""
         if not ending.outcome.failed or self._ended.fault:
             return True
         choice = self._responses.choose(trial, ending)
@@ -260,5 +260,5 @@ class TrialSequence:
         pause = f" in {choice.pause:g} s" if choice.pause else ""
         self._ledger.remark(f"{trial.name} is executed again{pause}")
         self._attendance.wait(choice.pause, self.outside)
-        self._batches.again(trial)  # when the run is stopped, it is left for who resumes it
+        self._batches.again(trial)  # after a stop it remains for a resume
         return False

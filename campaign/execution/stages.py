@@ -1,9 +1,9 @@
-"""Later stages of a run: when trials follow, and their execution.
+"""Later stages of a run: when their trials follow, and their execution.
 
-A stage is asked once all trials of its point have ended for good; its answer is in the journal
-before the first of its trials begins. Stages are asked in one order, that of their points' last
-planned trials, whatever the workers were busy with: so a trial has the same number in every run,
-and a run that is gone on with knows from the journal which of them were asked.
+A stage is evaluated after the final end of all trials of its point. Its trials are journaled before
+the first one begins. The order of stages is that of their points' last planned trials, independent
+of the workers: a trial has the same number in every run, and a resumed run reads the evaluated
+stages from the journal.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ from campaign.trial import Role, Trial, canonical_json
 
 NOTHING_TOLD = Cause("nothing found", "the recording shows nothing")
 TOLD = 3
-"""Refused trials of a stage that are told one by one; the journal has them all."""
+"""Number of refused trials per stage that are reported individually; the journal has all."""
 
 
 class StageArchive(Protocol):
-    """What stages need of the run's archive (`campaign.archive.RunWriter`)."""
+    """Methods of the run's archive that stages use (`campaign.archive.RunWriter`)."""
 
     def archived(self, number: int) -> TrialData:
-        """A trial of this run that has ended. Raises ArchiveError, LookupError."""
+        """A finished trial of this run. Raises ArchiveError, LookupError."""
 
     def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Note a stage's trials. Raises ArchiveError."""
+        """Journal a stage's trials. Raises ArchiveError."""
 
 
 UNKNOWN = Estimate.without_interval("nothing", math.nan, "", NOTHING_TOLD())
-"""Metrics of a recording that could not be measured."""
+"""Metric of a recording that could not be measured."""
 
 
 class Stages:
-    """The stages of a run that have not been asked yet. Used from one thread."""
+    """The stages of a run that are not yet evaluated. Used from one thread."""
 
     def __init__(
         self,
@@ -71,15 +71,15 @@ class Stages:
         finished: Iterable[int] = (),
         asked: Sequence[TrialsFollowed] = (),
     ) -> None:
-        """Begin, or go on where an earlier session ended.
+        """Begin, or continue an earlier session.
 
         Args:
             planned: all stages of the plan.
-            trials: all that are known: those of the plan, and those of `asked`.
-            refusal: what the backend says of a trial; empty when it can be executed.
-            measure: in a limited time, what an archived trial says by itself; absent: a stage does.
-            finished: numbers of the trials that have ended for good.
-            asked: the stages of which the journal tells.
+            trials: all known trials: of the plan and of `asked`.
+            refusal: the backend's reason to refuse a trial; empty for an executable trial.
+            measure: metrics of an archived trial, within a time limit; None: a stage measures.
+            finished: numbers of the trials that need no further attempt.
+            asked: the journaled stages.
         """
         known = {(place_of(each.test, each.point), each.stage) for each in asked}
         places = {stage.place: stage for stage in planned}
@@ -108,55 +108,53 @@ class Stages:
 
     @property
     def left(self) -> bool:
-        """Whether a stage has not been asked yet."""
+        """Whether a stage is not yet evaluated."""
         return bool(self._waiting)
 
     @property
     def failed(self) -> str:
-        """Why trials of a stage are missing; empty when none is."""
+        """Why trials of stages are missing; empty if none are missing."""
         more = len(self._failures) - 1
         return f"{self._failures[0]}{f', and {more} more' if more > 0 else ''}" if more >= 0 else ""
 
     def in_order(self, trials: Iterable[Trial]) -> list[Trial]:
-        """The trials that are to be executed: what had followed before a run was resumed first,
-        as it would have been without that.
-        """
+        """Trials in order of execution: those of evaluated stages first, as before a resume."""
         return sorted(trials, key=lambda trial: trial.number not in self._followed)
 
     def ended(self, trial: Trial) -> None:
-        """A trial has ended for good, and is archived."""
+        """Note that a trial needs no further attempt and is archived."""
         self._ended.add(trial.number)
 
     @property
     def is_due(self) -> bool:
-        """Whether everything has ended from which the next stage follows."""
+        """Whether all trials on which the next stage depends have ended."""
         if not self._waiting:
             return False
         own = self._trials[self._waiting[0].place]
         return all(trial.number in self._ended for trial in own)
 
     def ask(self) -> tuple[Sequence[Trial], Sequence[str]]:
-        """The trials of the stage that is due, journalled; also what there is to say.
+        """Evaluate and journal the stage that is due; its trials, and remarks for the operator.
 
-        Whatever goes wrong in it costs the stage only. Raises ArchiveError when it cannot be kept.
+        An error in the stage costs only the stage. Raises ArchiveError if it cannot be journaled.
         """
         stage = self._waiting[0]
-        found, reason = StageTrials(()), ""
+        outcome, reason = StageTrials(()), ""
         try:
-            found = self._follow(stage)
+            outcome = self._follow(stage)
         except (TooMuchError, CampaignError) as error:
             reason = str(error)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - must not cost the run
             reason = describe(error)
         what = (stage.test, stage.number, stage.name, stage.point)
-        entry = trials_followed(utc_now(), *what, found.trials, found.refused, reason)
+        entry = trials_followed(utc_now(), *what, outcome.trials, outcome.refused, reason)
         self._archive.trials_followed(entry)
         self._waiting.popleft()
-        self._trials[stage.place] += found.trials
-        self._next += len(found.trials)
+        self._trials[stage.place] += outcome.trials
+        self._next += len(outcome.trials)
         if text := _failure(entry):
             self._failures.append(text)
-        return found.trials, _remarks(entry)
+        return outcome.trials, _remarks(entry)
 
     def _follow(self, stage: PlannedStage) -> StageTrials:
         trials = self._trials[stage.place]
@@ -173,10 +171,10 @@ class Stages:
         return follow(stage, experiment, requests, first, self._next, self._refusal)
 
     def _measured(self, trial: TrialData) -> TrialData:
-        """With what it says by itself, also where nothing could be archived of that.
+        """The trial with its metrics, measured now if none are archived; never empty.
 
-        A stage is asked while the bench waits: an experiment's `measure` that hung when its trial
-        ended must not hang here, and what says nothing is not measured anew.
+        The bench waits for the stage. An experiment's `measure` that hung at the end of its trial
+        must not hang here; `UNKNOWN` marks a trial that is not to be measured again.
         """
         if self._measure is None or trial.estimates or not isinstance(trial, ArchivedTrial):
             return trial
@@ -184,10 +182,10 @@ class Stages:
 
 
 def _on_benches_of(trials: Sequence[Trial], archived: Sequence[TrialData]) -> bool:
-    """Whether each was executed on the bench that it has now.
+    """Whether each trial was executed on its present bench.
 
-    A run may be gone on with on a changed bench. What was found on the one before, or on both, may
-    not decide how the changed one moves.
+    A run may be resumed on a changed bench. Results of the previous bench must not decide how the
+    changed bench moves.
     """
     return all(
         canonical_json(then.trial.bench) == canonical_json(now.bench)
@@ -196,7 +194,7 @@ def _on_benches_of(trials: Sequence[Trial], archived: Sequence[TrialData]) -> bo
 
 
 def refusal_of(backend: Backend) -> Refusal:
-    """Why `backend`, once it is connected, does not execute a trial."""
+    """Function that returns why the connected `backend` does not execute a trial."""
 
     def why(trial: Trial) -> str:
         if reason := calls.refusal(backend, trial):
@@ -209,7 +207,7 @@ def refusal_of(backend: Backend) -> Refusal:
 
 
 def _failure(entry: TrialsFollowed) -> str:
-    """That trials of a stage are missing, and why; empty when none is."""
+    """Which trials of a stage are missing, and why; empty if none are missing."""
     if entry.reason:
         return f"{entry.title} failed: {entry.reason}"
     if entry.refused:
@@ -220,7 +218,7 @@ def _failure(entry: TrialsFollowed) -> str:
 
 
 def _remarks(entry: TrialsFollowed) -> list[str]:
-    """What a person wants to know of a stage that was asked."""
+    """Remarks for the operator about an evaluated stage."""
     if entry.reason:
         return [_failure(entry)]
     count = len(entry.trials)
@@ -242,5 +240,5 @@ class _Nothing:
 
 
 def no_stages() -> Stages:
-    """Of a run all of whose trials are planned."""
+    """Stages of a run without later stages."""
     return Stages((), (), _Nothing(), {}, lambda trial: "")

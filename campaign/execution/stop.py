@@ -1,9 +1,9 @@
-"""Requests to stop a run: the first asks, the second insists.
+"""Requests to stop a run: the first ends it in order, the second aborts it.
 
-Nothing is raised where the program happens to stand: an exception out of a signal handler can be
-lost, for instance in a weak reference's callback, or break what it interrupts. The handler notes
-the request; a thread of its own leaves when somebody insists. Where a bench moves, the guardian
-sees to it that this succeeds while the program hangs in a call that lets no thread run.
+Signal handlers raise nothing: an exception from a handler can be lost, for instance in a weak
+reference's callback, or break the interrupted code. The handler notes the request; a separate
+thread aborts the program at the second one. For a live bench the guardian ensures the abort even
+while a call blocks all threads of the program.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ from campaign.execution.safety import NOT_SAFE, SAFE
 from campaign.plain_text import printable
 
 _NOTICE = "\nstopping: closing the archive; press Ctrl-C again to abort\n"
-"""Short enough for a narrow terminal: what wraps it breaks words."""
+"""Fits a narrow terminal, which would break words."""
 NOTHING_BEGUN = "stopped at once; nothing was begun"
 _SHOW_CURSOR = "\x1b[?25h"  # a live display hides it
 _LONGEST = 2000
-"""bytes of a note, so that a pipe takes it whole."""
+"""bytes; longest note, so that one write to a pipe takes it."""
 _PIECE = 4096
 """bytes read at a time."""
 _OWN = 128
-"""Added to a signal's number by our own handler; the C handler of Python writes the plain ones."""
+"""Added to a signal's number by this module's handler; Python's C handler writes plain numbers."""
 _ENDING = 1.0
-"""s in which a guardian that runs lets go of its end of the pipe."""
+"""s; time limit for the guardian to close its end of the pipe."""
 
 
 @dataclass(frozen=True)
 class GuardianPipes:
-    """The ends that the guardian has given us.
+    """Pipe ends from the guardian.
 
     Attributes:
-        come, back: of one pipe: signals to this program, also those that it writes itself.
-        tell: to the guardian.
+        come, back: read and write end of one pipe: signals to this program, also from itself.
+        tell: write end of the pipe to the guardian.
     """
 
     come: int
@@ -67,10 +67,10 @@ class GuardianPipes:
 
 
 def under_guardian(kind: BackendKind) -> GuardianPipes | None:
-    """Begin anew as the child of a guardian, where `kind` moves a bench and there is none yet.
+    """Restart the program as the child of a guardian, if `kind` moves a bench and has none yet.
 
-    To be called before anything is begun or said. None where no guardian is needed, and in a
-    program that only uses this one as a library. Raises UsageError on a system without any.
+    Call it before any work or output. Returns None if no guardian is needed, and in a program that
+    uses campaign as a library. Raises UsageError on a system without guardian (not POSIX).
     """
     if not kind.live:
         return None
@@ -94,25 +94,25 @@ def _begin_anew(kind: BackendKind) -> NoReturn:
     sys.stdout.flush()
     sys.stderr.flush()
     guardian = str(Path(__file__).with_name("guardian.py"))
-    # -I, -S: nothing in the user's folder can stand in for a module of the library.
+    # -I, -S: a file in the user's folder cannot replace a module of the library.
     command = [sys.executable, "-I", "-S", guardian, sys.executable, *sys.orig_argv[1:]]
     os.execv(sys.executable, command)  # noqa: S606 - our own program, no shell
 
 
 class StopSwitch:
-    """Calling it says whether somebody asked the run to stop.
+    """Stop flag of the run: a call returns whether a stop was requested.
 
-    The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (the terminal is gone) only sets it: running trials
-    see it and end, the bench is made safe and the archive is closed. A second SIGINT or SIGTERM
-    makes the bench safe and ends the program; a second SIGHUP does not, because shell and kernel
-    both send one when a terminal closes, and nobody insists.
+    The first SIGINT (Ctrl-C), SIGTERM or SIGHUP (terminal closed) only sets it: running trials
+    end, the bench is made safe and the archive is closed. A second SIGINT or SIGTERM makes the
+    bench safe and ends the program. A second SIGHUP does not: shell and kernel both send one when
+    a terminal closes.
 
     Attributes:
-        make_safe: called in a thread of its own when somebody insists; the exit code.
+        make_safe: called in a separate thread at the second request; returns the exit code.
     """
 
     def __init__(self, guardian: GuardianPipes | None = None) -> None:
-        """`guardian`: of a program that moves a bench."""
+        """`guardian`: pipes of a program that moves a bench."""
         self._reason = ""
         self._note: Callable[[], str] = lambda: NOTHING_BEGUN
         self._moves = False
@@ -125,7 +125,7 @@ class StopSwitch:
 
     @property
     def reason(self) -> str:
-        """Who asked, or the empty text."""
+        """Source of the request; empty without one."""
         return self._reason
 
     def request(self, reason: str) -> None:
@@ -133,10 +133,10 @@ class StopSwitch:
         self._reason = self._reason or reason
 
     def kept(self, note: Callable[[], str], *, moves: bool, stopper: Sequence[str] = ()) -> None:
-        """What is said last when the program is left at once: what of the run is kept, and where.
+        """Set the last message of an abort: what of the run is kept, and where.
 
-        `moves`: whether there is a bench that somebody has to have seen at rest. The guardian has
-        the text before this returns, and the command `stopper` that stops the bench's controller.
+        `moves`: whether the bench needs a confirmed safe state. The guardian receives the text and
+        the command `stopper`, which stops the bench's controller, before this returns.
         """
         self._note, self._moves = note, moves
         text = f"{NOT_SAFE if moves else ''}\n{note()}".strip()
@@ -145,9 +145,9 @@ class StopSwitch:
 
     @contextmanager
     def on_signals(self) -> Iterator[StopSwitch]:
-        """Listen to SIGINT, SIGTERM and SIGHUP inside the block. Main thread only.
+        """Handle SIGINT, SIGTERM and SIGHUP inside the block. Main thread only.
 
-        A SIGHUP that was ignored before stays ignored: that is what nohup is for.
+        A SIGHUP that is ignored before stays ignored, as nohup requires.
         """
         guardian = self._guardian
         with ExitStack() as stack:
@@ -155,7 +155,7 @@ class StopSwitch:
             watcher = threading.Thread(target=self._watch, args=(come,), daemon=True)
             watcher.start()
             stack.callback(watcher.join, _ENDING if guardian else None)
-            stack.callback(os.close, back)  # the watcher ends by it
+            stack.callback(os.close, back)  # ends the watcher
             if guardian:
                 self._tell_text(NOTE, NOT_SAFE)  # until more is known
                 self._tell(bytes((CONNECTED,)))
@@ -177,7 +177,7 @@ class StopSwitch:
                 yield self
             finally:
                 for number, handler in before.items():
-                    if handler is not None:  # None: not set from Python, and not ours to put back
+                    if handler is not None:  # None: not set from Python, not restorable
                         signal.signal(number, handler)
 
     def _tell_text(self, kind: int, text: str) -> None:
@@ -191,7 +191,7 @@ class StopSwitch:
             except BrokenPipeError:
                 self.request("the death of its guardian process")
             except OSError:
-                pass  # the guardian does not run at the moment, and the pipe is full
+                pass  # the guardian is suspended, and the pipe is full
 
     def _ask(self, number: int) -> None:
         self.request("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
@@ -200,20 +200,20 @@ class StopSwitch:
             _say(_NOTICE)
 
     def _watch(self, come: int) -> None:
-        """Count what each of those has heard who listen: the largest number is true."""
-        heard = {0: StopRequests(), OURS: StopRequests(), _OWN: StopRequests()}
+        """Count requests per listener (C handler, guardian, own handler); the maximum decides."""
+        counted = {0: StopRequests(), OURS: StopRequests(), _OWN: StopRequests()}
         while data := os.read(come, _PIECE):
             for byte in data:
                 number = byte % OURS
-                if number in _stopping_signals():  # others may have handlers, too
-                    heard[byte - number].add(number)
+                if number in _stopping_signals():  # other signals may have handlers, too
+                    counted[byte - number].add(number)
                     self._ask(number)
-            if max(asked.times for asked in heard.values()) > 1:
+            if max(asked.times for asked in counted.values()) > 1:
                 self._leave()
         os.close(come)
 
     def _leave(self) -> NoReturn:
-        """Somebody insists: bench to rest, a last line, and out."""
+        """Abort: make the bench safe, print the last message, exit."""
         self._tell(bytes((MAKING_SAFE,)))
         code = self.make_safe()
         unsafe = code is ExitCode.NOT_SAFE
@@ -229,8 +229,8 @@ class StopSwitch:
 
 
 def _say(text: str) -> None:
-    # Not through sys.stderr: its buffer may be what a signal has interrupted.
-    with suppress(OSError):  # nobody may be there to read it
+    # Not through sys.stderr: the signal may have interrupted a write to its buffer.
+    with suppress(OSError):  # stderr may be closed
         os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, text.encode())
 
 

@@ -13,28 +13,28 @@ from campaign.stopwatch import UNTIMED, Timing
 from campaign.trial import Trial
 
 Subscriber = Callable[[Trial, tuple[ChannelInfo, ...], Array, Array], None]
-"""Is handed every block that is archived: its trial, the channels, time (n,), block (channels, n).
+"""Receives every archived block: its trial, channels, time (n,), block (channels, n).
 
-Called from the trial's own thread, before the backend goes on: it must return at once and change
-nothing. One that raises is not called again in that trial.
+It is called in the trial's thread while the backend waits: it must return immediately and change
+nothing. After an exception it is not called again in that trial.
 """
 
 
 @dataclass(frozen=True)
 class Patience:
-    """How long (s, of the wall clock) a live backend is waited for.
+    """Time limits (s of wall clock) for a live backend.
 
     Attributes:
         first: until the first samples: configuring, arming, warming up.
-        silence: between two hand-overs of samples.
-        closing: for `execute` to return once nothing more is to come: braking, coming to rest.
-        grace: for `execute` to return once its stop flag was set, until `make_safe` is called.
-        giving_up: for `execute` to return once `make_safe` was called, and at least `grace` after
-            its answer, until the trial is given up.
-        tick: between two looks at the clock.
-        asleep: a look that comes so late says that this program itself did not run: what was not
-            heard meanwhile is nobody's silence.
-        late: what samples may wait until they are handed over.
+        silence: between two deliveries of samples.
+        closing: from the last sample until `execute` returns: braking, coming to rest.
+        grace: from setting the stop flag until `make_safe` is called, if `execute` does not return.
+        giving_up: from the call of `make_safe` until the trial is abandoned, if `execute` does not
+            return; at least `grace` after the answer of `make_safe`.
+        tick: between two checks of the clock.
+        asleep: delay of a check from which this program itself was suspended: that time does not
+            count as silence.
+        late: maximum delay of samples until their delivery.
     """
 
     first: float = 15.0
@@ -49,12 +49,12 @@ class Patience:
 
 @dataclass(frozen=True)
 class Supervision:
-    """What the recorder of every trial of a run is told.
+    """Settings of the supervision of all trials of a run.
 
     Attributes:
-        source, live: as the backend's `BackendKind` declares.
-        clock: a steady one (s).
-        timing: told what the trial's own thread does.
+        source, live: as declared by the backend's `BackendKind`.
+        clock: monotonic clock (s).
+        timing: stopwatch for the trial's thread.
     """
 
     source: Source = Source.SIMULATION
@@ -66,7 +66,7 @@ class Supervision:
 
 
 class TrialStop:
-    """The stop flag of one trial: the run is to halt, or the trial's own recorder has ended it."""
+    """Stop flag of one trial: set by a stop of the run, or by the trial's recorder."""
 
     def __init__(self, halted: Callable[[], bool]) -> None:
         self._halted = halted
@@ -77,23 +77,23 @@ class TrialStop:
 
     @property
     def halted(self) -> bool:
-        """Whether it is the run that is to end."""
+        """Whether the run is to end."""
         return self._halted()
 
     def trip(self) -> None:
-        """End this trial, and no other."""
+        """End this trial only."""
         self._tripped.set()
 
 
 class SilenceWatch:
-    """Counts how long nothing was heard, but for the time in which this program did not run."""
+    """Measures the silence of a backend, without the time in which this program was suspended."""
 
     def __init__(self, asleep: float, now: float) -> None:
         self._asleep = asleep
         self._since = self._looked = now
 
     def look(self, now: float, heard: float | None) -> float:
-        """How long (s) nothing was heard; `heard` is when something was last, None if never."""
+        """Silence (s) at `now`; `heard` is the time of the last samples, None before any."""
         if now - self._looked > self._asleep:
             self._since = now
         self._looked = now

@@ -1,7 +1,7 @@
 """Metrics of a recording at the end of its trial.
 
-It is archived, so that an analysis of tomorrow reads what was found today. The recording is on the
-disk before: nothing that goes wrong here costs it, and an analysis measures what was not archived.
+They are archived, so that a later analysis reads the same values. The recording is already on the
+disk: an error here does not cost it, and an analysis computes metrics that were not archived.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from campaign.stopwatch import UNTIMED, Timing, Work
 from campaign.trial import Role
 
 LIMIT = 60.0
-"""s that one recording may be measured for: the bench waits, and what follows from it."""
+"""s; time limit per recording: the bench and later stages wait for it."""
 
 
 @dataclass(frozen=True)
 class TrialMeasurement:
-    """Measures completed measurements of the experiments that say how; a `Measure`.
+    """Computes metrics of completed trials whose experiment has `measure`; a `Measure`.
 
     Any thread may use it.
 
     Attributes:
-        limit: s; what takes longer is left behind, and the trial is archived without metrics.
+        limit: time limit (s); a longer computation is abandoned, without metrics in the archive.
     """
 
     experiments: Kinds[Experiment]
@@ -56,14 +56,14 @@ class TrialMeasurement:
             return self._in_time(data)
 
     def _in_time(self, data: ArchivedTrial) -> ArchivedMetrics:
-        """In a thread of its own, since nothing else can be left behind when it hangs."""
+        """Measure in a separate thread, which can be abandoned if it hangs."""
         call = Call(partial(self._measured, data), "measuring")
         if call.has_ended(self.limit):
             return call.answer()
         return ArchivedMetrics(problem=f"measuring did not end within {self.limit:g} s")
 
     def _measured(self, data: ArchivedTrial) -> ArchivedMetrics:
-        began = time.thread_time()  # of a thread that no span knows
+        began = time.thread_time()  # of a thread outside all spans
         try:
             return self._found(data)
         finally:
@@ -93,7 +93,7 @@ class TrialMeasurement:
 
 
 def checked(found: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """Those that were found at all. Raises ValueError where two have one name."""
+    """Estimates with a finite value. Raises ValueError if two have the same name."""
     names = Counter(estimate.name for estimate in found)
     twice = [name for name, count in names.items() if count > 1]
     if twice:
@@ -102,7 +102,7 @@ def checked(found: Sequence[Estimate]) -> tuple[Estimate, ...]:
 
 
 def author(plug_in: PlugIn | None) -> str:
-    """The code of a kind: this program, or a package with the hash of its sources."""
+    """Origin of a kind's code: this program, or a package with the hash of its sources."""
     program = f"campaign {campaign.__version__}"
     if plug_in is None:
         return program

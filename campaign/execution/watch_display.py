@@ -1,8 +1,7 @@
 """`--watch` of `run` and `resume`: channels of the running trial, drawn in the terminal.
 
-Whoever runs trials only leaves samples and progress here, and goes on at once. A thread of its own
-draws them, through a descriptor of its own: a slow terminal sees fewer pictures, one that is gone
-none, and no trial waits for either.
+Trials store samples and progress here without waiting. A separate thread draws them through its own
+descriptor: a slow terminal receives fewer pictures, a closed terminal none, and no trial waits.
 """
 
 from __future__ import annotations
@@ -28,31 +27,30 @@ from campaign.units import convert
 INTERVAL = 0.5
 """s between two pictures."""
 MOST = 4000
-"""Samples of a channel that are kept; of more, every second one."""
+"""Maximum number of samples kept per channel; beyond it, every second sample is dropped."""
 CHANNELS = 3
-"""Most channels that are drawn: those that the trial needs first."""
+"""Maximum number of drawn channels; those that the trial requires come first."""
 STALE = 1.0
-"""s without samples after which another trial is drawn in place of one that has not ended."""
+"""s without samples after which another trial replaces an unfinished one."""
 PATIENCE = 1.0
-"""s that a picture may take at the end of a run, or before a question."""
+"""s; maximum wait for a picture at the end of a run, or before a prompt."""
 NARROW, LOW = 40, 12
-"""Columns and rows below which the line of progress stands alone."""
+"""Columns and rows below which only the progress line is drawn."""
 AHEAD = 0.5
-"""s of a trial that may come sooner than they pass: a live bench hands over blocks of 0.2 s."""
+"""s by which samples may precede the wall clock: a live bench delivers blocks of 0.2 s."""
 AFTERWARDS = "as delivered, not live"
 
 
 class Trace:
-    """What has come of one trial, thinned.
+    """Thinned samples of one trial.
 
     Attributes:
-        channels: those that are drawn, at most CHANNELS.
-        afterwards: whether samples came sooner than they could be measured: the backend computes
-            them, or delivers at the end.
+        channels: the drawn channels, at most CHANNELS.
+        afterwards: whether samples came faster than real time: computed, or delivered at the end.
     """
 
     def __init__(self, trial: Trial, channels: tuple[ChannelInfo, ...], now: float) -> None:
-        """`now`: of a steady clock (s)."""
+        """`now`: time of a monotonic clock (s)."""
         wanted = sorted(enumerate(channels), key=lambda each: each[1].name not in trial.requires)
         chosen = wanted[:CHANNELS]
         self.trial = trial
@@ -65,7 +63,7 @@ class Trace:
         self._stride = 1
 
     def add(self, time: Array, block: Array, now: float) -> None:
-        """Take samples that came `now`: time (n,) in s, block (channels, n)."""
+        """Add samples received at `now`: time (n,) in s, block (channels, n)."""
         self._stride = max(self._stride, len(time) // MOST)
         self.end = float(time[-1])
         self.afterwards = self.afterwards or self.end > now - self._began + AHEAD
@@ -80,7 +78,7 @@ class Trace:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more is to come."""
+        """Whether the trial has no more samples."""
         return self.end >= self.trial.task.duration - 2.0 / self.trial.task.sample_rate
 
 
@@ -90,16 +88,16 @@ class WatchDisplay:
     def __init__(
         self, terminal: int, size: Callable[[], os.terminal_size] = shutil.get_terminal_size
     ) -> None:
-        """`terminal`: the descriptor that is drawn to."""
+        """`terminal`: descriptor of the output."""
         self._terminal, self._size = terminal, size
-        self._keeping = threading.Lock()  # of what is below, for as long as it takes to look
+        self._keeping = threading.Lock()  # guards the fields below; held briefly
         self._trace: Trace | None = None
         self._heard = 0.0
         self._progress: Progress | None = None
         self._news: deque[str] = deque()
         self._changed = False
-        self._drawing = threading.Lock()  # of the terminal
-        self._lines = 0  # of the picture on the screen
+        self._drawing = threading.Lock()  # guards the terminal
+        self._lines = 0  # lines of the picture on the screen
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._draw_on, name="watch", daemon=True)
         self._thread.start()
@@ -107,7 +105,7 @@ class WatchDisplay:
     def seen(
         self, trial: Trial, channels: tuple[ChannelInfo, ...], time_: Array, block: Array
     ) -> None:
-        """What recorders tell; see `supervision.Subscriber`."""
+        """Store new samples; see `supervision.Subscriber`."""
         if not len(time_):
             return
         with self._keeping:
@@ -115,20 +113,20 @@ class WatchDisplay:
             is_other = trace is None or trace.trial.number != trial.number
             if trace is not None and is_other and not trace.is_over and now - self._heard < STALE:
                 return
-            if trace is None or is_other or time_[0] <= trace.end:  # the last: a further attempt
+            if trace is None or is_other or time_[0] <= trace.end:  # the last: another attempt
                 trace = self._trace = Trace(trial, channels, now)
             trace.add(time_, block, now)
             self._heard, self._changed = now, True
 
     def __call__(self, progress: Progress) -> None:
-        """Keep the state of the run, to be shown soon."""
+        """Store the state of the run for the next picture."""
         with self._keeping:
             self._progress, self._changed = progress, True
             self._news.extend(line.plain for line in news(progress))
 
     @contextmanager
     def hidden(self) -> Iterator[None]:
-        """Nothing is drawn inside the block; the last picture stays above it."""
+        """Draw nothing inside the block; the last picture stays above it."""
         free = self._drawing.acquire(timeout=PATIENCE)
         self._lines = 0
         try:
@@ -138,12 +136,12 @@ class WatchDisplay:
                 self._drawing.release()
 
     def end(self) -> None:
-        """A last picture, if the terminal takes it soon."""
+        """Draw a last picture, within PATIENCE."""
         self._ended.set()
         self._thread.join(PATIENCE)
 
     def _draw_on(self) -> None:
-        with suppress(OSError):  # the terminal is gone: the run is not to end by it
+        with suppress(OSError):  # a closed terminal must not end the run
             while not self._ended.wait(INTERVAL):
                 self._draw()
             self._draw()
@@ -156,7 +154,7 @@ class WatchDisplay:
                 self._changed = False
                 progress, trace = self._progress, self._trace
                 samples = trace.samples() if trace else np.empty((1, 0))
-                told = [printable(line) for line in self._news]
+                lines = [printable(line) for line in self._news]
                 self._news.clear()
             columns, rows = self._size()
             picture = []
@@ -165,7 +163,7 @@ class WatchDisplay:
             if progress is not None:
                 picture.append(_line(progress)[: columns - 1])
             up = f"\x1b[{self._lines}F" if self._lines else ""
-            text = "\n".join([*told, *picture, ""])
+            text = "\n".join([*lines, *picture, ""])
             self._lines = len(picture)
             self._write(f"{up}\x1b[J{text}".encode(errors="replace"))
 
@@ -175,7 +173,7 @@ class WatchDisplay:
 
 
 def drawn(trace: Trace, samples: Array, width: int, height: int) -> list[str]:
-    """Lines of a picture: a heading, and each channel in its unit over time (s)."""
+    """Lines of a picture: a heading, and each channel in its display unit over time (s)."""
     import plotext
 
     about = trace.trial

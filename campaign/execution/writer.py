@@ -1,4 +1,4 @@
-"""The archive as the runner needs it: two small interfaces."""
+"""Interfaces of the archive that the runner uses."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from campaign.trial import Trial
 
 
 class TrialWriter(Protocol):
-    """Takes the samples of one trial and keeps them once it has ended.
+    """Receives the samples of one trial, and archives them at its end.
 
-    As a `Recorder`, but for lost samples: those come as NaN, with their event.
+    Like a `Recorder`, except that lost samples come as NaN, with their event.
     """
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None: ...
@@ -28,12 +28,12 @@ class TrialWriter(Protocol):
     def event(self, event: Event) -> None: ...
 
     def finish(self, ending: Ending, started: str, ended: str) -> None:
-        """Keep the trial, whole: no crash can lose it then. Raises ArchiveError."""
+        """Archive the whole trial; afterwards a crash cannot lose it. Raises ArchiveError."""
 
     def measure(self, measure: Measure) -> str:
-        """Keep what `measure` finds in its samples, once it is kept; why nothing was measured.
+        """Archive the metrics that `measure` computes, after `finish`. Raises ArchiveError.
 
-        Raises ArchiveError.
+        Returns why metrics are missing, or an empty text.
         """
 
 
@@ -45,26 +45,26 @@ class Begins(Protocol):
 
 
 class PlanWriter(Begins, Protocol):
-    """Takes the trials of a run; `begin` and what it returns may be used from several threads."""
+    """Writes the trials of a run; several threads may use `begin` and its results."""
 
     @property
     def folder(self) -> Path:
-        """Where the run lies until it is sealed."""
+        """Folder of the run until it is sealed."""
 
     def attempt(self, trial: Trial) -> int:
-        """Which one that is, from 1."""
+        """Number of the next attempt at `trial`, from 1."""
 
     def metrics(self) -> Mapping[int, Sequence[Estimate]]:
-        """What was measured in the last finished attempt at each trial, by number."""
+        """Metrics of the last finished attempt at each trial, by number."""
 
     def note(self, *entries: Entry) -> None:
-        """Keep what processes tell of trials that they have written. Raises ArchiveError."""
+        """Journal entries of trials that other processes have written. Raises ArchiveError."""
 
     def decision(self, decision: str, reason: str, trial: int | None = None) -> None:
-        """Note what the run did besides its plan. Raises ArchiveError."""
+        """Journal an action of the run outside its plan. Raises ArchiveError."""
 
     def operator_step(self, trial: int, step: str, answer: str) -> None:
-        """Note what a person was asked to do, and the answer. Raises ArchiveError."""
+        """Journal an operator step and the answer. Raises ArchiveError."""
 
     def seal(self, status: RunStatus, reason: str, safe_state: SafeState, *, ended: str) -> Path:
-        """Close the run for good and say where it is."""
+        """Seal the run and return its path."""

@@ -1,7 +1,7 @@
 """Order of a bench's tables as in its file.
 
-The archive keeps trees by their content, whose keys have no order; but torques of several
-interfaces are added in the order in which the file names them, which decides their last bits.
+Archived trees have no order of keys. But torques of several interfaces are added in the order of
+the bench file, which determines their last bits.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from campaign.trial import Tree
 
 
 def in_written_order(bench: Tree, texts: Iterable[str]) -> Tree:
-    """`bench` with its tables as in the one of these TOML texts that has its name.
+    """`bench` with its tables in the order of the TOML text with the same `name`.
 
-    What a text does not have keeps its place behind; without such a text it stays as it is.
+    Keys that the text lacks follow in their present order. `bench` is unchanged without a text.
     """
     for text in texts:
         try:
             written = tomllib.loads(text)
         except tomllib.TOMLDecodeError:
-            continue  # archived, and edited since; its trials stand for themselves
+            continue  # edited since it was archived; the trials remain valid
         if written.get("name") == bench.get("name"):
             ordered: Tree = _ordered(bench, written)
             return ordered

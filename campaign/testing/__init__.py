@@ -1,4 +1,4 @@
-"""What a lab tests its own kinds with; `docs/developers/writing-a-backend.md` shows how.
+"""Checks for a laboratory's own plug-ins; see `docs/developers/writing-a-backend.md`.
 
 ```python
 @pytest.mark.parametrize("name", backend_checks())
@@ -6,7 +6,7 @@ def test_backend(name: str) -> None:
     backend_checks()[name](UNDER_TEST)
 ```
 
-`known` makes experiments, friction models, methods and backends of a test known to the program.
+`known` registers a test's experiments, friction models, methods and backends with the program.
 """
 
 from __future__ import annotations

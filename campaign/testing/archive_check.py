@@ -20,7 +20,7 @@ _AT = "2000-01-01T00:00:00Z"
 def archived_as_recorded(
     trial: Trial, channels: tuple[ChannelInfo, ...], recording: Recording
 ) -> None:
-    """Archive the recording, seal it, read it back. Raises CheckFailedError where they differ."""
+    """Archive, seal and read back the recording. Raises CheckFailedError if they differ."""
     with tempfile.TemporaryDirectory() as folder:
         try:
             path = _sealed(Path(folder), trial, channels, recording)

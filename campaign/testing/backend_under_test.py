@@ -10,25 +10,25 @@ from campaign.trial import Trial
 
 
 class CheckFailedError(AssertionError):
-    """What the backend did, and what the interface asks for."""
+    """Behavior of the backend that violates the interface."""
 
 
 @dataclass(frozen=True)
 class BackendUnderTest:
-    """A backend and what it is tried with.
+    """A backend and the trials to check it with.
 
     Attributes:
-        open: makes a new one, not yet entered.
-        possible: a trial that it executes to its end; several seconds of bench time, so that a stop
-            finds it under way, and no `stop_rate`.
-        impossible: a trial that it has to refuse.
-        names: what the refusal has to name: the field, such as `base_acceleration`.
-        most_blocks: how many blocks of samples may still come once a stop was asked for.
-        failing: makes a backend whose bench fails during `possible`; None when that cannot be had.
-        live: whether it moves something in the time of the wall clock, as its `BackendKind` says;
-            `possible` then has to take as long as it says.
-        stop_outside: stops the bench as a person beside the program would, e.g. by
-            `campaign stop`, and returns once that is confirmed; of a `SupportsExternalStop` only.
+        open: creates a new backend, not yet entered.
+        possible: an executable trial without `stop_rate`; several seconds of bench time, so that
+            a stop can interrupt it.
+        impossible: a trial that the backend must refuse.
+        names: field that the refusal must name, such as `base_acceleration`.
+        most_blocks: maximum number of blocks after a stop request.
+        failing: creates a backend whose bench fails during `possible`; None if not available.
+        live: whether the bench moves in wall-clock time, as declared by its `BackendKind`;
+            `possible` must then take its stated duration.
+        stop_outside: stops the bench from outside the program, e.g. by `campaign stop`, and
+            returns after the confirmation; only for a `SupportsExternalStop`.
     """
 
     open: Callable[[], Backend]

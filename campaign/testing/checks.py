@@ -18,14 +18,14 @@ from campaign.trial import Trial, canonical_json
 from campaign.units import factor
 
 LATEST = 0.2
-"""s; older a sample of a live backend may not become before it is handed over."""
+"""s; maximum age of a live backend's sample at its delivery."""
 PATIENCE = 30.0
-"""s of the wall clock for what has to come back."""
+"""s of wall-clock time until a call must return."""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,62}\Z")
 
 
 def backend_checks() -> dict[str, Check]:
-    """Every check by its name, which says what is demanded."""
+    """All checks by name; the name states the requirement."""
     checks = (
         accepts_a_possible_trial,
         refuses_an_impossible_trial_naming_the_field,
@@ -59,7 +59,7 @@ def backend_checks() -> dict[str, Check]:
 
 
 def accepts_a_possible_trial(under_test: BackendUnderTest) -> None:
-    """`refuses` is None for what can be executed, before anything is connected and after."""
+    """`refuses` returns None for an executable trial, before and after connecting."""
     backend = under_test.open()
     reason = backend.refuses(under_test.possible)
     require(reason is None, f"refuses() said {reason!r} of the possible trial")
@@ -69,7 +69,7 @@ def accepts_a_possible_trial(under_test: BackendUnderTest) -> None:
 
 
 def refuses_an_impossible_trial_naming_the_field(under_test: BackendUnderTest) -> None:
-    """`refuses` says why, with the name of the field that a user can change."""
+    """`refuses` states the reason and names the field that a user can change."""
     reason = under_test.open().refuses(under_test.impossible)
     require(reason, "refuses() had nothing against the impossible trial")
     named = under_test.names in str(reason)
@@ -77,26 +77,26 @@ def refuses_an_impossible_trial_naming_the_field(under_test: BackendUnderTest) -
 
 
 def announces_channels_once_before_samples(under_test: BackendUnderTest) -> None:
-    """`start` comes once, and first."""
+    """`start` is called once, before any sample."""
     recorder, _ = _executed(under_test)
     require(not recorder.order, "; ".join(recorder.order))
     require(recorder.channels, "no channel was announced")
 
 
 def announces_the_channels_it_names(under_test: BackendUnderTest) -> None:
-    """What `channels` says of a trial, before or after connecting, is what is then announced."""
+    """`channels`, before and after connecting, names the channels that are then announced."""
     trial = under_test.possible
     with under_test.open() as backend:
         named = (under_test.open().channels(trial), backend.channels(trial))
         recorder, _ = _on(backend, trial)
     announced = {info.name for info in recorder.channels}
     for names in named:
-        told = f"channels() named {sorted(names or ())}, and {sorted(announced)} were announced"
-        require(names is None or names == announced, told)
+        message = f"channels() named {sorted(names or ())}, and {sorted(announced)} were announced"
+        require(names is None or names == announced, message)
 
 
 def holds_slower_channels(under_test: BackendUnderTest) -> None:
-    """A channel with a rate of its own changes no more often than that, and is never filled."""
+    """A channel with its own rate changes at most at that rate; its values are held."""
     recording, _ = _recorded(under_test)
     rate = under_test.possible.task.sample_rate
     for name, channel in recording.channels.items():
@@ -104,13 +104,13 @@ def holds_slower_channels(under_test: BackendUnderTest) -> None:
         if own is None:
             continue
         require(0 < own <= rate, f"{name}: its own rate is {own:g} Hz of {rate:g} Hz recorded")
-        changes = int(np.count_nonzero(np.diff(channel.samples)))  # NaN differs from anything
+        changes = int(np.count_nonzero(np.diff(channel.samples)))  # NaN differs from any value
         most = own * len(recording.time) / rate + 1
         require(changes <= most, f"{name}: {changes} values at {own:g} Hz; at most {most:g} can be")
 
 
 def describes_channels_in_known_units(under_test: BackendUnderTest) -> None:
-    """Names an archive can have, none twice; an SI unit that converts to the one displayed."""
+    """Names are unique and valid in an archive; the SI unit converts to the displayed unit."""
     recorder, _ = _executed(under_test)
     names = [info.name for info in recorder.channels]
     require(len(set(names)) == len(names), f"two channels share a name: {', '.join(names)}")
@@ -144,14 +144,14 @@ def keeps_the_promised_sample_times(under_test: BackendUnderTest) -> None:
 
 
 def keeps_the_duration_without_gaps(under_test: BackendUnderTest) -> None:
-    """A completed trial has all samples of its duration, give or take one, and none is missing."""
+    """A completed trial has all samples of its duration (±1), and all are finite."""
     recording, ending = _recorded(under_test)
-    told = f"{ending.outcome}: {ending.reason}"
-    require(ending.outcome is Outcome.COMPLETED, f"the possible trial ended as {told}")
+    outcome = f"{ending.outcome}: {ending.reason}"
+    require(ending.outcome is Outcome.COMPLETED, f"the possible trial ended as {outcome}")
     task = under_test.possible.task
     wanted = task.duration * task.sample_rate
-    found = len(recording.time)
-    require(abs(found - wanted) <= 1, f"{found} samples in place of {wanted:g}")
+    count = len(recording.time)
+    require(abs(count - wanted) <= 1, f"{count} samples in place of {wanted:g}")
     for name, channel in recording.channels.items():
         missing = int(np.count_nonzero(~np.isfinite(channel.samples)))
         require(not missing, f"{name}: {missing} samples are missing in a completed trial")
@@ -166,7 +166,7 @@ def ends_as_it_says(under_test: BackendUnderTest) -> None:
 
 
 def ends_a_failing_trial_as_a_fault(under_test: BackendUnderTest) -> None:
-    """A bench that fails is an ending that names fault and reason, and no exception."""
+    """A failing bench results in an ending with fault and reason, not in an exception."""
     if under_test.failing is None:
         return
     try:
@@ -174,13 +174,13 @@ def ends_a_failing_trial_as_a_fault(under_test: BackendUnderTest) -> None:
             ending = backend.execute(under_test.possible, StrictRecorder(), lambda: False)
     except BackendError as error:
         raise CheckFailedError(f"a failing bench raised BackendError: {error}") from error
-    told = f"a failing bench ended the trial as {ending.outcome}"
-    require(ending.outcome in (Outcome.FAULT, Outcome.LIMIT, Outcome.DIVERGED), told)
+    message = f"a failing bench ended the trial as {ending.outcome}"
+    require(ending.outcome in (Outcome.FAULT, Outcome.LIMIT, Outcome.DIVERGED), message)
     _consistent(ending)
 
 
 def stops_in_mid_trial(under_test: BackendUnderTest) -> None:
-    """Once `stopped()` is true the trial ends within a few blocks, interrupted and safe."""
+    """After `stopped()` becomes true, the trial ends within a few blocks, interrupted and safe."""
     asked_after = 1
     recorder = StrictRecorder()
     _interrupted(under_test, recorder, lambda: recorder.blocks >= asked_after)
@@ -190,7 +190,7 @@ def stops_in_mid_trial(under_test: BackendUnderTest) -> None:
 
 
 def stops_before_the_first_sample(under_test: BackendUnderTest) -> None:
-    """A stop that is already asked for ends the trial at once."""
+    """A stop requested before the trial ends it immediately."""
     recorder = StrictRecorder()
     _interrupted(under_test, recorder, lambda: True)
     allowed = under_test.most_blocks
@@ -198,7 +198,7 @@ def stops_before_the_first_sample(under_test: BackendUnderTest) -> None:
 
 
 def makes_safe_as_often_as_asked(under_test: BackendUnderTest) -> None:
-    """Before any trial, after one, and once more: confirmed every time."""
+    """`make_safe` confirms before a trial, after it, and when called again."""
     with under_test.open() as backend:
         seen = [backend.make_safe()]
         backend.execute(under_test.possible, StrictRecorder(), lambda: False)
@@ -209,31 +209,31 @@ def makes_safe_as_often_as_asked(under_test: BackendUnderTest) -> None:
 
 
 def stops_no_other_trial(under_test: BackendUnderTest) -> None:
-    """Each trial has a stop flag of its own: one that was stopped stops none after it."""
+    """Each trial has its own stop flag: a stopped trial does not stop the next one."""
     with under_test.open() as backend:
         first = backend.execute(under_test.possible, StrictRecorder(), lambda: True)
         second = backend.execute(under_test.possible, StrictRecorder(), lambda: False)
     as_asked = (first.outcome, second.outcome) == (Outcome.INTERRUPTED, Outcome.COMPLETED)
-    told = f"a trial that was stopped, and one that was not, ended as {first.outcome}"
-    require(as_asked, f"{told} and {second.outcome}")
+    message = f"a trial that was stopped, and one that was not, ended as {first.outcome}"
+    require(as_asked, f"{message} and {second.outcome}")
 
 
 def passes_the_supervision(under_test: BackendUnderTest) -> None:
-    """A run finds nothing wrong with it: channels, time, values, limits, length."""
-    found = supervised(under_test)
-    told = f"a run would end the possible trial as {found.ending.outcome}: {found.ending.reason}"
-    require(found.ending.outcome is Outcome.COMPLETED, told)
+    """The supervision of a run accepts channels, time, values, limits and length."""
+    end = supervised(under_test)
+    message = f"a run would end the possible trial as {end.ending.outcome}: {end.ending.reason}"
+    require(end.ending.outcome is Outcome.COMPLETED, message)
 
 
 def is_ended_at_a_limit_and_made_safe(under_test: BackendUnderTest) -> None:
-    """It stops once the supervision has found a limit exceeded, and its bench is made safe."""
+    """It stops after the supervision detects an exceeded limit; its bench is made safe."""
     recording, _ = _recorded(under_test)
     watched, channel = with_narrow_limit(under_test, recording)
     _ended(under_test, Outcome.LIMIT, f"{channel} exceeded its limit", watched=watched)
 
 
 def is_ended_at_an_undefined_sample(under_test: BackendUnderTest) -> None:
-    """It stops once the supervision has found a sample undefined, and its bench is made safe."""
+    """It stops after the supervision detects an undefined sample; its bench is made safe."""
 
     def undefined(time: Array, block: Array) -> tuple[Array, Array]:
         return time, np.full_like(block, np.nan)
@@ -242,7 +242,7 @@ def is_ended_at_an_undefined_sample(under_test: BackendUnderTest) -> None:
 
 
 def is_ended_when_its_time_stands_still(under_test: BackendUnderTest) -> None:
-    """It stops once the supervision has found its time standing, and its bench is made safe."""
+    """It stops after the supervision detects a time that stands still; its bench is made safe."""
 
     def standing(time: Array, block: Array) -> tuple[Array, Array]:
         return np.zeros_like(time), block
@@ -251,7 +251,7 @@ def is_ended_when_its_time_stands_still(under_test: BackendUnderTest) -> None:
 
 
 def hands_samples_over_in_time(under_test: BackendUnderTest) -> None:
-    """Live: as they are taken, at most 0.2 s of them at a time, but for a hiccup of the host."""
+    """Live: the median block spans at most 0.2 s; single delays of the host are allowed."""
     if not under_test.live:
         return
     recorder, ending = _executed(under_test)
@@ -262,7 +262,7 @@ def hands_samples_over_in_time(under_test: BackendUnderTest) -> None:
 
 
 def is_made_safe_while_it_hangs(under_test: BackendUnderTest) -> None:
-    """Live: `make_safe` from another thread gets through while `execute` does not come back."""
+    """Live: `make_safe` works from another thread while `execute` does not return."""
     if not under_test.live:
         return
     state = got_through(under_test, PATIENCE)
@@ -271,19 +271,19 @@ def is_made_safe_while_it_hangs(under_test: BackendUnderTest) -> None:
 
 
 def executes_twice(under_test: BackendUnderTest) -> None:
-    """A second trial starts at time 0 and is as long as the first, with the same channels."""
+    """A second trial starts at time 0, with the length and channels of the first."""
     with under_test.open() as backend:
-        found = [_on(backend, under_test.possible) for _ in range(2)]
-    (first, _), (second, ending) = found
+        executions = [_on(backend, under_test.possible) for _ in range(2)]
+    (first, _), (second, ending) = executions
     require(ending.outcome is Outcome.COMPLETED, f"the second ended as {ending.outcome}")
     require(first.channels == second.channels, "the second announced other channels")
-    times = [recorder.recording(ending).time for recorder, ending in found]
+    times = [recorder.recording(ending).time for recorder, ending in executions]
     same = np.array_equal(times[0], times[1])
     require(same, f"{len(times[0])} samples first, then {len(times[1])}, or at other times")
 
 
 def lets_go_when_left(under_test: BackendUnderTest) -> None:
-    """What was left can be had again at once: by a new backend, and by the same one."""
+    """After leaving, a new backend and the same one can be entered again immediately."""
     first = under_test.open()
     for which, backend in (("first", first), ("second", under_test.open()), ("first", first)):
         try:
@@ -295,7 +295,7 @@ def lets_go_when_left(under_test: BackendUnderTest) -> None:
 
 
 def lets_exceptions_pass(under_test: BackendUnderTest) -> None:
-    """Leaving hides no exception of whoever used it."""
+    """Leaving suppresses no exception of the caller."""
     try:
         with under_test.open():
             raise KeyError("of the user")
@@ -305,7 +305,7 @@ def lets_exceptions_pass(under_test: BackendUnderTest) -> None:
 
 
 def records_what_can_be_archived(under_test: BackendUnderTest) -> None:
-    """A run with this one trial is sealed, and reads back as it was recorded."""
+    """A run of this trial is sealed and reads back as recorded."""
     recorder, ending = _executed(under_test)
     require(recorder.blocks, "nothing was recorded")
     archived_as_recorded(under_test.possible, recorder.channels, recorder.recording(ending))
@@ -335,16 +335,14 @@ def _ended(
     watched: Trial | None = None,
     disturb: Disturb = lambda time, block: (time, block),
 ) -> None:
-    """Execute under a supervision that ends the trial, as `outcome`."""
-    found = supervised(under_test, watched=watched, disturb=disturb)
-    told = f"{why}, and the trial ended as {found.ending.outcome}: {found.ending.reason}"
-    require(found.ending.outcome is outcome, told)
+    """Execute under a supervision that ends the trial; require `outcome`."""
+    end = supervised(under_test, watched=watched, disturb=disturb)
+    message = f"{why}, and the trial ended as {end.ending.outcome}: {end.ending.reason}"
+    require(end.ending.outcome is outcome, message)
     allowed = under_test.most_blocks
-    require(
-        found.after <= allowed, f"{why}; {found.after} blocks came after; at most {allowed} may"
-    )
+    require(end.after <= allowed, f"{why}; {end.after} blocks came after; at most {allowed} may")
     if under_test.live:
-        safe = found.made_safe and found.made_safe[-1] is SafeState.CONFIRMED
+        safe = end.made_safe and end.made_safe[-1] is SafeState.CONFIRMED
         require(safe, f"{why}; make_safe() then did not answer CONFIRMED")
 
 
@@ -354,8 +352,8 @@ def _interrupted(
     with under_test.open() as backend:
         ending = backend.execute(under_test.possible, recorder, stopped)
         state = backend.make_safe()
-    told = f"a stopped trial ended as {ending.outcome}, not as interrupted"
-    require(ending.outcome is Outcome.INTERRUPTED, told)
+    message = f"a stopped trial ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, message)
     _consistent(ending)
     require(state is SafeState.CONFIRMED, "the safe state was not confirmed after a stop")
 
@@ -374,7 +372,7 @@ def _consistent(ending: Ending) -> None:
 
 
 def executes_together_what_it_does_alone(under_test: BackendUnderTest) -> None:
-    """Of trials executed together each has the samples that it has alone, and its own end."""
+    """Each of several trials executed together has the samples it has alone, and its own ending."""
     with under_test.open() as backend:
         if not isinstance(backend, ExecutesTogether):
             return
@@ -385,7 +383,7 @@ def executes_together_what_it_does_alone(under_test: BackendUnderTest) -> None:
             backend.group(trial) == backend.group(trial.model_copy(update={"number": 2})),
             "group() of two trials that differ in their number only is not the same",
         )
-        # Each has noise of its own. The second one is stopped at once: that is its own affair.
+        # Each has its own noise. The stop of the second trial must not affect the others.
         trials = [
             trial.model_copy(update={"number": number, "seed": trial.seed + number})
             for number in range(1, most + 1)
@@ -421,11 +419,11 @@ def _require_equal(alone: Recording, together: Recording) -> None:
 
 
 def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
-    """Once stopped it says by whom, and moves again only after just that stop was cleared."""
+    """A stopped bench names the source of the stop; it moves only after that stop is cleared."""
     with under_test.open() as backend:
         if not isinstance(backend, SupportsExternalStop):
-            told = "a way to stop it is given (stop_outside), but it cannot report a stop"
-            require(under_test.stop_outside is None, told)
+            text = "a way to stop it is given (stop_outside), but it cannot report a stop"
+            require(under_test.stop_outside is None, text)
             return
         require(under_test.stop_outside, "it can be stopped from outside: stop_outside says how")
         require(backend.panic_stop() is None, "it is stopped before a stop was sent")
@@ -433,37 +431,37 @@ def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
         first = _found(backend)
         _moves_nothing(under_test.possible, backend)
         backend.make_safe()
-        _found(backend)  # nor does coming to rest clear it
+        _found(backend)  # make_safe() must not clear the stop
         _does_not_clear(backend, first.count + 1)
         _stop(under_test)
         _does_not_clear(backend, first.count)
         backend.clear_stop(_found(backend).count)
         require(backend.panic_stop() is None, "it is stopped after the stop was cleared")
         ending = _execute(under_test.possible, backend, StrictRecorder())
-        told = f"after the stop was cleared, the trial ended as {ending.outcome}: {ending.reason}"
-        require(ending.outcome is Outcome.COMPLETED, told)
+        text = f"after the stop was cleared, the trial ended as {ending.outcome}: {ending.reason}"
+        require(ending.outcome is Outcome.COMPLETED, text)
 
 
 def _stopped_in_mid_trial(under_test: BackendUnderTest, backend: Backend) -> None:
     recorder = StrictRecorder(lambda count: _stop(under_test) if count == 1 else None)
     ending = _execute(under_test.possible, backend, recorder)
-    told = f"a trial stopped from outside ended as {ending.outcome}, not as interrupted"
-    require(ending.outcome is Outcome.INTERRUPTED, told)
+    message = f"a trial stopped from outside ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, message)
 
 
 def _moves_nothing(trial: Trial, backend: Backend) -> None:
     recorder = StrictRecorder()
     ending = _execute(trial, backend, recorder)
     require(not recorder.blocks, f"{recorder.blocks} blocks were recorded on a stopped bench")
-    told = f"a trial on a stopped bench ended as {ending.outcome}, not as interrupted"
-    require(ending.outcome is Outcome.INTERRUPTED, told)
+    message = f"a trial on a stopped bench ended as {ending.outcome}, not as interrupted"
+    require(ending.outcome is Outcome.INTERRUPTED, message)
 
 
 def _found(backend: SupportsExternalStop) -> PanicStop:
-    found = backend.panic_stop()
-    if found is None or not found.by.strip():
-        raise CheckFailedError(f"panic_stop() answered {found!r} on a stopped bench")
-    return found
+    stop = backend.panic_stop()
+    if stop is None or not stop.by.strip():
+        raise CheckFailedError(f"panic_stop() answered {stop!r} on a stopped bench")
+    return stop
 
 
 def _does_not_clear(backend: SupportsExternalStop, count: int) -> None:

@@ -1,4 +1,4 @@
-"""Kinds of a test that are not installed."""
+"""Plug-ins that a test registers without installation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AnyKind = Experiment | FrictionModel | CompensationMethod | BackendKind | Export
 
 @contextmanager
 def known(*kinds: AnyKind) -> Iterator[None]:
-    """Within the block, protocols and benches can name `kinds`, as if they were installed."""
+    """Register `kinds` for protocols and benches within the block, as if they were installed."""
     with ExitStack() as stack:
         for kind in kinds:
             stack.enter_context(_room(kind).including(kind))

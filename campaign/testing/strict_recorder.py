@@ -11,19 +11,19 @@ from campaign.recording import Array, ChannelInfo, Ending, Event, MemoryRecorder
 
 
 class StrictRecorder:
-    """Keeps what it is given as a `MemoryRecorder`, and every slip in words.
+    """Recorder that keeps samples like `MemoryRecorder`, and a text for each violation.
 
-    Nothing is raised while the backend runs: it might take the exception for its own.
+    It raises nothing while the backend runs: the backend might handle the exception as its own.
 
     Attributes:
-        order: slips in the order of calls.
-        shapes: slips in the shape, type or time of blocks and events.
-        blocks: how many were appended.
-        sizes: how many samples each of them had.
+        order: violations of the order of calls.
+        shapes: violations of shape, type or time of blocks and events.
+        blocks: number of appended blocks.
+        sizes: samples per block without violation.
     """
 
     def __init__(self, on_block: Callable[[int], None] = lambda count: None) -> None:
-        """`on_block` is told the number of blocks after each."""
+        """`on_block` is called with the number of blocks after each block."""
         self.order: list[str] = []
         self.shapes: list[str] = []
         self.channels: tuple[ChannelInfo, ...] = ()
@@ -51,7 +51,7 @@ class StrictRecorder:
             self.shapes.append(f"block {self.blocks}: {slip}")
         else:
             self.sizes.append(len(time))
-            # A backend may fill the same array again; what was handed over must not change.
+            # A backend may reuse the array; the recorded samples must not change.
             self._memory.append(time.copy(), block.copy())
         self._on_block(self.blocks)
 
@@ -64,7 +64,7 @@ class StrictRecorder:
         self._memory.event(event)
 
     def recording(self, ending: Ending) -> Recording:
-        """All blocks without a slip."""
+        """All blocks without a violation."""
         return self._memory.recording(ending)
 
     def _slip(self, time: Array, block: Array) -> str:

@@ -30,19 +30,19 @@ from campaign.testing.backend_under_test import BackendUnderTest, CheckFailedErr
 from campaign.trial import Trial
 
 OTHERS = 1e300
-"""What the limits are that a check is not about."""
+"""Value of limits that a check does not test (practically unlimited)."""
 
 Disturb = Callable[[Array, Array], tuple[Array, Array]]
-"""Changes a block of samples, time (n,) and (channels, n), on its way to the recorder."""
+"""Function that changes a block, time (n,) and samples (channels, n), before the recorder."""
 
 
 @dataclass
 class SupervisedEnd:
-    """What came of a trial under supervision.
+    """Result of a supervised trial.
 
     Attributes:
-        after: blocks that the backend handed over once its trial was over.
-        made_safe: what `make_safe` answered, in order.
+        after: number of blocks that the backend delivered after its trial was stopped.
+        made_safe: answers of `make_safe`, in order.
     """
 
     ending: Ending
@@ -59,8 +59,8 @@ def supervised(
 ) -> SupervisedEnd:
     """Execute the possible trial as a run does.
 
-    The supervision is handed `watched` in its place, whose limits the backend itself does not know,
-    and samples that are disturbed.
+    The supervision receives `watched` instead, with limits that the backend does not know, and the
+    samples after `disturb`.
     """
     with under_test.open() as backend:
         between = _Between(backend, under_test.possible, disturb)
@@ -75,10 +75,10 @@ def supervised(
 
 
 def with_narrow_limit(under_test: BackendUnderTest, recording: Recording) -> tuple[Trial, str]:
-    """The possible trial with one limit at half of what it reaches; also which channel that is."""
+    """The possible trial with one limit at half of the recorded maximum, and its channel."""
     for each in WATCHED:
         if each.limit == "rate" or each.channel not in recording.channels:
-            continue  # a mean needs not exceed what a sample does
+            continue  # this limit applies to a mean, which may stay below a sample's maximum
         reached = float(np.max(np.abs(recording[each.channel])))
         if reached > 0:
             limits = dict.fromkeys(("angle", "rate", "acceleration", "torque", "current"), OTHERS)
@@ -90,7 +90,7 @@ def with_narrow_limit(under_test: BackendUnderTest, recording: Recording) -> tup
 
 
 def got_through(under_test: BackendUnderTest, patience: float) -> SafeState:
-    """What `make_safe` answers within `patience` (s) while `execute` hangs in its recorder."""
+    """Answer of `make_safe` within `patience` (s) while `execute` hangs in its recorder."""
     recorder = _Hanging()
     answers: list[SafeState] = []
     stop = threading.Event()
@@ -117,7 +117,7 @@ def got_through(under_test: BackendUnderTest, patience: float) -> SafeState:
 
 
 class _Hanging(MemoryRecorder):
-    """Takes the first samples, and does not come back from that."""
+    """Recorder that blocks in its first `append` until released."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -131,7 +131,7 @@ class _Hanging(MemoryRecorder):
 
 
 class _Between:
-    """Hands the backend its own trial, and what it records on to the supervision."""
+    """Passes the backend its own trial, and the supervision its samples."""
 
     def __init__(self, backend: Backend, trial: Trial, disturb: Disturb) -> None:
         self._backend, self._trial, self._disturb = backend, trial, disturb

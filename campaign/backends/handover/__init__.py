@@ -1,1 +1,1 @@
-"""What `campaign.backends.files` is made of: folders for a person at a rig, and what comes back."""
+"""Parts of `campaign.backends.files`: folders for a person at a rig, and returned recordings."""

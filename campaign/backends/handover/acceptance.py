@@ -27,24 +27,24 @@ from campaign.signals import Zero
 from campaign.trial import Trial
 
 START = 0.02
-"""of the angle limit, by which a trial may begin beside where it was asked to."""
+"""Tolerance of the start angle as a share of the angle limit."""
 STOPPED = 20
-"""samples over which the rate that ends a trial is averaged: a person has looked at it as well."""
+"""Samples over which the rate that ends a trial is averaged; a person has also observed it."""
 GO_ON = 40
-"""samples that are asked for behind that rate ..."""
+"""Samples that are requested after that rate ..."""
 FEWEST = 8
-"""... of which as many are kept as it takes to have these above half of the last rate: a light load
-passes the rate within one or two, and nothing is told of what it did there. With 40 the breakaway
-torque of a load of 70 kg m^2 is 0.3 % off, whose 20 before are enough."""
+"""... of which so many are kept that this number is above half of the largest rate: a light load
+passes the rate within one or two samples, too few for its motion. With 40 the breakaway torque of
+a load of 70 kg m^2 is 0.3 % off; its 20 samples before are sufficient."""
 LIMITED = {DRIVE_TORQUE: "torque", MOTOR_CURRENT: "current"}
-"""The limit of a bench that holds a torque, by channel."""
+"""Limit of the bench that applies to a torque, by channel."""
 
 
 class RefusedRecording(Exception):  # noqa: N818 - of a recording, not of this program
-    """A recording that is not what was asked.
+    """A recording that does not fit its trial.
 
     Attributes:
-        recording: what there is of it, None when it cannot be read.
+        recording: the refused recording; None if it is unreadable.
     """
 
     def __init__(
@@ -61,54 +61,54 @@ def accepted_recording(
     others: Sequence[Trial],
     may_clip: Collection[str] = (),
 ) -> ReturnedRecording:
-    """The recording as it is archived. Raises RefusedRecording when it is not what was asked.
+    """The recording to archive. Raises RefusedRecording if it does not fit the trial.
 
     Args:
-        others: trials whose recording it could be instead.
-        may_clip: channels that may stand at their limit.
+        others: trials to which the recording could belong instead.
+        may_clip: channels that may be clipped.
     """
     task = trial.task
     recording, stopped = _until_stopped(trial, recording)
     asked = task.command.sample(recording.time)
-    if found := checks.wrong_length(task, len(recording.time), stopped):
-        raise RefusedRecording(found, recording)
+    if problem := checks.wrong_length(task, len(recording.time), stopped):
+        raise RefusedRecording(problem, recording)
     good = ~recording.lost
     series = {name: values[good] for name, values in recording.by_name.items()}
     for name, values in series.items():
         if not np.isfinite(values).all():
             first = int(np.argmax(~np.isfinite(recording[name]) & good))
-            told = f"{name} has no value at {recording.time[first]:.6g} s"
-            raise RefusedRecording(checks.RecordingProblem("undefined", told), recording)
+            text = f"{name} has no value at {recording.time[first]:.6g} s"
+            raise RefusedRecording(checks.RecordingProblem("undefined", text), recording)
     if not good.any():
         raise RefusedRecording(
             checks.RecordingProblem("undefined", "all of its samples are missing"), recording
         )
     asked = asked[good]
-    found, limits, words = None, _limits(trial), partial(shown, trial)
+    problem, limits, words = None, _limits(trial), partial(shown, trial)
     if limits is not None and RELATIVE_ANGLE in series:
-        found = checks.wrong_start(task, series[RELATIVE_ANGLE], START * limits.angle, words)
-    if found is None and COMMAND in series:
-        theirs = {
+        problem = checks.wrong_start(task, series[RELATIVE_ANGLE], START * limits.angle, words)
+    if problem is None and COMMAND in series:
+        commands = {
             other.name: other.task.command.sample(recording.time)[good]
             for other in others
             if other.task.mode == task.mode
         }
-        found = checks.wrong_command(series[COMMAND], asked, task.sample_rate, theirs, words)
-    found = found or checks.wrong_motion(task, series, asked)
+        problem = checks.wrong_command(series[COMMAND], asked, task.sample_rate, commands, words)
+    problem = problem or checks.wrong_motion(task, series, asked)
     unlimited = {name: values for name, values in series.items() if name not in may_clip}
-    found = found or checks.clipped(task, unlimited, asked, _torque_limits(trial), words)
-    if found is not None:
-        raise RefusedRecording(found, recording)
+    problem = problem or checks.clipped(task, unlimited, asked, _torque_limits(trial), words)
+    if problem is not None:
+        raise RefusedRecording(problem, recording)
     return recording
 
 
 def _until_stopped(trial: Trial, recording: ReturnedRecording) -> tuple[ReturnedRecording, bool]:
-    """Up to the rate that ends the trial, and as far behind it as is needed; whether it got there.
+    """The recording up to the rate that ends the trial and some samples more; whether reached.
 
-    Nothing behind that rate breaks a limit.
+    It is cut before any sample beyond a limit after that rate.
     """
     bound, still = trial.task.stop_rate, isinstance(trial.task.base_acceleration, Zero)
-    # Of a hull at rest the gyro tells the same rate, and is not differenced from an encoder.
+    # With the hull at rest the gyro shows the same rate, without differentiation of an encoder.
     names = (GYRO_RATE, RELATIVE_RATE) if still else (RELATIVE_RATE,)
     name = next((name for name in names if name in recording.by_name), None)
     if bound is None or name is None:
@@ -123,14 +123,14 @@ def _until_stopped(trial: Trial, recording: ReturnedRecording) -> tuple[Returned
     remark = f"{name} reached the rate that ends the trial"
     kept = recording.cut(_enough(np.abs(rate), reached), remark)
     if (violation := _violation(trial, kept)) is not None and violation.index > reached:
-        kept = recording.cut(violation.index, remark)  # it had reached it within the limits
+        kept = recording.cut(violation.index, remark)  # the rate was reached within the limits
     return kept, True
 
 
 def _enough(size: Array, reached: int) -> int:
-    """The first stop from `reached` on with `FEWEST` samples above half of the largest before it.
+    """First index from `reached` with `FEWEST` earlier samples above half of their largest.
 
-    At most `GO_ON` behind; `size` of the rate, shape (n,).
+    At most `GO_ON` after `reached`; `size`: magnitude of the rate, shape (n,).
     """
     for stop in range(reached, reached + GO_ON):
         part = size[:stop]
@@ -147,13 +147,13 @@ def _limits(trial: Trial) -> LimitsOptions | None:
 
 
 def _torque_limits(trial: Trial) -> dict[str, float]:
-    """By channel, the limit of the bench that may hold it."""
+    """Limits of the bench by channel of torque or current."""
     limits = _limits(trial)
     return {name: float(getattr(limits, key)) for name, key in LIMITED.items()} if limits else {}
 
 
 def not_completed(trial: Trial, recording: ReturnedRecording) -> str:
-    """Why the recorder will not take it for completed, in words; empty where it will."""
+    """Why the recorder will not accept the trial as completed; empty if it will."""
     if recording.lost.any():
         return f"lost samples: {int(recording.lost.sum())} of its samples are missing"
     violation = _violation(trial, recording)
@@ -161,7 +161,7 @@ def not_completed(trial: Trial, recording: ReturnedRecording) -> str:
 
 
 def _violation(trial: Trial, recording: ReturnedRecording) -> Violation | None:
-    """The first sample beyond a limit of the bench."""
+    """The first sample beyond a limit of the bench, or None."""
     limits = _limits(trial)
     if limits is None:
         return None

@@ -1,7 +1,7 @@
-"""Pure checks of returned series against what was requested.
+"""Pure checks of returned series against the requested ones.
 
-A command that was recorded has to be the one that was asked, sample by sample. Motion is only held
-against it by its sign and its size: how well a rig follows is what an experiment finds out.
+A recorded command must equal the requested one, sample by sample. A motion is compared only by sign
+and size: the tracking of a rig is the subject of the experiment.
 """
 
 from __future__ import annotations
@@ -24,44 +24,44 @@ from campaign.recording import Array
 from campaign.trial import Task
 
 TOLERANCE = 0.02
-"""of the RMS of a command: more is another command."""
+"""Largest RMS difference as a share of the command's RMS; beyond it, it is another command."""
 HELD = 2
-"""samples by which a command may be late: a controller holds each of its own."""
+"""Permitted delay of a command in samples: a controller holds its samples."""
 AGAINST = -0.3
-"""Correlation (about zero) below which something runs the other way round."""
+"""Correlation (about zero) below which a series has the opposite sign."""
 ALIKE = 0.9
 """Correlation above which two series have one shape."""
 LOUDER = 5.0
-"""Factor by which a motion may be larger or smaller than what was asked: friction takes a part."""
+"""Factor by which a motion may be larger or smaller than requested: friction takes a part."""
 FLAT = 8
-"""samples at one extreme value, at least, that are a clipped series."""
+"""Minimum number of consecutive samples at an extreme value of a clipped series."""
 SHARE = 0.005
-"""of a recording that they are, at least."""
+"""Minimum share of a recording for these samples."""
 LONG = 0.05
-"""of a recording that a series stands still while what it is to bring about changes."""
+"""Minimum share of a recording in which a series is constant while its effect changes."""
 CHANGE = 0.1
-"""of the RMS of the command that it changes by."""
+"""Minimum of that change as a share of the command's RMS."""
 LEVELS = 50
-"""between the extremes; of a series with fewer nobody can tell whether it is clipped."""
+"""Minimum number of levels between the extremes for a detection of clipping."""
 AT_LIMIT = 0.98
-"""of a bench's limit, from which a series is held by the limit itself."""
+"""Share of a bench's limit from which the limit itself holds a series."""
 
 RATES = (RELATIVE_RATE, GYRO_RATE)
 TORQUES = (DRIVE_TORQUE, MOTOR_CURRENT, JOINT_TORQUE)
 
 
 Told = Callable[[str, float], str]
-"""How a value (SI) of a channel is told, such as `5 deg/s`."""
+"""Formats a value (SI) of a channel, such as `5 deg/s`."""
 
 
 def plain(channel: str, value: float) -> str:
-    """A value as it is, for whoever has no trial to tell its unit."""
+    """Format of a value without a trial, hence without unit."""
     return f"{value:.6g}"
 
 
 @dataclass(frozen=True)
 class RecordingProblem:
-    """What is wrong with a recording: its name, and what was seen."""
+    """A problem of a recording: name and description."""
 
     name: str
     text: str
@@ -71,7 +71,7 @@ class RecordingProblem:
 
 
 def wrong_length(task: Task, samples: int, stopped: bool) -> RecordingProblem | None:
-    """A recording that ends too soon; `stopped`: at the rate that ends its trial."""
+    """Check for an early end; `stopped`: the rate that ends the trial was reached."""
     wanted = task.duration * task.sample_rate
     if stopped or samples >= wanted - 1:
         return None
@@ -85,7 +85,7 @@ def wrong_length(task: Task, samples: int, stopped: bool) -> RecordingProblem | 
 def wrong_start(
     task: Task, angle: Array, within: float, told: Told = plain
 ) -> RecordingProblem | None:
-    """A trial that began elsewhere: `angle` (n,) as recorded, `within` what it may be off by."""
+    """Check the start angle: `angle` (n,) as recorded, `within` its tolerance."""
     off = float(angle[0]) - task.start_angle
     if abs(off) <= within:
         return None
@@ -100,9 +100,9 @@ def wrong_start(
 def wrong_command(
     got: Array, asked: Array, rate: float, others: Mapping[str, Array], told: Told = plain
 ) -> RecordingProblem | None:
-    """Why a recorded command is not the one that was asked; both (n,), at `rate` (Hz).
+    """Compare a recorded command with the requested one; both (n,), at `rate` (Hz).
 
-    `others`: what was asked of other trials, by name.
+    `others`: requested commands of other trials, by name.
     """
     size = _rms(asked)
     if size == 0.0:
@@ -117,7 +117,9 @@ def wrong_command(
         return None
     if _rms(got) <= TOLERANCE * size:
         return RecordingProblem("no command", "nothing was commanded in all of the recording")
-    if _off(-got, asked) <= TOLERANCE:  # before its delay: out and back is back and out, later
+    if (
+        _off(-got, asked) <= TOLERANCE
+    ):  # before the delay: the negative of a symmetric command resembles a late one
         return RecordingProblem("wrong sign", "the command is the negative of what was asked")
     lag = _lag(asked, got)
     if abs(lag) > HELD and _off(got, asked, lag, lag) <= TOLERANCE:
@@ -142,11 +144,11 @@ def wrong_command(
 
 
 def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> RecordingProblem | None:
-    """What moves against what was asked, or is far larger or smaller. `series` by channel, (n,)."""
+    """Check sign and size of the motion against the command. `series` by channel, (n,)."""
     still = task.base_acceleration.shape == "zero"
     for name in _following(task, still=still):
-        if name in series and (found := _against_command(name, series[name], asked)) is not None:
-            return found
+        if name in series and (problem := _against_command(name, series[name], asked)) is not None:
+            return problem
     if RELATIVE_RATE in series and RELATIVE_ANGLE in series:
         angle = series[RELATIVE_ANGLE] - series[RELATIVE_ANGLE][0]
         turned = np.cumsum(series[RELATIVE_RATE]) / task.sample_rate
@@ -155,8 +157,8 @@ def wrong_motion(task: Task, series: Mapping[str, Array], asked: Array) -> Recor
     if still and RELATIVE_RATE in series:
         for name in TORQUES[:2]:
             if name in series and _brakes(series[name], series[RELATIVE_RATE]):
-                told = f"{name} brakes in both directions what it is to move"
-                return RecordingProblem("wrong sign", told)
+                text = f"{name} brakes in both directions what it is to move"
+                return RecordingProblem("wrong sign", text)
     return None
 
 
@@ -167,11 +169,11 @@ def clipped(
     limits: Mapping[str, float],
     told: Told = plain,
 ) -> RecordingProblem | None:
-    """A torque or current that stays at one extreme value while it would have gone on.
+    """Detect a torque or current that stays at an extreme value, but should have changed.
 
-    Told from one that is steady by how it gets there, as steeply as before and then not at all; or
-    by what it is to bring about, which changes all the while.
-    `limits` of the bench, by channel: what stands at its limit is held by the bench itself.
+    A clipped series differs from a steady one by a sudden end of its slope, or by a change of the
+    command or rate error during the constant value.
+    `limits` of the bench, by channel: a series at its limit is limited by the bench, not clipped.
     """
     left = asked - series[RELATIVE_RATE] if RELATIVE_RATE in series else None
     left = asked if task.mode == "torque" else left
@@ -194,10 +196,10 @@ def clipped(
 
 
 def _following(task: Task, *, still: bool) -> tuple[str, ...]:
-    """The channels that have the command's sign.
+    """The channels that must have the command's sign.
 
-    A rate that follows a sine may be late by half a period for good reason, and the rate relative
-    to a hull that moves is not the one that is commanded.
+    A rate that follows a sine may legitimately be late by half a period. The rate relative to a
+    moving hull is not the commanded one.
     """
     if task.mode == "torque":
         return (DRIVE_TORQUE,) if task.compensation == "none" else ()
@@ -223,7 +225,7 @@ def _against_command(name: str, got: Array, asked: Array) -> RecordingProblem | 
 
 
 def _brakes(torque: Array, rate: Array) -> bool:
-    """Whether a torque is against the motion in both directions: friction never is a motor."""
+    """Whether a torque opposes the motion in both directions: friction never drives."""
     fast = 0.2 * float(np.max(np.abs(rate)))
     out, back = rate > fast, rate < -fast
     if not (fast and out.any() and back.any()):
@@ -233,7 +235,7 @@ def _brakes(torque: Array, rate: Array) -> bool:
 
 
 def _runs_at_top(values: Array) -> list[tuple[int, int]]:
-    """Begin and end of the stretches at the upper extreme; none where that is no large value."""
+    """Begin and end of the runs at the maximum; empty if the maximum is no large value."""
     top, span = float(np.max(values)), float(np.ptp(values))
     if span == 0.0 or top < 0.5 * float(np.max(np.abs(values))):
         return []
@@ -244,7 +246,7 @@ def _runs_at_top(values: Array) -> list[tuple[int, int]]:
 
 
 def _cut_off(values: Array, runs: Sequence[tuple[int, int]]) -> bool:
-    """Whether the series rises to its top as steeply as before, and stays there at once."""
+    """Whether the series rises steeply to its maximum and suddenly stays there."""
     if sum(end - begin for begin, end in runs) < max(1.0, SHARE * len(values)):
         return False
     top, span = float(np.max(values)), float(np.ptp(values))
@@ -262,7 +264,7 @@ def _cut_off(values: Array, runs: Sequence[tuple[int, int]]) -> bool:
 def _of_no_effect(
     runs: Sequence[tuple[int, int]], left: Array | None, count: int, asked: Array
 ) -> bool:
-    """Whether what is left to do changes during the longest run, and the series does not."""
+    """Whether `left` (command or rate error) changes during the longest run of constant values."""
     if not runs or left is None:
         return False
     begin, end = max(runs, key=lambda run: run[1] - run[0])
@@ -274,7 +276,7 @@ def _of_no_effect(
 
 
 def _lag(asked: Array, got: Array) -> int:
-    """Samples by which `got` is later than `asked`, where both are most alike."""
+    """Delay of `got` relative to `asked` (samples) at the largest correlation."""
     size = 1 << (len(asked) + len(got) - 1).bit_length()
     spectrum = np.fft.rfft(got, size) * np.conj(np.fft.rfft(asked, size))
     alike = np.fft.irfft(spectrum, size)
@@ -283,18 +285,18 @@ def _lag(asked: Array, got: Array) -> int:
 
 
 def _off(got: Array, asked: Array, first: int = -HELD, last: int = HELD) -> float:
-    """RMS of the difference over the RMS of what was asked, at the best lag of first to last."""
+    """RMS of the difference divided by the RMS of `asked`, at the best lag from first to last."""
     size = _rms(asked)
-    found = []
+    differences = []
     for lag in range(first, last + 1):
         a = asked[max(0, -lag) : len(asked) - max(0, lag)]
         b = got[max(0, lag) : len(got) - max(0, -lag)]
-        found.append(_rms(b - a) / size if len(a) else np.inf)
-    return float(min(found))
+        differences.append(_rms(b - a) / size if len(a) else np.inf)
+    return float(min(differences))
 
 
 def _correlation(a: Array, b: Array) -> float:
-    """About zero; 0 where one of them is nothing."""
+    """Correlation about zero; 0 if one series is zero."""
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float(a @ b) / size if size else 0.0
 
@@ -307,7 +309,7 @@ _FACTORS = (("degrees and radians", 180 / np.pi), ("rpm and rad/s", 30 / np.pi),
 
 
 def _factor(scale: float) -> str:
-    """A factor with what it may come from."""
+    """Text of a factor with its possible cause."""
     for name, value in _FACTORS:
         for known in (value, 1 / value):
             if abs(abs(scale) / known - 1.0) < TOLERANCE:

@@ -15,7 +15,7 @@ from campaign.text import nearest
 from campaign.trial import Trial
 
 NAME = "rig"
-"""What the layout of a first mapping is called."""
+"""Name of the layout in a first mapping."""
 _HEAD = """\
 # Which columns of the files that come back are which channels. As it stands, it reads files with
 # the headings `time`, `command` ... in the units given here: change `column` and `unit` to those
@@ -25,7 +25,7 @@ _HEAD = """\
 
 
 def read_layouts(path: Path) -> dict[str, Layout]:
-    """Every `[columns.NAME]` of a file. Raises ProtocolError with everything that is wrong."""
+    """All `[columns.NAME]` of a file. Raises ProtocolError with all problems."""
     try:
         source = read_source(path, path.name)
     except UnreadableError as error:
@@ -44,9 +44,9 @@ def read_layouts(path: Path) -> dict[str, Layout]:
 
 
 def layout_of(trial: Trial, known: Mapping[str, Layout], name: str, path: Path) -> Layout:
-    """The layout by which a trial is read: `name`, else the only one, else that of its name.
+    """Layout of a trial: `name`, else the only one, else that with the name of its test or mode.
 
-    That is the name of its test, or its mode: a command is a rate in one and a torque in the other.
+    Modes have different layouts, since a command is a rate in one and a torque in another.
     Raises ProtocolError.
     """
     if not name and len(known) == 1:
@@ -68,7 +68,7 @@ def layout_of(trial: Trial, known: Mapping[str, Layout], name: str, path: Path) 
 
 
 def requested_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The channels that some of `trials` require, with the command; and those of use to some."""
+    """The channels that some of `trials` require, with the command; and optional channels."""
     required = dict.fromkeys((COMMAND, *(name for trial in trials for name in trial.requires)))
     useful = dict.fromkeys(name for trial in trials for name in trial.can_use)
     return tuple(required), tuple(
@@ -77,7 +77,7 @@ def requested_channels(trials: Sequence[Trial]) -> tuple[tuple[str, ...], tuple[
 
 
 def first_mapping(trials: Sequence[Trial]) -> str:
-    """A mapping that names the channels asked for, to be made that of the rig."""
+    """Draft of a mapping with the requested channels, to be adapted to the rig."""
     modes = tuple(dict.fromkeys(trial.task.mode for trial in trials))
     text = _HEAD
     for mode in modes:

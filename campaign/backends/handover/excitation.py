@@ -1,4 +1,4 @@
-"""What a trial asks of a rig, as series: command and hull motion over time."""
+"""Excitation of a trial as series: command and hull motion over time."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ class Series:
 
     @property
     def heading(self) -> str:
-        """As the CSV file has it."""
+        """Heading in the CSV file."""
         return f"{self.name} ({self.unit})"
 
 
 def samples_of(task: Task) -> int:
-    """How many samples a trial has that lasts its whole duration."""
+    """Number of samples of a trial with its full duration."""
     return max(2, round(task.duration * task.sample_rate))
 
 
 def axis_of(trial: Trial) -> AxisKind:
-    """How the axis moves, as the trial's bench says it."""
+    """Kind of axis of the trial's bench."""
     axis = trial.bench.get("axis")
     kind = axis.get("kind", AxisKind.ROTARY) if isinstance(axis, dict) else AxisKind.ROTARY
     return AxisKind(str(kind))
 
 
 def shown(trial: Trial, channel: str, value: float) -> str:
-    """A value of a channel (SI) in the unit that a reader is shown, with it."""
+    """Text of a channel's value (SI) in its display unit."""
     if channel not in VOCABULARY:
         return f"{value:.6g}"
     axis = axis_of_channel(channel, sides_in(trial.bench))
@@ -57,7 +57,7 @@ def shown(trial: Trial, channel: str, value: float) -> str:
 
 
 def facts_of(trial: Trial) -> RigFacts:
-    """What of the trial's bench makes one channel of another; nothing where there is no bench."""
+    """Facts of the trial's bench to derive channels; empty without a valid bench."""
     try:
         return RigFacts.of(Bench.model_validate(trial.bench, context={"si": True}))
     except ValidationError:
@@ -65,7 +65,7 @@ def facts_of(trial: Trial) -> RigFacts:
 
 
 def excitation(trial: Trial) -> Sequence[Series]:
-    """Time, command and, where the hull is to move, its acceleration and rate."""
+    """Time, command and, for a moving hull, its acceleration and rate."""
     task, axis = trial.task, axis_of(trial)
     time = np.arange(samples_of(task)) / task.sample_rate
     unit = info(COMMAND, task.mode, axis=axis).unit
@@ -79,7 +79,7 @@ def excitation(trial: Trial) -> Sequence[Series]:
 
 
 def write_csv(series: Sequence[Series], path: Path) -> None:
-    """A line per sample with every digit that a float needs, units in the heading."""
+    """Write a line per sample with all digits of a float, units in the heading."""
     rows = zip(*(each.values.tolist() for each in series), strict=True)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(each.heading for each in series) + "\n")
@@ -87,7 +87,7 @@ def write_csv(series: Sequence[Series], path: Path) -> None:
 
 
 def write_mat(series: Sequence[Series], trial: Trial, attempt: int, path: Path) -> None:
-    """MAT version 5, numbers only: a column per series, and what of the trial is a number."""
+    """Write MAT version 5, numbers only: a column per series, and numbers of the trial."""
     from scipy.io import savemat
 
     task = trial.task

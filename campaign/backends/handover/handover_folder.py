@@ -1,14 +1,14 @@
 """The folder of a hand-over: outgoing files, returned files and their state.
 
-    FOLDER/handover.json                whose it is
-    FOLDER/columns.toml                 which columns of returned files are which channels
-    FOLDER/index.html                   for the person at the rig
-    FOLDER/trial-00017/                 what trial 17 asks, and its first attempt
-    FOLDER/trial-00017/returned/        where its recording is put
-    FOLDER/trial-00017/verdict.json     what became of that
-    FOLDER/trial-00017/attempt-2/       the same once more, when the first was refused
+    FOLDER/handover.json                run that owns the folder
+    FOLDER/columns.toml                 mapping of columns of returned files to channels
+    FOLDER/index.html                   page for the person at the rig
+    FOLDER/trial-00017/                 files of trial 17, and its first attempt
+    FOLDER/trial-00017/returned/        folder for its recording
+    FOLDER/trial-00017/verdict.json     verdict on the recording
+    FOLDER/trial-00017/attempt-2/       the next attempt after a refusal
 
-Whatever is written is whole or not there: it is renamed into place. What came back stays as it is.
+Files are written completely and then renamed. Returned files are never changed.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ VERDICT = "verdict.json"
 RETURNED = "returned"
 PAGE = "index.html"
 MARKS = ("done", "done.txt")
-"""A file of such a name in `returned` says that its recording is whole."""
+"""Names of a file in `returned` that marks the recording as complete."""
 UNFINISHED = (".part", ".tmp", ".crdownload", ".partial")
-"""Endings of files that somebody is still copying."""
+"""Extensions of incomplete copies."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a recording that came back.
+    """Verdict on a returned recording.
 
     Attributes:
-        reason: why it was refused; empty when it was taken.
+        reason: reason of the refusal; empty if it was accepted.
         files: SHA-256 by name.
-        columns: SHA-256 of the layout by which it was read.
+        columns: SHA-256 of the layout used to read it.
     """
 
     reason: str
@@ -54,7 +54,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Came:
-    """Where a file came back before."""
+    """Trial and attempt for which a file was returned earlier."""
 
     trial: int
     attempt: str
@@ -71,7 +71,7 @@ class Attempt:
 
     @property
     def name(self) -> str:
-        """For people, as in `trial-00017, attempt 2`."""
+        """Name for messages, as `trial-00017, attempt 2`."""
         return f"trial-{self.trial:05d}, attempt {self.number}"
 
     @property
@@ -80,7 +80,7 @@ class Attempt:
 
     @property
     def verdict(self) -> Verdict | None:
-        """What became of it; None while it is out."""
+        """Verdict on its recording; None while there is none."""
         tree = read_json(self.folder / VERDICT)
         if tree is None:
             return None
@@ -88,7 +88,7 @@ class Attempt:
         return Verdict(str(tree.get("refused", "")), files, str(tree.get("columns", "")))
 
     def judge(self, verdict: Verdict) -> None:
-        """Keep what became of it."""
+        """Write the verdict."""
         tree = {
             "refused": verdict.reason,
             "files": verdict.files,
@@ -98,21 +98,21 @@ class Attempt:
 
     @property
     def fingerprint(self) -> str:
-        """Of the trial that was handed out; empty when the manifest cannot be read."""
+        """Fingerprint of the exported trial; empty if the manifest is unreadable."""
         return str((read_json(self.folder / MANIFEST) or {}).get("fingerprint", ""))
 
     @property
     def files(self) -> list[Path]:
-        """What came back so far, by name: neither marks nor what is still being copied."""
+        """Returned files sorted by name, without marks and incomplete copies."""
         try:
-            found = sorted(self.returned.iterdir())
+            paths = sorted(self.returned.iterdir())
         except OSError:
             return []
-        return [path for path in found if path.is_file() and not _is_aside(path.name)]
+        return [path for path in paths if path.is_file() and not _is_aside(path.name)]
 
     @property
     def is_marked(self) -> bool:
-        """Whether somebody has said that all of it is there."""
+        """Whether a mark declares the recording complete."""
         return any((self.returned / mark).exists() for mark in MARKS)
 
 
@@ -127,7 +127,7 @@ class Places:
         return self.folder / COLUMNS
 
     def check_owner(self, run: str) -> None:
-        """Raises UsageError when the folder is another run's, or somebody's own."""
+        """Raise UsageError if the folder belongs to another run, or to no run."""
         owner = read_json(self.folder / OWNER)
         if owner is not None and (other := str(owner.get("run", ""))) != run:
             raise UsageError(
@@ -141,32 +141,32 @@ class Places:
             )
 
     def claim(self, run: str) -> None:
-        """The folder is that run's from now on. Raises BackendError when it cannot be written."""
+        """Note `run` as the owner of the folder. Raises BackendError if it is not writable."""
         if not (self.folder / OWNER).exists():
             with writing(self.folder):
                 self.folder.mkdir(parents=True, exist_ok=True)
             write_text(self.folder / OWNER, json_text({"run": run}) + "\n")
 
     def trials(self) -> list[int]:
-        """Numbers of those that were handed out, in order."""
+        """Numbers of the exported trials, in order."""
         names = [path.name.removeprefix("trial-") for path in self.folder.glob("trial-*")]
         numbers = sorted(int(name) for name in names if name.isdecimal())
         return [number for number in numbers if self.attempts(number)]
 
     def attempts(self, number: int) -> list[Attempt]:
-        """Those at a trial that were handed out, in order."""
+        """The exported attempts at a trial, in order."""
         first = self.folder / f"trial-{number:05d}"
         if not (first / MANIFEST).exists():
             return []
-        found = [Attempt(number, 1, first)]
-        while (folder := first / f"attempt-{len(found) + 1}").is_dir():
-            found.append(Attempt(number, len(found) + 1, folder))
-        return found
+        attempts = [Attempt(number, 1, first)]
+        while (folder := first / f"attempt-{len(attempts) + 1}").is_dir():
+            attempts.append(Attempt(number, len(attempts) + 1, folder))
+        return attempts
 
     def next_attempt(self, trial: Trial) -> tuple[Attempt, bool]:
-        """The attempt that is due, and whether it is handed out already.
+        """The due attempt, and whether it is already exported.
 
-        A new one is due when the last was refused, or was that of a trial that is another today.
+        A new one is due if the last was refused, or if the trial has changed since.
         """
         had = self.attempts(trial.number)
         if had and had[-1].fingerprint == trial.fingerprint:
@@ -179,24 +179,24 @@ class Places:
         return Attempt(trial.number, number, folder), False
 
     def came(self) -> dict[str, Came]:
-        """Every file that was judged, by its SHA-256, and for what it came back last."""
-        found: dict[str, Came] = {}
+        """Last use of every judged file, by its SHA-256."""
+        came_by_digest: dict[str, Came] = {}
         for number in self.trials():
             for attempt in self.attempts(number):
                 if (verdict := attempt.verdict) is not None:
-                    found |= came_by(attempt, verdict)
-        return found
+                    came_by_digest |= came_by(attempt, verdict)
+        return came_by_digest
 
 
 def came_by(attempt: Attempt, verdict: Verdict) -> dict[str, Came]:
-    """The files of one attempt, by their SHA-256."""
+    """Use of the files of one attempt, by their SHA-256."""
     came = Came(attempt.trial, attempt.name, verdict.columns)
     return {digest: came for digest in verdict.files.values() if digest}
 
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[Path]:
-    """A folder that is at `folder` when the block ends without an error. Raises BackendError."""
+    """Create `folder` completely, after the block, or not at all. Raises BackendError."""
     part = folder.with_name(f".{folder.name}.part")
     with writing(folder):
         shutil.rmtree(part, ignore_errors=True)
@@ -210,7 +210,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Within the block something is written; what fails is a BackendError that names it."""
+    """Convert an OSError of writing in the block to a BackendError that names `path`."""
     try:
         yield
     except OSError as error:
@@ -219,7 +219,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file whole, or not at all. Raises BackendError."""
+    """Write a file completely, or not at all. Raises BackendError."""
     part = path.with_name(f".{path.name}.part")
     with writing(path):
         part.write_text(text, encoding="utf-8", newline="\n")
@@ -227,7 +227,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
-    """The table in a file; None where there is none."""
+    """JSON table in a file; None without a valid one."""
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):

@@ -47,11 +47,11 @@ _SAFE = (
 
 @dataclass(frozen=True)
 class Row:
-    """A trial as the first page lists it.
+    """A trial in the list of the first page.
 
     Attributes:
         duration: s.
-        attempts: that were handed out; none yet where it is empty.
+        attempts: exported attempts with their verdicts; may be empty.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Row:
 
     @classmethod
     def of_trial(cls, trial: Trial, attempts: Sequence[Attempt]) -> Row:
-        """A trial of this session."""
+        """Row of a trial of this session."""
         return cls(
             trial.name,
             trial.label,
@@ -75,16 +75,16 @@ class Row:
 
     @classmethod
     def of_manifest(cls, attempts: Sequence[Attempt]) -> Row:
-        """A trial of an earlier session, as it was handed out."""
-        told = read_json(attempts[-1].folder / MANIFEST) or {}
-        task = told.get("task")
+        """Row of a trial of an earlier session, from its manifest."""
+        tree = read_json(attempts[-1].folder / MANIFEST) or {}
+        task = tree.get("task")
         duration = task.get("duration") if isinstance(task, dict) else None
         return cls(
-            str(told.get("name", "")),
-            str(told.get("label", "")),
-            str(told.get("role", "")),
+            str(tree.get("name", "")),
+            str(tree.get("label", "")),
+            str(tree.get("role", "")),
             float(duration or 0.0),
-            tuple(map(str, told.get("setup", ()))),
+            tuple(map(str, tree.get("setup", ()))),
             tuple((each, each.verdict) for each in attempts),
         )
 
@@ -93,9 +93,9 @@ def first_page(run: str, rows: Sequence[Row], due: str, state: str, mapping: str
     """The page of the whole hand-over.
 
     Args:
-        due: name of the trial that is waited for; "" for none.
-        state: what the run does now, in a sentence.
-        mapping: where it is said what the columns are.
+        due: name of the trial whose recording is awaited; "" for none.
+        state: present state of the run, a sentence.
+        mapping: file that defines the columns.
     """
     body = [
         f"<h1>Hand-over of {_text(run)}</h1>" if run else "<h1>Hand-over</h1>",
@@ -133,7 +133,7 @@ def first_page(run: str, rows: Sequence[Row], due: str, state: str, mapping: str
 def attempt_page(
     trial: Trial, attempt: Attempt, series: Sequence[Series], before: Sequence[str], mapping: str
 ) -> str:
-    """The page of one attempt at a trial. `before`: why earlier ones were refused, in order."""
+    """The page of one attempt at a trial. `before`: reasons of earlier refusals, in order."""
     task = trial.task
     up = "../" * (2 if attempt.number > 1 else 1)
     again = f", attempt {attempt.number}" if attempt.number > 1 else ""
@@ -184,14 +184,14 @@ def attempt_page(
 
 
 def columns_file(path: Path, folder: Path) -> str:
-    """Where the layout is, as the pages say it: by its name where it lies in the folder."""
+    """Layout file as shown on the pages: by its name if it is in the folder."""
     return COLUMNS if path == folder / COLUMNS else str(path)
 
 
 def manifest(
     trial: Trial, attempt: Attempt, run: str, series: Sequence[Series], before: Sequence[str]
 ) -> dict[str, Any]:
-    """All that the rig may be told of a trial, in SI."""
+    """All data of a trial for the rig, in SI."""
     task = trial.task
     methods = trial.bench.get("compensation")
     method = methods.get(task.compensation) if isinstance(methods, dict) else None
@@ -244,10 +244,10 @@ def _row(row: Row, due: str) -> str:
     states = [_state(attempt, verdict) for attempt, verdict in row.attempts]
     if row.name == due:
         states[-1] = f"<strong>{states[-1]}, waited for</strong>"
-    told = "<br>".join(states) or "to come"
+    state_text = "<br>".join(states) or "to come"
     return (
         f"<tr><th scope='row'>{name}</th><td>{_text(row.label)}{_role(row.role)}{steps}</td>"
-        f"<td class='short'>{row.duration:.4g} s</td><td>{told}</td></tr>"
+        f"<td class='short'>{row.duration:.4g} s</td><td>{state_text}</td></tr>"
     )
 
 
@@ -260,12 +260,12 @@ def _state(attempt: Attempt, verdict: Verdict | None) -> str:
 
 
 def _role(role: str) -> str:
-    told: dict[str, str] = {
+    texts: dict[str, str] = {
         Role.HOME: "; it brings the axis to where the next trial begins",
         Role.WARM_UP: "; it warms the bench up",
         Role.CHECK: "; it shows whether the bench is still the same",
     }
-    return told.get(role, "")
+    return texts.get(role, "")
 
 
 def _settings(trial: Trial) -> list[str]:
@@ -291,12 +291,12 @@ def _settings(trial: Trial) -> list[str]:
             "torque": "drive_torque",
             "current": "motor_current",
         }
-        told = [
+        shown_limits = [
             f"{in_axis_terms(name, sides)} {shown(trial, watched[name], float(value))}"
             for name, value in limits.items()
             if name in watched and isinstance(value, int | float)
         ]
-        lines.append(f"Limits that the rig itself has to keep: {', '.join(told)}.")
+        lines.append(f"Limits that the rig itself has to keep: {', '.join(shown_limits)}.")
     return lines
 
 
@@ -320,12 +320,12 @@ def _channels(trial: Trial) -> str:
 
 
 def _meaning(name: str) -> str:
-    told = explained(name)
-    return told.removeprefix(f"{name} (").removesuffix(")") if told != name else ""
+    text = explained(name)
+    return text.removeprefix(f"{name} (").removesuffix(")") if text != name else ""
 
 
 def _sketch(series: Series) -> str:
-    """The series as a line, at most some hundred points of it: to see what will happen."""
+    """Figure of the series as a line of at most 600 points, as a preview."""
     values = series.values
     places = np.unique(np.linspace(0, len(values) - 1, 600).astype(int))
     low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))

@@ -20,22 +20,22 @@ from campaign.recording import Array, ChannelInfo
 from campaign.trial import Trial
 
 CLOCK = 1e-3
-"""Relative; further apart, two clocks do not run alike: it is another rate."""
+"""Largest relative difference of two clocks; beyond it, it is another sample rate."""
 DRIFT = 0.25
-"""of a sample that a recording may drift in all before its samples are put on the trial's clock."""
+"""Total drift in sample periods above which a recording is interpolated to the trial's clock."""
 
 
 @dataclass(frozen=True)
 class ReturnedRecording:
-    """What came back, as a recorder wants it.
+    """A returned recording, ready for a recorder.
 
     Attributes:
         channels: in the order of the rows of `samples`, shape (channels, n).
         time: shape (n,), s; sample k at k / `Task.sample_rate`.
         lost: which samples are missing, shape (n,).
-        rate: at which it was recorded (Hz), by its own clock.
-        duration: of the whole of it (s); what goes on after the trial is not in `samples`.
-        remarks: what was done to it, in sentences.
+        rate: sample rate (Hz) by its own clock.
+        duration: total duration (s); `samples` end with the trial.
+        remarks: sentences about modifications.
     """
 
     channels: tuple[ChannelInfo, ...]
@@ -47,7 +47,7 @@ class ReturnedRecording:
     remarks: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Array:
-        """Samples of a channel; KeyError where it was not recorded."""
+        """Samples of a channel. Raises KeyError if it was not recorded."""
         return self.by_name[name]
 
     @property
@@ -57,7 +57,7 @@ class ReturnedRecording:
         return {channel.name: row for channel, row in rows}
 
     def cut(self, count: int, remark: str) -> ReturnedRecording:
-        """Its first samples."""
+        """The first `count` samples, with a further remark."""
         return replace(
             self,
             time=self.time[:count],
@@ -68,26 +68,26 @@ class ReturnedRecording:
 
 
 class OtherRateError(ValueError):
-    """It was sampled at another rate than the trial asks for."""
+    """The recording has another sample rate than the trial."""
 
 
 class ColumnsError(ValueError):
-    """What its layout makes of it is not what the trial needs."""
+    """The channels of the layout are not those that the trial needs."""
 
 
 def read_returned(
     trial: Trial, files: Sequence[Path], layout: Layout, wanted: Collection[str]
 ) -> ReturnedRecording:
-    """The recording that lies in `files`, which have one clock.
+    """Read the recording from `files`, which have one clock.
 
-    Raises RecordingError for files that cannot be read, MappingError for what does not go with the
-    layout, OtherRateError and ColumnsError.
+    Raises RecordingError for unreadable files, MappingError for files that do not match the layout,
+    OtherRateError and ColumnsError.
     """
     names = [path.name for path in files]
     entry = RecordingEntry(file=tuple(names))
-    opened, found = describe(entry, layout, files, names, facts_of(trial), wanted)
+    opened, descriptions = describe(entry, layout, files, names, facts_of(trial), wanted)
     with opened:
-        ((described, _),) = found
+        ((described, _),) = descriptions
         task, rate = trial.task, described.sample_rate
         ratio = rate / task.sample_rate
         if abs(ratio - 1.0) > CLOCK:
@@ -111,7 +111,7 @@ def read_returned(
 
 
 def _check_channels(trial: Trial, described: RecordingDescription) -> None:
-    """Raises ColumnsError where a channel is lacking, or made as if the hull were at rest."""
+    """Raise ColumnsError for a missing channel, or one derived for a hull at rest that moves."""
     names = [each.name for each in described.channels]
     if lacking := missing(trial.requires, names):
         raise ColumnsError(
@@ -129,7 +129,7 @@ def _check_channels(trial: Trial, described: RecordingDescription) -> None:
 def _on_the_grid(
     samples: Array, lost: np.ndarray, ratio: float, count: int, remarks: list[str]
 ) -> tuple[Array, np.ndarray]:
-    """At the times of the trial; `ratio` of the recorded rate to the trial's, `count` wanted."""
+    """Samples at the times of the trial; `ratio`: recorded rate / trial's rate, `count`: needed."""
     have = samples.shape[1]
     if abs(ratio - 1.0) * min(have, count) <= DRIFT:
         return samples[:, :count], lost[:count]
@@ -147,7 +147,7 @@ def _on_the_grid(
 
 
 def _announced(trial: Trial, channel: ChannelInfo) -> ChannelInfo:
-    """The command by the words of the trial's mode. Raises ColumnsError."""
+    """Channel for announcement; the command gets the label of the mode. Raises ColumnsError."""
     if channel.name != COMMAND:
         return channel
     due = info(COMMAND, trial.task.mode, axis=axis_of(trial))
