@@ -1,6 +1,6 @@
 """Coulomb and viscous friction: T = Tc sgn(v) + sigma2 v (Eq. 4.6 with Ts = Tc).
 
-What a data sheet or a no-load test tells of a motor. At rest it is a set, |T| <= Tc
+It is the friction of a motor's data sheet or no-load test. At rest it is a set, |T| <= Tc
 (`DryFriction`), which the engine solves for; as a compensation its torque jumps with the sign.
 """
 
