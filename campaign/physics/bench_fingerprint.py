@@ -77,12 +77,12 @@ def _acting(options: BaseModel, keys: tuple[str, ...], without: frozenset[tuple[
         return {}
     acting: dict[str, Any] = {}
     for name, field in type(options).model_fields.items():
-        value, here = getattr(options, name), (*keys, name)
+        value, path = getattr(options, name), (*keys, name)
         default = field.get_default(call_default_factory=True, validated_data={})
         at_default = default is not PydanticUndefined and value == default
-        if here in without or value is None or at_default:
+        if path in without or value is None or at_default:
             continue
-        plain = _plain(value, here, without)
+        plain = _plain(value, path, without)
         if plain != {} and plain != []:
             acting[name] = plain
     return acting

@@ -116,23 +116,23 @@ class KnownOptions(Options):
 
 def number_at(bench: BaseModel, path: str) -> tuple[float, Quantity | None] | None:
     """Number at a dotted path of a bench (SI) and its quantity; None without a number."""
-    here: Any = bench
+    node: Any = bench
     quantity: Quantity | None = None
     sides = getattr(bench, "sides", BOTH_ROTARY)
     for key in path.split("."):
-        if isinstance(here, Mapping) and key in here:
-            here = here[key]
-        elif isinstance(here, BaseModel) and key in type(here).model_fields:
-            field = type(here).model_fields[key]
-            if getattr(here, "side", "") == "motor":
+        if isinstance(node, Mapping) and key in node:
+            node = node[key]
+        elif isinstance(node, BaseModel) and key in type(node).model_fields:
+            field = type(node).model_fields[key]
+            if getattr(node, "side", "") == "motor":
                 sides = sides.at_motor
             quantity = next(_quantities((*field.metadata, field.annotation)), None)
-            here = getattr(here, key)
+            node = getattr(node, key)
         else:
             return None
-    if isinstance(here, bool) or not isinstance(here, int | float):
+    if isinstance(node, bool) or not isinstance(node, int | float):
         return None
-    return float(here), quantity and quantity.of(sides)
+    return float(node), quantity and quantity.of(sides)
 
 
 def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:

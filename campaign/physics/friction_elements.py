@@ -63,10 +63,10 @@ class DryInterface:
         """Holding torques (N m at the load), forwards and backwards, and those of the slowest
         sliding; this loads the compiled sliding function.
         """
-        ways = (1.0, -1.0)
-        holds = [self.torque * self.dry.static_torque(self.options, way) for way in ways]
+        signs = (1.0, -1.0)
+        holds = [self.torque * self.dry.static_torque(self.options, sign) for sign in signs]
         starts = [
-            self.torque * single_sliding(self.sliding, self.parameters, way, 0.0) for way in ways
+            self.torque * single_sliding(self.sliding, self.parameters, sign, 0.0) for sign in signs
         ]
         return holds[0], holds[1], starts[0], starts[1]
 

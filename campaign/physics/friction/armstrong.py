@@ -200,10 +200,10 @@ def steady_state(options: ArmstrongOptions, velocity: Array) -> Array:
     """Friction torque (N m) at `velocity` (rad/s), shape (n,), of a slide after a long rest."""
     torque = np.zeros_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity * sign > 0
+        moving = velocity * sign > 0
         coulomb, static, width, viscous = (in_direction(options, name, sign) for name in CURVE)
-        v = velocity[here]
-        torque[here] = (
+        v = velocity[moving]
+        torque[moving] = (
             sign * (coulomb + (static - coulomb) / (1.0 + (v / width) ** 2)) + viscous * v
         )
     return torque

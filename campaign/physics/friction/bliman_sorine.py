@@ -100,8 +100,8 @@ class BlimanSorineOptions(FrictionOptions):
             return self
         if self.static_torque is None or self.slow_stiffness is None:
             raise ValueError("order = 2 needs static_torque and slow_stiffness")
-        for way in (1.0, -1.0):
-            fast, slow = _settling(self, way)
+        for sign in (1.0, -1.0):
+            fast, slow = _settling(self, sign)
             if slow <= LEAST * fast:
                 raise ValueError("static_torque must be more than coulomb_torque")
             if self.slow_stiffness * fast >= self.bristle_stiffness * slow:

@@ -54,9 +54,9 @@ def steady_state(options: Any, velocity: Array) -> Array:
     """Friction torque (N m) of steady sliding at `velocity` (rad/s), shape (n,)."""
     torque = np.zeros_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity * sign > 0
+        moving = velocity * sign > 0
         coulomb, viscous = (in_direction(options, name, sign) for name in CURVE)
-        torque[here] = sign * coulomb + viscous * velocity[here]
+        torque[moving] = sign * coulomb + viscous * velocity[moving]
     return torque
 
 

@@ -125,12 +125,12 @@ def stribeck_curve(options: Any, velocity: Array) -> Array:
     """s(v) of Eq. 4.4 (N m), shape (n,): friction of steady sliding, unsigned, without sigma2."""
     curve = np.empty_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity >= 0 if sign > 0 else velocity < 0
+        mask = velocity >= 0 if sign > 0 else velocity < 0
         coulomb = in_direction(options, "coulomb_torque", sign)
         drop = in_direction(options, "static_torque", sign) - coulomb
-        speed = np.abs(velocity[here]) / in_direction(options, "stribeck_velocity", sign)
+        speed = np.abs(velocity[mask]) / in_direction(options, "stribeck_velocity", sign)
         fall = np.exp(-(speed ** in_direction(options, "stribeck_exponent", sign)))
-        curve[here] = coulomb + drop * fall
+        curve[mask] = coulomb + drop * fall
     return curve
 
 
