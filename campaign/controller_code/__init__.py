@@ -1,1 +1,1 @@
-"""Compensations as code for a controller: numbers of a bench, step functions in its language."""
+"""Compensations as controller code: parameters of a bench, step functions in its language."""

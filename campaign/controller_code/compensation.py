@@ -1,4 +1,4 @@
-"""A compensation of a bench as a sampled controller has it: numbers, states, steps."""
+"""A compensation of a bench in a sampled controller: parameters, states, steps."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ Array = NDArray[np.float64]
 INPUTS = ("gyro_rate", "load_angle", "motor_angle", "motor_current")
 """rad/s, rad, rad at the load, A."""
 SAMPLES = 2_000
-"""of the test vectors."""
+"""Number of test vectors."""
 FREQUENCIES = 0.3, 1.7, 6.1
-"""Hz, of the sines that they move along."""
+"""Frequencies of the sines in their motion (Hz)."""
 
 
 @dataclass(frozen=True)
 class SampledCompensation:
-    """A compensation made ready: what code for a controller is written from.
+    """A compensation prepared for its translation to controller code.
 
     Attributes:
-        name: of the bench's compensation.
-        lanes: the same as the engine runs it.
+        name: name of the compensation in the bench.
+        lanes: the compensation as the engine executes it.
     """
 
     name: str
@@ -51,16 +51,16 @@ class SampledCompensation:
 
     @property
     def identifier(self) -> str:
-        """The name in code and of files: a bench may call its compensations anything."""
+        """Name in code and of files; the name in the bench can have any characters."""
         words = "_".join(["compensation", *re.findall("[A-Za-z0-9]+", self.name)])
-        return words[:50].rstrip("_")  # MATLAB has names of 63
+        return words[:50].rstrip("_")  # MATLAB allows 63 characters
 
     @classmethod
     def of(cls, bench: CompleteBench, name: str) -> SampledCompensation:
-        """Raises UsageError where the bench has no such compensation, or it is not sampled."""
+        """From a bench. UsageError if it has no such compensation or no sample rate."""
         if name not in bench.compensation:
-            there = ", ".join(bench.compensation) or "none"
-            raise UsageError(f"{bench.name} has no compensation {name!r}; there are {there}")
+            names = ", ".join(bench.compensation) or "none"
+            raise UsageError(f"{bench.name} has no compensation {name!r}; there are {names}")
         rate = bench.controller.sample_rate
         if rate is None:
             raise UsageError(
@@ -74,7 +74,7 @@ class SampledCompensation:
         return cls(name, bench, together([Lane.of(bench, task, 1)], 1))
 
     def unit(self, rotary: str) -> str:
-        """What stands for a unit of a rotary axis."""
+        """Unit of this axis in place of that of a rotary axis."""
         return axis_unit(rotary, self.bench.sides)
 
     @property
@@ -88,15 +88,15 @@ class SampledCompensation:
 
     @property
     def motor_side(self) -> tuple[bool, ...]:
-        """Of each interface, whether it reads the motor's angle."""
+        """Whether each interface uses the motor's angle."""
         return tuple(bool(each) for each in self.lanes.compensation.side)
 
     def torques(self, inputs: Array) -> Array:
         """Torque (N m at the load) of each sample, shape (n,), from `INPUTS`, shape (n, 4).
 
-        No more than the bench's `limits.torque`, which the code keeps as well.
+        Clipped to the bench's `limits.torque`, as in the generated code.
         """
-        made = together(list(self.lanes.trials), 1)  # with states of its own
+        made = together(list(self.lanes.trials), 1)  # new states
         out = np.empty(len(inputs))
         _run(made.controller, made.compensation, made.memory, np.ascontiguousarray(inputs), out)
         return np.clip(out, -self.bench.limits.torque, self.bench.limits.torque)
@@ -106,7 +106,7 @@ class SampledCompensation:
 def _run(
     controller: Controller, compensation: Elements, memory: Memory, inputs: Array, out: Array
 ) -> None:
-    """The controller's own compensation, sample after sample."""
+    """Execute the controller's compensation for each sample."""
     controller, memory = controller_of(1, controller), memory_of(1, memory)
     compensation = elements_of(1, compensation)
     for k in range(len(inputs)):
@@ -118,7 +118,7 @@ def _run(
 
 
 def trial_inputs(made: SampledCompensation) -> Array:
-    """`INPUTS` along three sines with noise of the sensors' size, shape (n, 4): always the same."""
+    """`INPUTS` of three sines plus noise of a sensor's size, shape (n, 4); fixed seed."""
     draw, limits = np.random.default_rng(1), made.bench.limits
     time = np.arange(SAMPLES) * float(made.controller.period[0])
     angle, rate = np.zeros(SAMPLES), np.zeros(SAMPLES)

@@ -1,6 +1,6 @@
-"""One sample of a compensation as Python text, from which each target has its main function.
+"""One sample of a compensation as Python text, the source of each target's main function.
 
-The operations are those of `campaign.physics.sampled_controller`, in their order.
+Operations and their order are those of `campaign.physics.sampled_controller`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MEMORY = ("load_rate", "motor_rate", "load_angle", "motor_angle", "torque", "sta
 
 
 class Rows(NamedTuple):
-    """Numbers that the main function gets before its inputs: it changes states, not values."""
+    """Array argument of the main function: parameters (`values`), or states, which it changes."""
 
     name: str
     size: int
@@ -27,7 +27,7 @@ class Rows(NamedTuple):
 
 
 def rows_of(made: SampledCompensation) -> list[Rows]:
-    """All states, 0 at power-up, and the parameters of friction models."""
+    """All states (0 at power-up) and the parameters of the friction models."""
     order = made.controller.c.shape[0]
     states = [Rows("memory", len(MEMORY)), *([Rows("linear", order)] if order else [])]
     for e, each in enumerate(made.interfaces):
@@ -82,8 +82,8 @@ def _linear(made: SampledCompensation) -> Iterator[str]:
     a, b, c = (getattr(made.controller, each)[..., 0].tolist() for each in "abc")
     for row, inputs in enumerate(b):
         yield f"torque = torque + {c[row]!r} * linear[{row}]"
-        told = f"{inputs[0]!r} * rate + {inputs[1]!r} * motor_torque + {inputs[2]!r} * relative"
-        yield f"next_{row} = {told}"
+        total = f"{inputs[0]!r} * rate + {inputs[1]!r} * motor_torque + {inputs[2]!r} * relative"
+        yield f"next_{row} = {total}"
         for column in range(len(b)):
             yield f"next_{row} = next_{row} + {a[row][column]!r} * linear[{column}]"
     for row in range(len(b)):
@@ -91,7 +91,7 @@ def _linear(made: SampledCompensation) -> Iterator[str]:
 
 
 def _friction(made: SampledCompensation) -> Iterator[str]:
-    """States over the sample that has ended, then the torque that stands now."""
+    """Update states over the past sample, then evaluate the present torque."""
     if not made.interfaces:
         return
     period = float(made.controller.period[0])
@@ -100,8 +100,8 @@ def _friction(made: SampledCompensation) -> Iterator[str]:
     for over in (period, AN_INSTANT):
         for e, each in enumerate(made.interfaces):
             yield f"met = {rates[e]} * {float(each.rate)!r}"
-            told = f"met, met, met, 0.0, load_angle, {ROOM_TEMPERATURE!r}, 1.0"
-            yield f"now = Motion({told}, {over!r}, {1.0 / over!r}, 0.0)"
+            fields = f"met, met, met, 0.0, load_angle, {ROOM_TEMPERATURE!r}, 1.0"
+            yield f"now = Motion({fields}, {over!r}, {1.0 / over!r}, 0.0)"
             yield f"mean, change_{e} = step_{e}(parameters_{e}, friction_{e}, now)"
             if over == AN_INSTANT:
                 yield f"friction = friction + mean * {_gain(each)}"

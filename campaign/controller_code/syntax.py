@@ -1,4 +1,4 @@
-"""What differs between the languages of controllers: types, signs, forms of statements."""
+"""Differences between the languages of controllers: types, operators, forms of statements."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OF_TRUTHS = {ast.BitAnd: ast.And, ast.BitOr: ast.Or}
 
 @dataclass(frozen=True)
 class Several:
-    """The type of several numbers: that of each, and their names where it is a named tuple."""
+    """Type of a tuple: types of its values, and their names for a named tuple."""
 
     kinds: tuple[Any, ...]
     names: tuple[str, ...] = ()
@@ -28,7 +28,7 @@ class Several:
 
     @property
     def fields(self) -> list[str]:
-        """Their names in the target: no word of any language ends with a number like that."""
+        """Field names in the target. The numbers at their ends avoid reserved words."""
         names = self.names or ("value",) * len(self.kinds)
         return [f"{plain(name)}_{place}" for place, name in enumerate(names)]
 
@@ -37,7 +37,7 @@ MOTION = Several((NUMBER,) * len(Motion._fields), Motion._fields, "motion")
 
 
 def finite(x: float) -> bool:
-    """Whether it is neither infinite nor NaN; each language has its own way to ask."""
+    """Whether x is neither infinite nor NaN; each language has its own form."""
     return bool(abs(x) < float("inf"))
 
 
@@ -47,7 +47,7 @@ ASKED = {
     "bits_of": ((NUMBER,), INTEGER), "double_of": ((INTEGER,), NUMBER),
     "abs": ((NUMBER,), NUMBER), "finite": ((NUMBER,), TRUTH),
 }  # fmt: skip
-"""Types of arguments and result of what each language has a form for."""
+"""Argument and result types of the functions for which a language can have a form."""
 BY_NAME = {"abs": abs, "finite": finite}
 
 
@@ -55,18 +55,18 @@ SIGNS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=",
     ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
 }  # fmt: skip
-"""As most languages have them."""
+"""Operators of most languages."""
 
 
 def signs(no: str = "!", **others: str) -> dict[type, str]:
-    """Forms of operators; others: signs that the language has of its own."""
-    told = SIGNS | {getattr(ast, name): sign for name, sign in others.items()}
-    forms = {op: f"({{}} {sign} {{}})" for op, sign in told.items()}
+    """Forms of operators; no: negation; others: operators that differ from `SIGNS`."""
+    symbols = SIGNS | {getattr(ast, name): sign for name, sign in others.items()}
+    forms = {op: f"({{}} {sign} {{}})" for op, sign in symbols.items()}
     return {**forms, ast.USub: "(-{})", ast.Not: f"({no}{{}})"}
 
 
 class Argument(NamedTuple):
-    """Of a function in the target: name and type there, whether it is rows, and written to."""
+    """Argument of a target function: name and type there, whether it is rows, and written to."""
 
     name: str
     kind: str
@@ -76,20 +76,20 @@ class Argument(NamedTuple):
 
 @dataclass(frozen=True)
 class Syntax:
-    """A language. Texts with braces are forms for `str.format`.
+    """Syntax of a language. Texts with braces are forms for `str.format`.
 
     Attributes:
         kinds: types of `NUMBER`, `INTEGER` and `TRUTH`.
-        numbers: `INTEGER` and `TRUTH` as a number.
+        numbers: conversions of `INTEGER` and `TRUTH` to `NUMBER`.
         truths: false and true.
-        signs: by operator of the syntax tree, of numbers and truths.
-        whole: of integers.
-        known: by name in `ASKED`.
-        functions: by function of `elementary`: the language's own, which promise no bits.
-        branch: lines of if, else and end.   loop: of its head and its end.
-        call: from name, result, arguments by name of the callee, and those that are written.
+        signs: operators of numbers and truths, by class of the syntax tree.
+        whole: operators of integers.
+        known: forms of the functions in `ASKED`, by name.
+        functions: library functions by function of `elementary`; their bits can differ.
+        branch: lines of if, else and end.   loop: lines of head and end.
+        call: from name, result, arguments by the callee's names, and written arguments.
         function: from name, type of the result, arguments, declared names and types, and lines.
-        struct: a type of these fields; or "", as `rows`: a type of so many numbers.
+        struct: type with these fields; rows: type of `count` numbers; "" for none.
     """
 
     language: str
@@ -116,6 +116,6 @@ class Syntax:
 
 
 def plain(name: str) -> str:
-    """A name in letters that every language has, to which a number is added."""
-    told = "_".join(re.findall("[a-z0-9]+", name.lower()))
-    return told if told[:1].isalpha() else f"t{told}"
+    """A name in characters that every language accepts; the caller adds a number."""
+    text = "_".join(re.findall("[a-z0-9]+", name.lower()))
+    return text if text[:1].isalpha() else f"t{text}"

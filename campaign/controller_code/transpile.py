@@ -1,12 +1,12 @@
 """Translation of compiled step functions from Python to the language of a controller.
 
-A step function is plain Python of numbers (`campaign.physics.step_function`), and so is all that it
-calls. Each function becomes one of the target's language for each set of argument types; operations
-keep their order. What differs between languages is a `Syntax`. What has no counterpart is refused
-by name.
+A step function and its callees are plain Python with numbers (`campaign.physics.step_function`).
+Each function becomes one function of the target language per set of argument types. Operations
+keep their order. A `Syntax` contains the differences between languages. Code without a counterpart
+raises a UsageError that names it.
 
-Calls of the program's functions, and named tuples, become statements of their own: a language need
-not have them within expressions, and C does not say in which order it evaluates those.
+Calls of the program's functions, and named tuples, become separate statements. Some languages do
+not allow them in expressions, and C does not define the order of evaluation there.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ from campaign.physics import elementary
 
 @dataclass(frozen=True)
 class Said:
-    """An expression: its text and its type."""
+    """Text and type of an expression."""
 
     text: str
     type: Any
 
 
 class TargetFunction(NamedTuple):
-    """A function of the target: the type of its result, its arguments, and which it writes to."""
+    """A function of the target: name, type of the result, arguments."""
 
     name: str
     kind: Any
@@ -55,22 +55,22 @@ class TargetFunction(NamedTuple):
 
 @dataclass
 class Program:
-    """Types and functions of a language, in the order in which they can be compiled."""
+    """Types and functions in the target language, each after those it uses."""
 
     syntax: Syntax
     texts: list[str] = field(default_factory=list)
     known: dict[Any, Any] = field(default_factory=dict)
 
     def named(self, name: str) -> str:
-        """A name that nothing else in the program has; variables end with a number alone."""
+        """A unique name: it ends with `_p` and a number, variables with a number only."""
         return f"{self.syntax.prefix}{plain(name)}_p{len(self.known)}"
 
     def function(
         self, function: Callable[..., Any], types: Sequence[Any], rows: Sequence[int] = ()
     ) -> TargetFunction:
-        """A Python function for arguments of these types; written once.
+        """Translate a Python function for arguments of these types, once.
 
-        rows: how many numbers each argument of type `ROWS` has, in their order.
+        rows: lengths of the arguments of type `ROWS`, in their order.
         """
         function = getattr(function, "py_func", function)
         key = (function, tuple(types), tuple(rows))
@@ -80,33 +80,33 @@ class Program:
             where = f"{function.__module__}.{function.__qualname__}"
             source = textwrap.dedent(inspect.getsource(function))
             self.text_function(source, names, types, rows, where=where, key=key)
-        made: TargetFunction = self.known[key]
-        return made
+        translated: TargetFunction = self.known[key]
+        return translated
 
     def text_function(
         self, source: str, scope: Mapping[str, Any], types: Sequence[Any], rows: Sequence[int] = (),
         *, where: str = "", key: Any = None,
     ) -> TargetFunction:  # fmt: skip
-        """The same of Python text, whose names mean what `scope` says."""
+        """Translate a function given as Python text; `scope`: the values of its global names."""
         tree = ast.parse(source).body[0]
         if not isinstance(tree, ast.FunctionDef):
             raise UsageError(f"{where}: {source.splitlines()[0]!r} is no function")
         key = key or source
         name = self.named(tree.name)
-        self.known[key] = TargetFunction(name, None)  # a function that calls itself ends there
+        self.known[key] = TargetFunction(name, None)  # ends the recursion of self-calls
         made = _Function(self, name, tree, scope, types, rows, where or tree.name)
         self.known[key] = made.written()
         return self.known[key]  # type: ignore[no-any-return]
 
     def kind(self, kind: Any, rows: int = 0) -> str:
-        """A type in the target, declared where it needs that."""
+        """Name of a type in the target, after its declaration if it needs one."""
         if kind in self.syntax.kinds:
             return self.syntax.kinds[kind]
         if (kind, rows) not in self.known:
             if isinstance(kind, Several):
-                told = [self.kind(each) for each in kind.kinds]
+                kinds = [self.kind(each) for each in kind.kinds]
                 name = self.named(kind.title)
-                text = self.syntax.struct(name, dict(zip(kind.fields, told, strict=True)))
+                text = self.syntax.struct(name, dict(zip(kind.fields, kinds, strict=True)))
             else:
                 name = self.named(f"rows_of_{rows}")
                 text = self.syntax.rows(name, max(1, rows))
@@ -115,7 +115,7 @@ class Program:
         return str(self.known[kind, rows])
 
     def polynomial(self, coefficients: Sequence[float]) -> TargetFunction:
-        """Estrin's scheme, as `elementary.polynomial` has it."""
+        """Polynomial by Estrin's scheme, in the same order as `elementary.polynomial`."""
         terms, power = [repr(float(c)) for c in coefficients], "x"
         lines: list[str] = []
         while len(terms) > 1:
@@ -131,12 +131,12 @@ class Program:
         source = "\n    ".join(["def polynomial(x):", *lines, f"return {terms[0]}"])
         if source not in self.known:
             self.text_function(source, vars(elementary), [NUMBER])
-        made: TargetFunction = self.known[source]
-        return made
+        translated: TargetFunction = self.known[source]
+        return translated
 
 
 class _Function:
-    """One Python function, for one set of argument types."""
+    """Translation of one Python function for one set of argument types."""
 
     def __init__(
         self, program: Program, name: str, tree: ast.FunctionDef, scope: Mapping[str, Any],
@@ -149,7 +149,7 @@ class _Function:
         self.lines: list[str] = []
         self.depth = 1
         self.writes: set[str] = set()
-        self.whole: ast.expr | None = None  # a value that is no part of another
+        self.whole: ast.expr | None = None  # a value outside of any other expression
         self.result: Any = None
         arguments = [each.arg for each in tree.args.args]
         self.types: dict[str, Any] = dict(zip(arguments, types, strict=True))
@@ -158,7 +158,7 @@ class _Function:
         self.rows = dict(zip(sized, rows, strict=True))
 
     def written(self) -> TargetFunction:
-        """What its text gives; the text itself goes to the program."""
+        """Translate the body, and add the text to the program."""
         self._block(self.tree.body)
         arguments = []
         for each in [each.arg for each in self.tree.args.args]:
@@ -167,14 +167,14 @@ class _Function:
             arguments.append(Argument(*own))
         if self.result is None:
             raise self._refusal(self.tree, "returns nothing")
-        told = self.program.kind(self.result)
+        result = self.program.kind(self.result)
         self.program.texts.append(
-            self.syntax.function(self.name, told, arguments, self.declared, self.lines)
+            self.syntax.function(self.name, result, arguments, self.declared, self.lines)
         )
         return TargetFunction(self.name, self.result, arguments)
 
     def _named(self, name: str) -> str:
-        """The name in the target, which tells no letters apart by their case."""
+        """A unique name in the target; some languages ignore the case of letters."""
         return self.names.setdefault(name, f"{plain(name)}_{len(self.names) + 1}")
 
     def _temporary(self, kind: Any) -> str:
@@ -234,11 +234,11 @@ class _Function:
         if isinstance(target, ast.Tuple):
             self._unpack(target.elts, value)
             return
-        said = self._value(value)
-        self._line(self.syntax.assign, self._target(target, said.type), said.text)
+        expression = self._value(value)
+        self._line(self.syntax.assign, self._target(target, expression.type), expression.text)
 
     def _unpack(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
-        """All values are there before the first target has its own."""
+        """Evaluate all values before the first assignment, as Python does."""
         read = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
         if isinstance(value, ast.Tuple) and all(
             isinstance(each, ast.Name) and each.id not in read for each in targets
@@ -247,18 +247,18 @@ class _Function:
                 self._assign(target, each)
             return
         if isinstance(value, ast.Tuple):
-            said = []
+            expressions = []
             for each in value.elts:
                 one = self._value(each)
-                said.append(Said(self._temporary(one.type), one.type))
-                self._line(self.syntax.assign, said[-1].text, one.text)
+                expressions.append(Said(self._temporary(one.type), one.type))
+                self._line(self.syntax.assign, expressions[-1].text, one.text)
         else:
             whole = self._value(value)
             if not isinstance(whole.type, Several):
                 raise self._refusal(value, "is no several numbers")
             fields = zip(whole.type.fields, whole.type.kinds, strict=True)
-            said = [Said(f"{whole.text}.{name}", kind) for name, kind in fields]
-        for target, one in zip(targets, said, strict=True):
+            expressions = [Said(f"{whole.text}.{name}", kind) for name, kind in fields]
+        for target, one in zip(targets, expressions, strict=True):
             self._line(self.syntax.assign, self._target(target, one.type), one.text)
 
     def _target(self, target: ast.expr, kind: Any) -> str:
@@ -275,10 +275,10 @@ class _Function:
         raise self._refusal(target, "is nothing to assign to")
 
     def _several(self, values: Sequence[ast.expr], names: Any = (), title: str = "several") -> Said:
-        said = [self._said(each) for each in values]
-        kind = Several(tuple(each.type for each in said), tuple(names), title)
+        expressions = [self._said(each) for each in values]
+        kind = Several(tuple(each.type for each in expressions), tuple(names), title)
         made = self._temporary(kind)
-        for name, each in zip(kind.fields, said, strict=True):
+        for name, each in zip(kind.fields, expressions, strict=True):
             self._line(self.syntax.assign, f"{made}.{name}", each.text)
         return Said(made, kind)
 
@@ -292,7 +292,7 @@ class _Function:
         inside = [node for each in body for node in ast.walk(each) if isinstance(node, ast.Name)]
         stored = {node.id for node in inside if isinstance(node.ctx, ast.Store)}
         read = {node.id for node in ast.walk(over) if isinstance(node, ast.Name)}
-        if name in self.types or stored & {name, *read}:  # Python keeps its range, C would not
+        if name in self.types or stored & {name, *read}:  # Python fixes the range, C does not
             raise self._refusal(
                 over, "is changed inside, or its variable used outside, which has no counterpart"
             )
@@ -329,15 +329,15 @@ class _Function:
                 return self._worked_out(node)
 
     def _worked_out(self, node: ast.expr) -> Said:
-        """An expression of others."""
+        """Translate an expression that contains others."""
         signs = self.syntax.signs
         match node:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                said = self._said(operand)
-                return Said(signs[ast.USub].format(said.text), said.type)
+                inner = self._said(operand)
+                return Said(signs[ast.USub].format(inner.text), inner.type)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                told = self._as(TRUTH, operand, self._said(operand))
-                return Said(signs[ast.Not].format(told), TRUTH)
+                text = self._as(TRUTH, operand, self._said(operand))
+                return Said(signs[ast.Not].format(text), TRUTH)
             case ast.BinOp(
                 left=ast.Constant(value=int() | float() as base),
                 op=ast.Pow(),
@@ -348,17 +348,17 @@ class _Function:
                 return self._operation(node, self._said(left), type(op), self._said(right))
             case ast.BoolOp(op=op, values=values):
                 parts = [self._said(each) for each in values]
-                if {each.type for each in parts} != {TRUTH}:  # one of them is the result in Python
+                if {each.type for each in parts} != {TRUTH}:  # Python returns an operand
                     raise self._refusal(node, "is a number")
-                told = reduce(signs[type(op)].format, (each.text for each in parts))
-                return Said(told, TRUTH)
+                text = reduce(signs[type(op)].format, (each.text for each in parts))
+                return Said(text, TRUTH)
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in signs:
                 one, other = self._alike(node, self._said(left), self._said(right))
                 return Said(signs[type(op)].format(one.text, other.text), TRUTH)
             case ast.IfExp(test=test, body=yes, orelse=no):
-                told = self._as(TRUTH, test, self._said(test))
+                text = self._as(TRUTH, test, self._said(test))
                 one, other = self._alike(node, self._said(yes), self._said(no))
-                return Said(self.syntax.known["where"].format(told, one.text, other.text), one.type)
+                return Said(self.syntax.known["where"].format(text, one.text, other.text), one.type)
         raise self._refusal(node, "has no counterpart")
 
     def _operation(self, node: ast.expr, left: Said, op: Any, right: Said) -> Said:
@@ -380,7 +380,7 @@ class _Function:
         )
 
     def _as(self, kind: str, node: ast.expr, said: Said) -> str:
-        """The text of an expression as another type."""
+        """Text of an expression, converted to type `kind`."""
         if said.type == kind:
             return said.text
         if kind == NUMBER and said.type in self.syntax.numbers:
@@ -420,19 +420,19 @@ class _Function:
             return self._called(node, made, arguments[:1], [self._said(arguments[0])])
         if isinstance(function, type) and hasattr(function, "_fields"):
             return self._several(arguments, function._fields, function.__name__.lower())
-        said = [self._said(each) for each in arguments]
+        expressions = [self._said(each) for each in arguments]
         if name in self.syntax.known and function is BY_NAME.get(name, vars(elementary).get(name)):
             asked, kind = ASKED[name]
-            pairs = zip(asked, arguments, said, strict=True)
+            pairs = zip(asked, arguments, expressions, strict=True)
             return Said(self.syntax.known[name].format(*(self._as(*each) for each in pairs)), kind)
         if function in self.syntax.functions:
-            told = ", ".join(map(self._as, [NUMBER] * len(said), arguments, said))
-            return Said(f"{self.syntax.functions[function]}({told})", NUMBER)
+            texts = ", ".join(map(self._as, [NUMBER] * len(expressions), arguments, expressions))
+            return Said(f"{self.syntax.functions[function]}({texts})", NUMBER)
         if not inspect.isfunction(getattr(function, "py_func", function)):
             raise self._refusal(node, f"calls {name}, which is not of this program's")
         rows = [self.rows[getattr(a, "id", "")] for a in self._of_rows(arguments)]
-        made = self.program.function(function, [each.type for each in said], rows)
-        return self._called(node, made, arguments, said)
+        made = self.program.function(function, [each.type for each in expressions], rows)
+        return self._called(node, made, arguments, expressions)
 
     def _of_rows(self, arguments: Sequence[ast.expr]) -> list[ast.expr]:
         return [a for a in arguments if self.types.get(getattr(a, "id", "")) == ROWS]
@@ -444,18 +444,18 @@ class _Function:
         arguments: Sequence[ast.expr],
         said: Sequence[Said],
     ) -> Said:
-        """A call, as a statement."""
+        """Write a call as a statement."""
         if made.kind is None:
             raise self._refusal(node, "calls itself, which has no counterpart")
         pairs = list(zip(made.arguments, arguments, said, strict=True))
         written = {getattr(own, "id", "") for argument, own, _ in pairs if argument.written}
-        if written and node is not self.whole:  # what else is in it may be read before or after
+        if written and node is not self.whole:  # the order of reads is undefined
             raise self._refusal(node, "changes an argument within an expression: no counterpart")
         self.writes |= written
         result = self._temporary(made.kind)
-        told = {argument.name: each.text for argument, _, each in pairs}
-        names = [told[argument.name] for argument, _, _ in pairs if argument.written]
-        self._line("{}", self.syntax.call(made.name, result, told, names))
+        texts = {argument.name: each.text for argument, _, each in pairs}
+        names = [texts[argument.name] for argument, _, _ in pairs if argument.written]
+        self._line("{}", self.syntax.call(made.name, result, texts, names))
         return Said(result, made.kind)
 
     def _looked_up(self, node: ast.AST, name: str) -> Any:
@@ -479,5 +479,5 @@ class _Function:
 
 
 def _read(target: ast.expr) -> ast.expr:
-    """A target as an expression."""
+    """An assignment target as an expression to read."""
     return ast.parse(ast.unparse(target), mode="eval").body

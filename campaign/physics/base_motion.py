@@ -10,8 +10,8 @@ from campaign.signals import Array, MultiSine, Polyline, Signal, Sine, Zero
 def base_rate(acceleration: Signal, time: Array) -> Array:
     """Rate of the hull (rad/s) at `time` (s), shape (n,).
 
-    A sine acceleration, or a sum of sines, belongs to a steady oscillation, so its rate has zero
-    mean and the motion is already under way at t = 0. Any other acceleration starts from rest.
+    A sine acceleration, or a sum of sines, is a steady oscillation: its rate has zero mean, and the
+    hull moves at t = 0. Any other acceleration starts from rest.
     """
     match acceleration:
         case Zero():
@@ -27,7 +27,7 @@ def base_rate(acceleration: Signal, time: Array) -> Array:
 
 
 def _integral(polyline: Polyline, time: Array) -> Array:
-    """Exact integral of a polyline from t = 0, shape (n,). Its steps (equal times) are kept."""
+    """Exact integral of a polyline from t = 0, shape (n,); it can have steps (equal times)."""
     knots, values = np.array(polyline.times), np.array(polyline.values)
     area = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(knots) * (values[1:] + values[:-1]))])
 

@@ -1,6 +1,7 @@
-"""The bench: the platform under test, as validated from `benches/*.toml`.
+"""The bench: the platform under test, validated from `benches/*.toml`.
 
-Symbols are the thesis' (Figure 5.3, Table 5.1, appendix); every number is SI after validation.
+Symbols are those of the thesis (Figure 5.3, Table 5.1, appendix); all numbers are SI after
+validation.
 """
 
 from __future__ import annotations
@@ -66,9 +67,7 @@ class AxisOptions(Options):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A rotary axis is archived as it was before there was another: its trials keep their
-        fingerprints.
-        """
+        """The archived tree of a rotary axis has no `kind`: older fingerprints stay valid."""
         tree: dict[str, Any] = dump(self)
         if self.kind == "rotary":
             tree.pop("kind", None)
@@ -180,7 +179,7 @@ class ControllerOptions(Options):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A loop that a gyro feeds is archived as before there was another: fingerprints stay."""
+        """The archived tree of gyro feedback lacks the field: older fingerprints stay valid."""
         tree: dict[str, Any] = dump(self)
         if self.rate_feedback == "gyro":
             tree.pop("rate_feedback", None)
@@ -196,7 +195,7 @@ class ControllerOptions(Options):
     @field_validator("delay")
     @classmethod
     def _delay_of_samples(cls, delay: float, info: ValidationInfo) -> float:
-        """A continuous loop has no sample to count from; a delay would silently not be there."""
+        """A continuous loop has no samples; it would silently ignore a delay."""
         if delay > 0 and info.data.get("sample_rate", delay) is None:
             raise ValueError("'delay' needs controller.sample_rate: a continuous loop has none")
         return delay
@@ -250,12 +249,12 @@ class LimitsOptions(Options):
 
     @field_serializer("angle", when_used="json")
     def _in_words(self, angle: float) -> float | str:
-        """JSON has no infinity."""
+        """Infinity as text, because JSON has none."""
         return UNLIMITED if math.isinf(angle) else angle
 
 
 def _archived(info: ValidationInfo) -> bool:
-    """Whether what is validated is of an archive, and not of a file."""
+    """Whether the validated tree is from an archive, not from a bench file."""
     return isinstance(info.context, Mapping) and bool(info.context.get("si"))
 
 
@@ -292,7 +291,7 @@ class Bench(Options):
     @model_validator(mode="before")
     @classmethod
     def _name_methods(cls, tree: Any) -> Any:
-        """`[compensation.observer]` needs no `method = "observer"`: its name says it."""
+        """Default method: `[compensation.observer]` needs no `method = "observer"`."""
         if not isinstance(tree, dict) or not isinstance(tree.get("compensation"), dict):
             return tree
         named = {
@@ -304,7 +303,7 @@ class Bench(Options):
     @model_validator(mode="before")
     @classmethod
     def _known_in_one_place(cls, tree: Any, info: ValidationInfo) -> Any:
-        """The first archives of format 3 have `given` and `fitted` beside what is `known`."""
+        """The first archives of format 3 have `given` and `fitted` beside `known`."""
         if not _archived(info) or not isinstance(tree, Mapping):
             return tree
         beside = {name: tree[name] for name in ("given", "fitted") if name in tree}
@@ -314,12 +313,12 @@ class Bench(Options):
     @field_validator("sensors")
     @classmethod
     def _sensors_are_sampled(cls, sensors: SensorsOptions, info: ValidationInfo) -> SensorsOptions:
-        """A continuous controller sees everything exactly; no flaw may be lost silently."""
+        """A continuous controller has ideal sensors; it must not silently ignore a flaw."""
         controller = info.data.get("controller")
         if controller is None or controller.sample_rate is not None:
             return sensors
         if controller.rate is None or controller.current is None:
-            return sensors  # nobody says that it is continuous
+            return sensors  # the controller is incomplete, and not stated to be continuous
         flaws = [
             f"{sensor}.{name}"
             for sensor in SensorsOptions.model_fields
@@ -335,7 +334,7 @@ class Bench(Options):
 
     @model_validator(mode="after")
     def _leave_friction(self) -> Bench:
-        """A preload below its nominal one must not take more friction away than there is."""
+        """A preload below nominal must not remove more friction than the total."""
         if self.gear is not None:
             with_preload(self.friction, self.gear.ratio, self.gear.preload)
             return self
@@ -349,7 +348,7 @@ class Bench(Options):
     def _paths_lead_somewhere(
         cls, tree: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
     ) -> Self:
-        """Scatter, preload and what is known name what is there; all else would silently not be."""
+        """Paths of scatter, preload and `known` must exist; others would have no effect."""
         with axis_terms(sides_in(tree)):
             bench = handler(tree)
         preload = None if bench.gear is None else bench.gear.preload
@@ -361,23 +360,23 @@ class Bench(Options):
             wrong.append((("limits", "angle"), "a linear axis has ends: write how far it may go"))
         if wrong:
             raise invalid(wrong)
-        # What is archived is SI, and an experiment's own bench may lack what is known of the whole.
+        # Archived values are SI, and an experiment's own bench may lack paths of `known`.
         return bench if _archived(info) else bench.model_copy(update={"known": known_in_si(bench)})
 
     @property
     def is_linear(self) -> bool:
-        """Whether its axis travels instead of turning."""
+        """Whether the axis is linear."""
         return self.axis.kind == AxisKind.LINEAR.value
 
     @property
     def sides(self) -> Sides:
-        """How its axis and its motor move."""
+        """Kinds of motion of axis and motor."""
         load = AxisKind(self.axis.kind)
         driven = self.gear is not None and self.gear.lead is not None
         return Sides(load, AxisKind.ROTARY if driven else load)
 
     def with_friction(self, friction: Mapping[str, Any]) -> Self:
-        """This bench with other friction, and what scatter and preload say of that alone."""
+        """This bench with other friction, and the parts of scatter and preload that apply to it."""
         update: dict[str, Any] = {"friction": dict(friction)}
         if self.variation is not None:
             update["variation"] = acting(self.variation, friction)
@@ -389,30 +388,30 @@ class Bench(Options):
     def known_uncertainty(self, path: str) -> float | None:
         """Standard uncertainty (1 sigma, SI) of the value at a dotted path, e.g. `axis.inertia`.
 
-        None when nobody has said how well it is known.
+        None if it is not stated.
         """
         known = self.known.values.get(path)
         return None if known is None else known.standard_deviation
 
     def at_load(self, friction: FrictionOptions) -> tuple[float, float]:
-        """What one N m of an interface counts at the load, and its rate per load relative rate."""
+        """Torque at the load per N m of an interface, and its rate per load relative rate."""
         return friction.at_load(self.gear.ratio if self.gear else 1.0)
 
     @property
     def rate_is_of_encoder(self) -> bool:
-        """Whether the rate that its loop sees and that is recorded is made of the encoder."""
+        """Whether the rate of the loop and of the recording is derived from the encoder."""
         return self.controller is not None and self.controller.rate_feedback == "encoder"
 
     @property
     def ratio(self) -> float | None:
-        """N: motor rate over load rate; 1 without a gear, None where no motor is known either."""
+        """N: motor rate over load rate; 1 without a gear, None without gear and motor."""
         if self.gear is not None:
             return self.gear.ratio
         return None if self.motor is None else 1.0
 
     @property
     def torque_per_current(self) -> float | None:
-        """N Kt: torque at the load per ampere (N m/A); None where the motor is not known."""
+        """N Kt: torque at the load per ampere (N m/A); None without a motor."""
         if self.motor is None:
             return None
         return (self.ratio or 1.0) * self.motor.torque_constant

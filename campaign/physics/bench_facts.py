@@ -1,7 +1,7 @@
-"""Facts of a bench to check before use: sizes that must match.
+"""Facts of a bench to check before use: ratios of its quantities.
 
-Each fact sets one size against another of the same unit, the smaller the share the better: a count
-against what has to be resolved, friction against what drives, one bandwidth against the next.
+Each fact divides one quantity by another of the same unit; a smaller ratio is better. Examples:
+sensor count over the quantity to resolve, friction over drive torque, bandwidth over the next one.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from campaign.physics.resolution import rate_of_one_count
 from campaign.physics.variation import of_its_day
 
 SLOW = 1e-9
-"""rad/s; friction at this rate is that of the onset of sliding."""
+"""rad/s; friction at this rate is friction at the onset of sliding."""
 
 
 @dataclass(frozen=True)
 class Fact:
-    """One size against another.
+    """Ratio of two quantities of a bench.
 
     Attributes:
-        subject: what against what.
+        subject: names of the two quantities.
         value, against: in `unit`, SI; their share is small on a good bench.
-        display: the unit that a reader is shown.
-        verdict: `fine`, or a word for what it is instead.
-        advice: what to do; empty when it is fine.
+        display: displayed unit.
+        verdict: `fine`, or the word for the defect.
+        advice: recommended action; empty if the verdict is `fine`.
     """
 
     subject: str
@@ -55,7 +55,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class _Scale:
-    """Shares up to which something is fine, and up to which it is usable; words for the rest."""
+    """Largest shares that are fine and usable; words for larger shares."""
 
     fine: float
     usable: float
@@ -120,15 +120,15 @@ _CURRENT_LOOP = _Scale(
 
 
 def facts_of(bench: Bench) -> tuple[Fact, ...]:
-    """All that can be told of this bench, on its day; what it does not have is left out."""
+    """All facts of this bench on its day, without those whose values it lacks."""
     today = of_its_day(bench)
     with axis_terms(bench.sides):
-        found = (*_sensors(today), *_presliding(today), *_torques(today))
-        return found if lacking(bench) else (*found, *_bandwidths(complete(bench)))
+        facts = (*_sensors(today), *_presliding(today), *_torques(today))
+        return facts if lacking(bench) else (*facts, *_bandwidths(complete(bench)))
 
 
 def current_bandwidth(bench: CompleteBench) -> float:
-    """Frequency (rad/s) at which i / i* falls by 3 dB with the motor held still.
+    """Frequency (rad/s) at which i / i* falls by 3 dB with a locked rotor.
 
     (Kpc s + Kic) / (L s^2 + (R + Kpc) s + Kic), from |i / i*|^2 = 1/2, quadratic in omega^2.
     """
@@ -137,16 +137,16 @@ def current_bandwidth(bench: CompleteBench) -> float:
     a = motor.inductance**2
     b = (motor.resistance + p) ** 2 - 2.0 * motor.inductance * i - 2.0 * p**2
     c = -(i**2)
-    if i == 0.0:  # its gain at rest is p / (R + p), and so is what it falls from
+    if i == 0.0:  # 3 dB below its gain at rest, p / (R + p)
         return (motor.resistance + p) / motor.inductance
     return math.sqrt((-b + math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a))
 
 
 def rate_steps(bench: Bench) -> dict[str, float]:
-    """The rate at the load (rad/s) that one count of encoder or resolver looks like in one sample.
+    """Rate at the load (rad/s) of one count of encoder or resolver in one sample.
 
-    Behind the low-pass of the relative rate. Empty for a controller that sees everything exactly,
-    and without the resolver where nobody says what gear it sits behind.
+    It includes the low-pass of the relative rate. Empty for a continuous controller; without the
+    resolver if the gear ratio is unknown.
     """
     gains, sensors = bench.controller, bench.sensors
     if gains is None or gains.sample_rate is None:
@@ -185,7 +185,7 @@ def _sensors(bench: Bench) -> Iterator[Fact]:
 
 
 def _presliding(bench: Bench) -> Iterator[Fact]:
-    """One count of the encoder, whose angle is recorded and analysed, against Ts / sigma0 of each
+    """One count of the encoder, the source of the recorded angle, against Ts / sigma0 of each
     interface, at the load.
     """
     count = bench.sensors.encoder.resolution
@@ -220,7 +220,7 @@ def _torques(bench: Bench) -> Iterator[Fact]:
 
 
 def _bandwidths(bench: CompleteBench) -> Iterator[Fact]:
-    """The rate loop's crossover against what has to be faster than it; sliding, uncompensated."""
+    """Crossover of the rate loop against sample rate and current loop; sliding, uncompensated."""
     loop = dict(loops_of(bench, "none", "rate"))["sliding"]
     crossovers = loop.crossovers if isinstance(loop, LoopMargins) else ()
     if not crossovers:
@@ -234,5 +234,5 @@ def _bandwidths(bench: CompleteBench) -> Iterator[Fact]:
 
 
 def _values(bench: Bench, name: str) -> list[Any]:
-    found = (getattr(options, name, None) for options in bench.friction.values())
-    return [value for value in found if value]
+    values = (getattr(options, name, None) for options in bench.friction.values())
+    return [value for value in values if value]

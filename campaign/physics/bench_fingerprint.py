@@ -1,10 +1,10 @@
 """Fingerprint of a bench: a hash of the SI values that affect motion.
 
-Left out is what acts on nothing: names, comments, limits, how well values are known, and whatever
-is absent, off or at its default, so that an optional field of a later program alters no bench. Each
-compensation has a hash of its own, so that adding another alters nothing. The values at the bench's
-`operating` paths are left out, too, but which paths these are is not. Nor is which published cells
-the bench was made from: whoever takes one of them away describes another bench.
+The hash excludes names, comments, limits and uncertainties. It also excludes values that are
+absent, off or at their default, so that a new optional field changes no hash. Each compensation
+has its own hash, so that an additional one changes no other. The values at the bench's `operating`
+paths are excluded, but the list of these paths is included. So is the list of published cells from
+which the bench was made: without one of them it is another bench.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from campaign.physics.scatter import VariationOptions
 from campaign.trial import canonical_json
 
 DIGITS = 12
-"""significant ones that count: the same value in another unit differs in the last bits."""
+"""Significant digits in the hash: the same value in another unit differs in the last bits."""
 NOT_MOTION = frozenset(
     {("name",), ("description",), ("known",), ("limits",), ("compensation",), ("axis", "name")}
 )
-"""Fields of a bench that move nothing; compensations are hashed one by one."""
+"""Fields without effect on motion; compensations have separate hashes."""
 STATED = ("given", "fitted", "seen", "operating")
-"""Lists of `known` that count nevertheless, in any order and where they name something."""
+"""Lists of `known` that the hash includes, in any order, unless they are empty."""
 
 
 def fingerprint(bench: Bench) -> FingerprintOptions:
-    """The fingerprint of a bench and of each of its compensations."""
+    """Fingerprint of a bench and of each of its compensations."""
     operating = frozenset(tuple(path.split(".")) for path in bench.known.operating)
     acting = {"bench": _acting(bench, (), NOT_MOTION | operating)}
     for name in STATED:
@@ -49,10 +49,10 @@ def fingerprint(bench: Bench) -> FingerprintOptions:
 
 
 def why_altered(bench: Bench, compensation: str = "none") -> str:
-    """Why this is not the bench that it says something is known of; "" when it is, or says nothing.
+    """Why this bench is not the one that its `known` describes; "" if it is, or `known` is empty.
 
     Args:
-        compensation: the method that runs on it; what the others are does not matter then.
+        compensation: name of the active compensation; the others are not checked.
     """
     if not bench.known.describes:
         return ""
@@ -72,20 +72,20 @@ def why_altered(bench: Bench, compensation: str = "none") -> str:
 
 
 def _acting(options: BaseModel, keys: tuple[str, ...], without: frozenset[tuple[str, ...]]) -> Any:
-    """What of a table differs from its defaults, without the fields at the paths `without`."""
+    """Values of a table that differ from their defaults, without the paths `without`."""
     if _is_off(options):
         return {}
-    found: dict[str, Any] = {}
+    acting: dict[str, Any] = {}
     for name, field in type(options).model_fields.items():
-        value, here = getattr(options, name), (*keys, name)
+        value, path = getattr(options, name), (*keys, name)
         default = field.get_default(call_default_factory=True, validated_data={})
         at_default = default is not PydanticUndefined and value == default
-        if here in without or value is None or at_default:
+        if path in without or value is None or at_default:
             continue
-        plain = _plain(value, here, without)
+        plain = _plain(value, path, without)
         if plain != {} and plain != []:
-            found[name] = plain
-    return found
+            acting[name] = plain
+    return acting
 
 
 def _plain(value: Any, keys: tuple[str, ...], without: frozenset[tuple[str, ...]]) -> Any:
@@ -106,7 +106,7 @@ def _plain(value: Any, keys: tuple[str, ...], without: frozenset[tuple[str, ...]
 
 
 def _is_off(options: BaseModel) -> bool:
-    """Whether a table is there and does nothing."""
+    """Whether a table is present but has no effect."""
     if isinstance(options, Ripple):
         return options.amplitude == 0.0
     if isinstance(options, VariationOptions):

@@ -1,7 +1,7 @@
 """The `[known]` table of a bench: source cells, and uncertainty of its values.
 
-Nothing here acts on motion. `given`, `fitted` and `seen` are what a status of the scoreboard rests
-on; `fingerprint` says of which bench they are true (`bench_fingerprint`).
+No value here affects motion. A status of the scoreboard depends on `given`, `fitted` and `seen`;
+`fingerprint` identifies the bench for which they are true (`bench_fingerprint`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from campaign.units import Quantity, split_quantity
 NORMAL_95 = 1.959963984540054
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 Number = float | str
-"""SI; text with a unit as long as nobody has looked what it is of."""
+"""SI value; text with a unit before its quantity is known."""
 
 
 class KnownValue(Options):
@@ -46,7 +46,7 @@ class KnownValue(Options):
 
     @property
     def standard_deviation(self) -> float | None:
-        """1 sigma (SI); None when nobody has said how well the value is known."""
+        """1 sigma (SI); None if no uncertainty is stated."""
         if self.interval is not None:
             low, high = (float(end) for end in self.interval)
             return (high - low) / (2.0 * NORMAL_95)
@@ -102,7 +102,7 @@ class KnownOptions(Options):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A bench that nobody identified is archived as before: trials keep their fingerprints."""
+        """Without identification the archived tree is as before: trials keep their fingerprints."""
         tree: dict[str, Any] = dump(self)
         if self.identified is None:
             tree.pop("identified", None)
@@ -110,29 +110,29 @@ class KnownOptions(Options):
 
     @property
     def describes(self) -> bool:
-        """Whether it says anything that holds for one bench only."""
+        """Whether it states anything that is valid for one bench only."""
         return bool(self.given or self.fitted or self.seen or self.fingerprint)
 
 
 def number_at(bench: BaseModel, path: str) -> tuple[float, Quantity | None] | None:
-    """The number at a dotted path of a bench (SI) and its quantity; None where there is none."""
-    here: Any = bench
+    """Number at a dotted path of a bench (SI) and its quantity; None without a number."""
+    node: Any = bench
     quantity: Quantity | None = None
     sides = getattr(bench, "sides", BOTH_ROTARY)
     for key in path.split("."):
-        if isinstance(here, Mapping) and key in here:
-            here = here[key]
-        elif isinstance(here, BaseModel) and key in type(here).model_fields:
-            field = type(here).model_fields[key]
-            if getattr(here, "side", "") == "motor":
+        if isinstance(node, Mapping) and key in node:
+            node = node[key]
+        elif isinstance(node, BaseModel) and key in type(node).model_fields:
+            field = type(node).model_fields[key]
+            if getattr(node, "side", "") == "motor":
                 sides = sides.at_motor
             quantity = next(_quantities((*field.metadata, field.annotation)), None)
-            here = getattr(here, key)
+            node = getattr(node, key)
         else:
             return None
-    if isinstance(here, bool) or not isinstance(here, int | float):
+    if isinstance(node, bool) or not isinstance(node, int | float):
         return None
-    return float(here), quantity and quantity.of(sides)
+    return float(node), quantity and quantity.of(sides)
 
 
 def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:
@@ -145,9 +145,9 @@ def _quantities(hints: Iterable[Any]) -> Iterator[Quantity]:
 
 
 def known_in_si(bench: Any) -> KnownOptions:
-    """What a bench as written says is known of it, with SI numbers in place of text.
+    """The `known` table of a bench file, with SI numbers in place of text.
 
-    Raises pydantic's error for a path that leads to no number, and for a value that is none there.
+    Raises pydantic's error for a path without a number, and for an invalid value.
     """
     known: KnownOptions = bench.known
     faults: list[tuple[Keys, str]] = []
@@ -162,7 +162,7 @@ def known_in_si(bench: Any) -> KnownOptions:
 
 
 def _wrong_paths(known: KnownOptions, bench: BaseModel) -> Iterator[tuple[Keys, str]]:
-    """Paths that lead to no number of the bench: keys below `known`, and the message."""
+    """Invalid paths and correlations: keys below `known`, and the message."""
     for path in known.values:
         if number_at(bench, path) is None:
             yield ("values", path), f"the bench has no number at '{path}'"
@@ -192,7 +192,7 @@ def _parsed(
             return _number(written, value, quantity, relative=below[0] == "standard_uncertainty")
         except ValueError as error:
             faults.append(((*keys, *below), str(error)))
-            return math.nan  # and no second complaint
+            return math.nan  # causes no second message
 
     if entry.interval is not None:
         low, high = (number(end, "interval", index) for index, end in enumerate(entry.interval))
@@ -208,7 +208,7 @@ def _parsed(
 
 
 def _number(written: Number, value: float, quantity: Quantity | None, *, relative: bool) -> float:
-    """SI value of what is written; ValueError with a message for the user."""
+    """SI value of a written number; ValueError with a message for the user."""
     if not isinstance(written, str):
         if quantity is not None:
             raise ValueError(

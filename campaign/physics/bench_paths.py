@@ -1,4 +1,4 @@
-"""Whether scatter and preload of a bench refer to existing friction."""
+"""Check that scatter and preload of a bench refer to existing friction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def wrong_paths(
     variation: VariationOptions | None,
     preload: PreloadOptions | None,
 ) -> Iterator[tuple[Keys, str]]:
-    """Where in a bench's `tree`, as written, a path leads to no friction, and the message."""
+    """Locations in a bench's original `tree` of paths that match no friction, and the messages."""
     if variation is not None:
         raw = _at(tree, _VARIATION)
         for wrong in wrong_scatter(variation, friction):
@@ -31,7 +31,7 @@ def wrong_paths(
 
 
 def _at(tree: Any, keys: Keys) -> Mapping[str, Any]:
-    """The table at `keys`; an empty one when there is none."""
+    """Table at `keys`; an empty one by default."""
     for key in keys:
         tree = tree.get(key) if isinstance(tree, Mapping) else None
     return tree if isinstance(tree, Mapping) else {}

@@ -1,8 +1,8 @@
-"""Arrays of one trial, or of several side by side, for the engine.
+"""Arrays of one trial, or of several in parallel, for the engine.
 
-The last axis has the lanes; w is their number. Inside the engine, the functions here give the same
-without that axis, as arrays of its numbers (`campaign.physics.vector`): each number has all lanes.
-They own nothing: else each row that is taken in a loop would cost a counting of references.
+The last axis has the lanes; w is their number. The functions here return the arrays of the engine:
+the same without that axis, with all lanes in a number (`campaign.physics.vector`). These arrays own
+no memory, else each row in a loop would count references.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ Array = NDArray[np.float64]
 class System(NamedTuple):
     """The discretised linear part by lanes; w is the number of lanes.
 
-    `known` has a column for each state and then for each input that acts, at the start and at the
-    end of the step; what friction and compensation add is `by_friction` and `by_compensation`.
-    There is a row for each state; in a single trial some more, of zeros (`vector.by_rows`).
+    `known` has a column for each state and then for each active input, at the start and at the end
+    of the step. `by_friction` and `by_compensation` are the effects of friction and compensation.
+    There is a row for each state; a single trial has additional rows of zeros (`vector.by_rows`).
     """
 
-    known: Array  # (columns / COLUMNS, COLUMNS, rows, w): a column's rows lie side by side
-    plant_inputs: int  # rows of the signals that act on the plant, the first ones
+    known: Array  # (columns / COLUMNS, COLUMNS, rows, w): rows of a column are contiguous
+    plant_inputs: int  # number of first rows of the signals, which act on the plant
     by_friction: Array  # (2, rows, w) per N m of the mean, and of the change over the step
     by_compensation: Array  # (2, rows, w)
-    friction_rows: Array  # the same two, as loops over all rows take them
+    friction_rows: Array  # the same two, for loops over all rows
     compensation_rows: Array
-    acts: NDArray[np.int64]  # (4,) for each input its row of the signals; -1: it is zero
-    seen: int  # the state that continuous compensation sees as the relative rate ...
+    acts: NDArray[np.int64]  # (4,) row of each input in the signals; -1: zero input
+    seen: int  # state that continuous compensation uses as the relative rate ...
     low_pass: Array  # (w,) ... and the time constant (s) of its filter, 0 for none
     linear_x: Array  # (states, w) torque of the continuous linear compensation
-    linear_base: Array  # (w,) the same, of the base's rate
+    linear_base: Array  # (w,) the same, per rate of the base
     step: Array  # (w,) s
 
 
 class Dry(NamedTuple):
-    """Friction models that are sets at rest, by lanes, as plant or as compensation; d of them."""
+    """Friction models that are set-valued at rest, by lanes, as plant or compensation; d models."""
 
     address: NDArray[np.uintp]  # (d,) compiled sliding torques, for this many lanes
     fixed: Array  # (d, HAS + parameters, w)
@@ -58,34 +58,34 @@ class Dry(NamedTuple):
     limits: Array  # (d, LIMITS, w) torques of rest and of the slowest sliding (N m at the load)
     rippled: NDArray[np.int64]  # (d,)
     ripple: Array  # (d, 3, w) as of `Elements`
-    wave: Array  # (d, 1, w) what the ripple makes of every torque in this step
+    wave: Array  # (d, 1, w) ripple factor of the torques in this step
     wave_at: NDArray[np.uintp]  # (d,)
-    asked: Array  # (ASKED, w) where on their curves
+    asked: Array  # (ASKED, w) direction and speed
     asked_at: int
-    answer: Array  # (1, w) the sum of their sliding torques, unsigned
+    answer: Array  # (1, w) sum of the sliding torques, unsigned
     answer_at: int
-    state: Array  # (DRY, w) of all together, as they share one rate
-    numbers: Array  # the same, as the engine's numbers: each has all lanes
+    state: Array  # (DRY, w) common to all, as they share one rate
+    numbers: Array  # the same, as the engine's numbers with all lanes
 
 
 class Elements(NamedTuple):
-    """Friction models by lanes, as plant or as compensation: k interfaces besides the dry ones.
+    """Friction models by lanes, as plant or compensation: k interfaces besides the dry ones.
 
-    Equal ones are one of g groups, asked together (`campaign.physics.equal_interfaces`).
+    Equal ones form one of g groups, with one call each (`campaign.physics.equal_interfaces`).
     """
 
     address: NDArray[np.uintp]  # (g,) compiled step functions, for this many lanes and interfaces
-    fixed: Array  # (k, HAS + parameters, w), but of a group (rows, its interfaces, w)
-    fixed_at: NDArray[np.uintp]  # (g,) where each one's rows begin
+    fixed: Array  # (k, HAS + parameters, w), within a group (rows, its interfaces, w)
+    fixed_at: NDArray[np.uintp]  # (g,) address of the rows of each group
     kept: Array  # (k, KEEPS + state, w) likewise, advanced in place
     kept_at: NDArray[np.uintp]  # (g,)
-    met: Array  # (2, MEETS, w) what they meet on the load's and on the motor's side
+    met: Array  # (2, MEETS, w) motion at the load's and at the motor's side
     met_at: NDArray[np.uintp]  # (2,)
-    answer: Array  # (ANSWERS, w) the sum of their torque lines
+    answer: Array  # (ANSWERS, w) sum of the torque lines
     answer_at: int
     viscous: Array  # (k + d, w) the linear part (N m s/rad at the load), gain included
-    motor_side: NDArray[np.int64]  # (g,) reads the resolver rather than the encoder
-    side: NDArray[np.int64]  # (k + d,) the same of each interface
+    motor_side: NDArray[np.int64]  # (g,) reads the resolver instead of the encoder
+    side: NDArray[np.int64]  # (k + d,) the same for each interface
     rippled: NDArray[np.int64]  # (g,)
     ripple: Array  # (g, 3, w) amplitude, periods, phase: torque over the angle of the load
     dry: Dry
@@ -100,7 +100,7 @@ class Controller(NamedTuple):
     output_delay: int  # whole samples ...
     output_offset: int  # ... and steps beyond them
     delay: NDArray[np.int64]  # (4,) samples
-    noisy: NDArray[np.int64]  # (4,) for each sensor its column of the noise; -1: it has none
+    noisy: NDArray[np.int64]  # (4,) column of each sensor in the noise; -1: no noise
     period: Array  # (w,) s
     proportional: Array  # (w,) A s/rad
     integral: Array  # (w,) A/rad
@@ -117,20 +117,20 @@ class Controller(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is carried from step to step, advanced in place."""
+    """State from step to step, advanced in place."""
 
     x: Array  # (states, w)
     kept: Array  # (KEPT, w) of the sampled controller
     linear: Array  # (m, w)
     readings: Array  # (4, longest delay + 1, w), ring
     outputs: Array  # (output delay + 1, w), ring
-    held: Array  # (2, w) current command that is next, and that is in force (A)
+    held: Array  # (2, w) next current command, and the active one (A)
     ended: Array  # (2, w) torque at the end of the last line: of friction, of compensation
     counters: NDArray[np.int64]  # steps done, samples done
 
 
 def zeros(*shape: int) -> Array:
-    """Zeros, from the beginning of a cache line on: no row of a block's lanes lies in two lines."""
+    """Zeros, aligned to a cache line: each row of a block's lanes lies in one line."""
     size = math.prod(shape)
     room = np.zeros(size + CACHE_LINE // 8)
     first = -room.ctypes.data % CACHE_LINE // 8
@@ -138,7 +138,7 @@ def zeros(*shape: int) -> Array:
 
 
 def by_lane(rows: Sequence[Any]) -> Array:
-    """One array of each lane, with the lanes as the last axis."""
+    """Stack one array per lane, with the lanes as the last axis."""
     array = zeros(*np.shape(rows[0]), len(rows))
     for lane, row in enumerate(rows):
         array[..., lane] = row
@@ -147,7 +147,7 @@ def by_lane(rows: Sequence[Any]) -> Array:
 
 @pasted
 def system_of(lanes: int, its: System) -> System:
-    """A system, for the inside of the engine."""
+    """View of a system with the engine's numbers."""
     return System(
         by_rows(its.known, lanes),
         its.plant_inputs,
@@ -166,7 +166,7 @@ def system_of(lanes: int, its: System) -> System:
 
 @pasted
 def elements_of(lanes: int, its: Elements) -> Elements:
-    """Friction models, for the inside of the engine."""
+    """View of friction models with the engine's numbers."""
     return Elements(
         row_of(its.address),
         by_lanes(its.fixed, lanes),
@@ -188,7 +188,7 @@ def elements_of(lanes: int, its: Elements) -> Elements:
 
 @pasted
 def dry_of(lanes: int, its: Dry) -> Dry:
-    """Dry friction, for the inside of the engine: each lane decides for itself what it does."""
+    """View of dry friction for the engine, mostly as doubles: each lane branches separately."""
     return Dry(
         row_of(its.address),
         by_lanes(its.fixed, lanes),
@@ -209,7 +209,7 @@ def dry_of(lanes: int, its: Dry) -> Dry:
 
 @pasted
 def controller_of(lanes: int, its: Controller) -> Controller:
-    """A controller, for the inside of the engine."""
+    """View of a controller with the engine's numbers."""
     return Controller(
         its.every,
         its.closes_rate_loop,
@@ -236,7 +236,7 @@ def controller_of(lanes: int, its: Controller) -> Controller:
 
 @pasted
 def memory_of(lanes: int, its: Memory) -> Memory:
-    """A memory, for the inside of the engine."""
+    """View of a memory with the engine's numbers."""
     return Memory(
         by_lanes(its.x, lanes),
         by_lanes(its.kept, lanes),

@@ -1,15 +1,15 @@
-"""numba compilation with a cache that notices changed callees.
+"""numba compilation with a cache that detects changed callees.
 
-numba's own cache compares only the file a function stands in: edit a function that it calls in
-another file, and the old machine code goes on giving the old numbers. Here the cache folder's name
-is a hash of every source file that the function may call, so any edit starts afresh:
+numba's own cache compares only the file of a function. After an edit of a callee in another file,
+the old machine code would still run. Here the name of the cache folder is a hash of every source
+file that the function can call, so any edit causes a new compilation:
 
 - for a function of `campaign.physics`, all of `campaign.physics`, which calls nothing outside;
 - for any other, also the rest of this program, its own distribution, the folders and editable
-  installs that it imports from (`campaign.source_hash`), and which libraries are installed.
+  installs that it imports from (`campaign.source_hash`), and the list of installed libraries.
 
-Where that cannot be known (a notebook's cell, a source edited since the process began) nothing is
-kept. What a module reads from data files while it is imported is not seen.
+Without that information (a notebook's cell, a source edited since the process began) no code is
+cached. Data files that a module reads during its import are not included.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ _CHOSEN_BY_USER: str = _CONFIG.CACHE_DIR  # NUMBA_CACHE_DIR
 _DECORATING = threading.RLock()
 _IMPORTED_AT = time.time()
 CLOCK_TICK = 0.02
-"""s, by which the time of a file may lie before that of its writing: Linux counts in ticks."""
+"""s; a file's time can be earlier than its writing by this much: Linux counts in ticks."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @cache
 def cache_folder(module: str) -> Path | None:
-    """Where machine code of a module's functions is kept; None: it is not kept.
+    """Cache folder for machine code of a module's functions; None: no cache.
 
-    The folder lies in the user's cache (in NUMBA_CACHE_DIR, where that is set), or in a temporary
-    folder if that is shut, or if another user may have written in it (`distrust`).
+    It is in the user's cache (in NUMBA_CACHE_DIR if that is set), or in a temporary folder if that
+    is not writable, or if another user may have written to it (`distrust`).
     """
     try:
         name = _key(module)
-    except OSError:  # a source that is gone, or that may not be read
+    except OSError:  # a source that is missing or not readable
         name = None
     if name is None:
         return None
@@ -71,10 +71,10 @@ def cache_folder(module: str) -> Path | None:
 
 @cache
 def distrust(folder: Path) -> str:
-    """Why another user may have written what lies in a folder, which would be run; "" if none may.
+    """Why another user may have written code to a folder, which would be executed; "" if none may.
 
-    A folder that others cannot enter may hold files that their group may write, as a umask of 002
-    makes them. On Windows a user's cache is the user's.
+    Group-writable files (umask 002) are accepted in a folder that others cannot enter. On Windows
+    every cache is trusted.
     """
     if os.name != "posix":
         return ""
@@ -83,7 +83,7 @@ def distrust(folder: Path) -> str:
         Path(base, name) for base, folders, files in os.walk(folder) for name in (*folders, *files)
     )
     for path in (folder, folder.resolve(), *inside):
-        with suppress(FileNotFoundError):  # another process is writing there
+        with suppress(FileNotFoundError):  # another process writes to the folder
             about = path.lstat()
             if about.st_uid != os.geteuid():
                 return f"{path} belongs to another user"
@@ -96,7 +96,7 @@ def distrust(folder: Path) -> str:
 
 
 def distrusted() -> str:
-    """What to say of the engine's folder where it is not used for that; "" where it is."""
+    """Message if the engine's cache folder is not trusted and thus not used; "" else."""
     folder = _user_cache() / digest_of_sources(_PHYSICS)
     why = distrust(folder) if folder.is_dir() else ""
     return why and (
@@ -106,7 +106,7 @@ def distrusted() -> str:
 
 
 def is_kept_for_good(folder: Path) -> bool:
-    """Whether a cache folder is the user's, and not a temporary one of this process."""
+    """Whether a cache folder is that of the user, not a temporary one of this process."""
     return folder.parent == _user_cache()
 
 
@@ -119,7 +119,7 @@ def _user_cache() -> Path:
 
 
 def _key(module: str) -> str | None:
-    """16 hexadecimal digits that change with whatever a module's functions may call."""
+    """16 hexadecimal digits that change with any code that a module's functions can call."""
     physics = digest_of_sources(_PHYSICS)
     if f"{module}.".startswith("campaign.physics."):
         return physics
@@ -140,22 +140,22 @@ def digest_of_sources(folder: Path) -> str:
 
 
 def _is_newer(sources: Mapping[str, Path]) -> bool:
-    """Whether a source was written after this process may have imported what it was before."""
+    """Whether a source was changed after this process may have imported it."""
     return any(path.stat().st_mtime > _IMPORTED_AT - CLOCK_TICK for path in sources.values())
 
 
 def _libraries() -> list[str]:
-    """Names, versions and times of all that is installed where modules are looked for."""
+    """Names, versions and times of all distributions on the module search path."""
     folders = (Path(folder) for folder in dict.fromkeys(sys.path) if folder)
     abouts = (about for folder in folders for about in folder.glob("*.dist-info"))
     return sorted(f"{about.name} {about.stat().st_mtime_ns}" for about in abouts)
 
 
 class ByModule:
-    """Numba's name for where a function is kept: by its module, not by the path of its file.
+    """Cache locator of numba: by the module of a function, not by the path of its file.
 
-    The folder has a hash of the sources, so that machine code is that of every copy of them: an
-    environment made anew, or another checkout, compiles nothing again.
+    The folder has a hash of the sources, so that all copies of them share machine code: a new
+    environment or another checkout does not compile again.
     """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
@@ -165,29 +165,29 @@ class ByModule:
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> ByModule | None:
-        """As numba asks for it; None for a function without a file."""
+        """Factory for numba; None for a function without a file."""
         return cls(function, file) if Path(file).is_file() else None
 
     def ensure_cache_path(self) -> None:
-        """Raises OSError."""
+        """Create the folder. Raises OSError."""
         self._folder.mkdir(parents=True, exist_ok=True)
 
     def get_cache_path(self) -> str:
-        """The folder."""
+        """Path of the folder."""
         return str(self._folder)
 
     def get_source_stamp(self) -> str:
-        """What is kept under another one is not used."""
+        """Hash of the source file; numba ignores entries with another stamp."""
         return hashlib.sha256(self._file.read_bytes()).hexdigest()
 
     def get_disambiguator(self) -> str:
-        """What tells functions of one name apart."""
+        """Line number, to distinguish functions with the same name."""
         return str(self._line)
 
 
 @contextmanager
 def _kept_in(folder: Path | None) -> Iterator[None]:
-    """Numba chooses the cache folder when it decorates; other packages keep their own."""
+    """Set the cache folder during a decoration of numba; other packages keep their own."""
     own = {"CACHE_DIR": str(folder), "CACHE_LOCATOR_CLASSES": f"{__name__}.{ByModule.__name__}"}
     with _DECORATING:
         before = {name: getattr(_CONFIG, name, "") for name in own}
@@ -201,7 +201,7 @@ def _kept_in(folder: Path | None) -> Iterator[None]:
 
 
 def compiled(function: F, **options: Any) -> F:
-    """Decorator: compile at the first call, keep on disk, release the GIL while running."""
+    """Decorator: compile at the first call, cache on disk, run without the GIL."""
     folder = cache_folder(function.__module__)
     with _kept_in(folder):
         compile_ = numba.njit(cache=folder is not None, nogil=True, error_model="numpy", **options)
@@ -209,43 +209,43 @@ def compiled(function: F, **options: Any) -> F:
 
 
 def entry(function: F) -> F:
-    """Decorator: as `compiled`, for what makes no arrays: counting of references is left out.
+    """Decorator: as `compiled`, without reference counting, for code that creates no arrays.
 
-    The engine's structures have dozens of arrays: counting doubled the time it took to compile.
+    The engine's structures have dozens of arrays: counting doubled the compilation time.
     """
     return compiled(function, _nrt=False, no_cfunc_wrapper=True)
 
 
 class _WithinCompiledCode(CPUDispatcher):  # type: ignore[misc]
-    """Has no code for Python, which would crash."""
+    """Dispatcher without a Python wrapper; a call from Python would crash."""
 
     def __call__(self, *args: object, **options: object) -> None:
         raise TypeError(f"{self.__name__} is called by compiled code alone; see its py_func")
 
 
 def inlined(function: F) -> F:
-    """Decorator: a part of the engine's loop without the cost of a call; it makes no arrays.
+    """Decorator: a part of the engine's loop without the cost of a call; it creates no arrays.
 
-    LLVM puts it into its callers: it takes half as long to compile as what is `pasted`.
+    LLVM inlines it into its callers: it compiles in half the time of `pasted`.
     """
     options = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    made = numba.njit(error_model="numpy", _nrt=False, **options)(function)
-    made.__class__ = _WithinCompiledCode
-    return cast(F, made)
+    dispatcher = numba.njit(error_model="numpy", _nrt=False, **options)(function)
+    dispatcher.__class__ = _WithinCompiledCode
+    return cast(F, dispatcher)
 
 
 def pasted(function: F) -> F:
-    """Decorator: pasted into its caller as source: for numbers of lanes that must be literals.
+    """Decorator: inlined into its caller as source, so that numbers of lanes are literals.
 
-    Arrays of vectors stay in registers this way.
+    Arrays of vectors then stay in registers.
     """
     return cast(F, numba.njit(inline="always", error_model="numpy")(function))
 
 
 def called(function: F) -> F:
-    """Decorator: a part of the engine that is compiled for itself, where a call costs little.
+    """Decorator: a part of the engine that is compiled separately, if a call costs little.
 
-    As `entry`, it makes no arrays.
+    As with `entry`, it creates no arrays.
     """
     return cast(F, numba.njit(error_model="numpy", _nrt=False, no_cfunc_wrapper=True)(function))
 
@@ -253,7 +253,7 @@ def called(function: F) -> F:
 def compiled_callback(signature: Any, function: Callable[..., Any], module: str) -> Any:
     """Compile `function`, which calls one of `module`, now; the result has an `address`.
 
-    Whether it is kept is asked anew each time: the module may have been edited and loaded again.
+    Each call determines the cache folder again, because the module can be edited and reloaded.
     """
     folder = cache_folder.__wrapped__(module)
     with _kept_in(folder):

@@ -1,7 +1,7 @@
 """Completeness of a bench for simulation, and its missing values.
 
-A bench is facts: whoever analyses recordings writes what is known. The equations of motion need
-more, and here is the one place that says what, and what each is for.
+A bench states facts: for an analysis of recordings, the known values are enough. The equations of
+motion need more values; this module lists them and their purposes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PURPOSES = {
     "controller.current": "the current loop",
     "limits": "what must never be exceeded while it moves",
 }
-"""What a simulation needs of a bench, by dotted path, and what for."""
+"""Purpose of each value that a simulation needs, by its dotted path in the bench."""
 
 
 class CompleteAxis(AxisOptions):
@@ -76,19 +76,19 @@ class CompleteBench(Bench):
 
 
 class IncompleteBenchError(ValueError):
-    """A bench lacks what something needs; the message is for the user.
+    """A bench lacks a necessary value; the message is for the user.
 
     Attributes:
-        paths: of the fields, dotted.
+        paths: dotted paths of the missing fields.
     """
 
     def __init__(self, message: str, paths: Iterable[str] = ()) -> None:
-        super().__init__(message)  # alone, so that it can be handed on to another process
+        super().__init__(message)  # message only: another process has to unpickle it
         self.paths = tuple(paths)
 
     @classmethod
     def of(cls, bench: Bench, paths: Sequence[str], who: str) -> IncompleteBenchError:
-        """What `who` needs and the bench does not say at `paths`, with what each is for."""
+        """Error for `who`, which needs the values missing at `paths`; with their purposes."""
         what = "; ".join(
             f"{path} ({PURPOSES[path]})" if path in PURPOSES else path for path in paths
         )
@@ -96,52 +96,52 @@ class IncompleteBenchError(ValueError):
 
 
 def lacking(bench: Bench, paths: Sequence[str] = tuple(PURPOSES)) -> tuple[str, ...]:
-    """Those of `paths` at which the bench says nothing; of all that a simulation needs."""
+    """Those of `paths` that the bench lacks; by default of all that a simulation needs."""
     return tuple(path for path in paths if _at(bench, path) is None)
 
 
 def require(bench: Bench, paths: Sequence[str], who: str) -> None:
-    """Raise IncompleteBenchError, which names every one of `paths` that the bench lacks.
+    """Raise IncompleteBenchError if the bench lacks any of `paths`; it names all of them.
 
-    who: what needs it, e.g. "a rate command's plan".
+    who: what needs the values, e.g. "a rate command's plan".
     """
     if paths := lacking(bench, paths):
         raise IncompleteBenchError.of(bench, paths, who)
 
 
 def inertia_of(bench: Bench, who: str) -> float:
-    """J (kg m^2). Raises IncompleteBenchError where nobody says it."""
+    """Inertia J (kg m^2). Raises IncompleteBenchError if the bench lacks it."""
     if bench.axis.inertia is None:
         raise IncompleteBenchError.of(bench, ("axis.inertia",), who)
     return bench.axis.inertia
 
 
 def control_rate(bench: Bench) -> float | None:
-    """Of its sampled controller (Hz); None where it is continuous, or nobody says."""
+    """Sample rate of the controller (Hz); None if it is continuous or unknown."""
     return None if bench.controller is None else bench.controller.sample_rate
 
 
 def pointing_high_pass(bench: Bench) -> float:
-    """Corner (Hz) of the high-pass that its pointing error is seen through; 0 without one."""
+    """Corner frequency (Hz) of the high-pass of the pointing error; 0 without one."""
     return 0.0 if bench.controller is None else bench.controller.pointing_high_pass
 
 
 def limits_of(bench: Bench, who: str = "whatever moves") -> LimitsOptions:
-    """Its limits. Raises IncompleteBenchError where it has none."""
+    """Limits of the bench. Raises IncompleteBenchError if it has none."""
     if bench.limits is None:
         raise IncompleteBenchError.of(bench, ("limits",), who)
     return bench.limits
 
 
 def complete(bench: Bench, who: str = "a simulation") -> CompleteBench:
-    """The same bench as one that can be simulated.
+    """The bench as a CompleteBench, for simulation.
 
-    Raises IncompleteBenchError naming every field that it lacks.
+    Raises IncompleteBenchError, which names every missing field.
     """
     if isinstance(bench, CompleteBench):
         return bench
     require(bench, tuple(PURPOSES), who)
-    # Its parts are validated; only their types become narrower.
+    # The parts are already validated; only their types become narrower.
     return CompleteBench.model_construct(
         bench.model_fields_set,
         **{
@@ -155,15 +155,15 @@ def complete(bench: Bench, who: str = "a simulation") -> CompleteBench:
 
 
 def _narrowed(kind: type[_Narrow], options: Options | None) -> _Narrow:
-    """A table as its narrower type; the caller knows that it has all of it."""
+    """A table as its narrower type; the caller ensures that no value is missing."""
     given: dict[str, Any] = {} if options is None else dict(options)
     narrowed = kind.model_construct(options.model_fields_set if options else None, **given)
     return cast("_Narrow", narrowed)
 
 
 def _at(bench: Bench, path: str) -> Any:
-    """What stands at a dotted path; None where nothing does."""
-    found: Any = bench
+    """Value at a dotted path; None without one."""
+    value: Any = bench
     for name in path.split("."):
-        found = getattr(found, name, None)
-    return found
+        value = getattr(value, name, None)
+    return value

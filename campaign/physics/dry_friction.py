@@ -1,16 +1,16 @@
 """Dry friction of all lanes: in the plant, and as a compensation.
 
-`campaign.physics.dry_step` has the scheme; here its numbers are taken from where they stand. The
-functions that the engine calls are in the order in which it does:
+`campaign.physics.dry_step` has the scheme; this module applies it to the engine's arrays. The
+functions are in the order of the engine's calls:
 
-1. The plant's dry friction is solved with all other torques as they were when the step began. The
-   rate and motion that it leaves are those that all others are then asked with: one prediction for
-   all, or what should cancel does not.
-2. The others' lines, those of a dry compensation among them.
-3. A step that ends stuck is held again, now that all lines are known; all else stays as predicted.
-4. After such a step the load's rate is set to the hull's: rounding is no sliding.
+1. Solve the plant's dry friction with all other torques as at the start of the step. The resulting
+   rate and motion are the inputs of all other models: equal torques cancel only with one common
+   prediction.
+2. Compute the lines of the others, including a dry compensation.
+3. Recompute the holding line of a step that ends stuck, from all lines; the rest is unchanged.
+4. After such a step set the load's rate to the hull's: rounding must not cause sliding.
 
-Each lane decides for itself. A model gives its sliding torque by address, as it gives its step
+Each lane branches separately. The engine gets a model's sliding torque by address, like its step
 function (`campaign.physics.sliding_torque`).
 """
 
@@ -61,9 +61,9 @@ from campaign.physics.vector import each_lane
 
 @inlined
 def expect_dry(lanes: int, friction: Elements, by: Array) -> None:
-    """What dry friction does over the step, all else being as it was when the step began.
+    """Solve dry friction over the step, with all other torques as at its start.
 
-    by: `System.by_friction`. The rates in `friction.met` are without this friction; then, with it.
+    by: `System.by_friction`. Updates the rates in `friction.met` from those without this friction.
     """
     solve_dry(lanes, friction.dry, each_lane(by), each_lane(friction.met[0]))
 
@@ -86,8 +86,8 @@ def solve_dry(lanes: int, dry: Dry, by: Array, met: Array) -> None:
         dry.asked[ASKED_SPEED, k] = max(way * v0 + gain, 0.0)
     _slide(lanes, dry)
     for k in range(lanes):
-        # Where friction rises with the rate, the corrected rate is the linearly implicit one:
-        # however steep the rise, it does not throw the rate across zero.
+        # If friction rises with the rate, the corrected rate is linearly implicit: even a steep
+        # rise does not carry the rate across zero.
         way, gain = dry.asked[ASKED_DIRECTION, k], state[DRY_GAIN, k]
         rise = dry.answer[0, k] - state[DRY_START, k]
         slope = -0.5 * by[MEAN, RATE, k] * rise / (gain if gain != 0.0 else 1.0)
@@ -118,7 +118,7 @@ def solve_dry(lanes: int, dry: Dry, by: Array, met: Array) -> None:
 
 @inlined
 def expect_filtered(system: System, plant: Array, met: Array) -> None:
-    """The same for compensation behind a low-pass. plant: `Dry.numbers` of its friction."""
+    """`expect_dry` for compensation behind a low-pass. plant: `Dry.numbers` of its friction."""
     by, seen = system.by_friction, system.seen
     more = fma(by[CHANGE, seen], plant[DRY_CHANGE], by[MEAN, seen] * plant[DRY_MEAN])
     met[MEETS_RATE_END] = met[MEETS_RATE_END] + more
@@ -130,8 +130,8 @@ def expect_filtered(system: System, plant: Array, met: Array) -> None:
 def feed_forward(lanes: int, follows: bool, plant: Dry, compensation: Elements) -> None:
     """Equation 4.6 as a compensation, s(v) sgn(v) with sgn(0) = 0.
 
-    follows: the plant is dry and its own rate is what is seen. Then the directions are the plant's,
-    and while that sticks the compensation is zero. Else they are the signs of the rate. A jump
+    follows: the plant is dry and compensation uses its rate. Then the directions are those of the
+    plant, and compensation is zero while it sticks. Else they are the signs of the rate. A jump
     inside the step enters by its mean and first moment.
     """
     met, answer = each_lane(compensation.met[0]), each_lane(compensation.answer)
@@ -188,9 +188,9 @@ def hold_again(
     new: Array,
     base_end: float,
 ) -> None:
-    """The line of a step that ends stuck, now that the lines of all else are known.
+    """Recompute the line of a step that ends stuck, from the lines of all other models.
 
-    known, new: as in the engine.   base_end: rate of the hull when the step ends (rad/s).
+    known, new: as in the engine.   base_end: rate of the hull at the end of the step (rad/s).
     """
     dry, fed = friction.dry.numbers, compensation.dry.numbers
     stuck = dry[DRY_DIRECTION] == 0.0
@@ -219,7 +219,7 @@ def hold_again(
 
 @inlined
 def dry_torque_as_it_begins(dry: Array, first: bool) -> float:
-    """The torque as a step begins (N m). dry: `Dry.numbers`.   first: no step was before."""
+    """Torque at the start of a step (N m). dry: `Dry.numbers`.   first: it is the first step."""
     start = dry[DRY_START]
     torque: float = where(first, start, 0.5 * (start + dry[DRY_ENDED]))
     return torque
@@ -227,7 +227,7 @@ def dry_torque_as_it_begins(dry: Array, first: bool) -> float:
 
 @inlined
 def add_line(elements: Elements) -> None:
-    """Add it to the lines of the other models; what the next record needs is kept."""
+    """Add the dry line to the lines of the other models; keep its end for the next record."""
     answer, dry = elements.answer, elements.dry.numbers
     answer[MEAN] = answer[MEAN] + dry[DRY_MEAN]
     answer[CHANGE] = answer[CHANGE] + dry[DRY_CHANGE]
@@ -236,14 +236,14 @@ def add_line(elements: Elements) -> None:
 
 @inlined
 def rest(dry: Array, base_end: float, known: Array) -> None:
-    """A stuck load has the hull's rate, but for a lane whose numbers are none."""
+    """Set the rate of a stuck load to the hull's rate, except in a lane that has diverged."""
     stuck = (dry[DRY_DIRECTION] == 0.0) & (abs(known[RATE] - base_end) < math.inf)
     known[RATE] = where(stuck, base_end, known[RATE])
 
 
 @inlined
 def _slide(lanes: int, dry: Dry) -> None:
-    """The sum of all sliding torques, in `dry.answer`; where, stands in `dry.asked`."""
+    """Sum all sliding torques into `dry.answer`, for direction and speed in `dry.asked`."""
     for k in range(lanes):
         dry.answer[0, k] = 0.0
     for e in range(dry.address.shape[0]):
@@ -254,7 +254,7 @@ def _slide(lanes: int, dry: Dry) -> None:
 
 @inlined
 def _limits(lanes: int, dry: Dry, met: Array) -> None:
-    """The sums of all limits where the step has its middle, by the ripples."""
+    """Sum all limits at the position in the middle of the step, with ripples."""
     for row in range(LIMITS):
         for k in range(lanes):
             dry.state[DRY_HOLDS_FORWARDS + row, k] = 0.0
@@ -271,7 +271,7 @@ def _limits(lanes: int, dry: Dry, met: Array) -> None:
 
 @inlined
 def _limits_towards(k: int, state: Array) -> Limits:
-    """Of lane `k`, in its direction."""
+    """Limits of lane `k`, in its direction."""
     back = state[DRY_DIRECTION, k] < 0.0
     holds, holds_back = state[DRY_HOLDS_FORWARDS, k], state[DRY_HOLDS_BACKWARDS, k]
     starts, starts_back = state[DRY_STARTS_FORWARDS, k], state[DRY_STARTS_BACKWARDS, k]
@@ -293,7 +293,7 @@ def _starts(k: int, state: Array, direction: float) -> float:
 
 @inlined
 def _response(k: int, by: Array) -> Response:
-    """Of lane `k`; friction acts against the motion, so that the columns are negative."""
+    """Response of lane `k`; friction opposes the motion, so the columns are negative."""
     return Response(
         -by[MEAN, RATE, k],
         -by[CHANGE, RATE, k],
@@ -304,7 +304,7 @@ def _response(k: int, by: Array) -> Response:
 
 @inlined
 def _with_line(row: int, by: Array, mean: float, change: float, ended: float) -> float:
-    """A state when the step ends, with one more torque line."""
+    """State at the end of the step, with an additional torque line."""
     total: float = fma(by[CHANGE, row], change, fma(by[MEAN, row], mean, ended))
     return total
 

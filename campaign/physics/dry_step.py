@@ -1,32 +1,32 @@
 """One step of dry friction: sliding, stuck, or an event, to second order.
 
-Dry friction is a set at rest, |T| <= Ts, and s(v) sgn(v) when sliding (Equation 4.6). Parallel dry
+Dry friction is a set at rest, |T| <= Ts, and s(v) sgn(v) in sliding (Equation 4.6). Parallel dry
 interfaces share one relative rate, so they slide and stick together: the sum of their curves is
-one curve, the sum of their static torques one static torque. What is kept from step to step is the
+one curve, the sum of their static torques one static torque. The state from step to step is the
 direction of sliding: 1, -1, or 0 for stuck.
 
-A step knows the relative rate v0 where it begins, what rate v1 and motion q it would end with
-without this friction, and how both answer to a torque that is a straight line over the step:
+Inputs of a step are the relative rate v0 at its start, rate v1 and motion q at its end without this
+friction, and the response of both to a torque that is a straight line over the step:
 
     v(h) = v1 - (a mean + b change)      q(h) = q - (c mean + d change)       (`Response`)
 
-Solved for the line, this gives the *holding line*: the one that leads to a wanted rate and motion.
-It is the applied torque with its mean and first moment over the step. Three things can happen:
+Solved for the line, this gives the *holding line*, which results in a given rate and motion. It is
+the applied torque with its mean and first moment over the step. There are three cases:
 
-- Sliding on. The line goes from s(v0) to s(v(h)), the trapezoidal rule, with v(h) predicted from
-  s(v0) and corrected once.
-- Stopping, at the share p of the step: v(h) would change its sign. p is where the parabola through
-  v0, v(h) and the motion crosses zero. If friction can hold what then acts, the rest of the step is
-  stuck: it is the holding line to rate 0 and motion v0 p h / 2, so that rate and angle are right
-  although the torque jumps inside the step. If it can not, friction turns round at p: two
-  constants, entered as the line of their mean and first moment.
-- Stuck: the holding line to rate 0 and motion 0. Where that line leaves -Ts .. Ts, it breaks away:
-  what lies beyond Ts is taken off, again by its mean and first moment, and where the slowest
-  sliding has less torque than rest, so is the difference from then on.
+- Continued sliding. The line goes from s(v0) to s(v(h)), the trapezoidal rule, with v(h) predicted
+  from s(v0) and corrected once.
+- Stopping at the share p of the step: v(h) would change its sign. p is the zero of the parabola
+  through v0, v(h) and the motion. If friction can hold the applied torque, the rest of the step is
+  stuck: the holding line to rate 0 and motion v0 p h / 2, so that rate and angle are right although
+  the torque jumps inside the step. If it cannot, friction reverses at p: two constants, represented
+  by the line of their mean and first moment.
+- Stuck: the holding line to rate 0 and motion 0. If that line leaves -Ts .. Ts, the load breaks
+  away. The part beyond Ts is subtracted, again by its mean and first moment. If the slowest sliding
+  has less torque than rest, the difference is subtracted from then on, too.
 
-With both moments right, a step with an event is off by third order, as the trapezoidal rule is in
-a step without. A constant that brings the rate to zero by the end of the step (Moreau's time
-stepping) is off by second order in the angle.
+With both moments, the error of a step with an event is of third order, like that of the trapezoidal
+rule in a step without. A constant that brings the rate to zero at the end of the step (Moreau's
+time stepping) has an error of second order in the angle.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from campaign.physics.compilation import called
 
 
 class Response(NamedTuple):
-    """How much the relative rate and angle at the end of a step fall per N m of friction."""
+    """Decrease of relative rate and angle at the end of a step per N m of friction."""
 
     rate_mean: float
     rate_change: float
@@ -47,10 +47,10 @@ class Response(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Torques (N m, unsigned) about rest, in the direction of sliding (when stuck, forwards).
+    """Torques (N m, unsigned) near rest, in the direction of sliding (if stuck, forwards).
 
-    holds: the most before it slides that way.   starts: of the slowest sliding.
-    ..._back: the same the other way.
+    holds: largest torque before sliding.   starts: torque of the slowest sliding.
+    ..._back: the same in the other direction.
     """
 
     holds: float
@@ -60,18 +60,18 @@ class Limits(NamedTuple):
 
 
 class DryStep(NamedTuple):
-    """What dry friction does over one step.
+    """Result of dry friction for one step.
 
     Attributes:
         mean, change: the torque line (N m), without the linear viscous part.
-        start, end: torque when the step begins and when it ends (N m), never beyond Ts; the line's
-            own ends may be where the line stands for a jump. A recorder takes the mean of the end
-            of one step and the start of the next: the inputs' straight lines make each lag.
-        direction: of sliding when the step ends; 0: stuck.
-        rate_end: relative rate then (rad/s); 0 when stuck.
-        motion: relative angle that the step moves by (rad).
-        leaves: share of the step at which the direction that it began with ends; 1 if it does not.
-        begins: share of the step at which the direction that it ends with begins.
+        start, end: torque at the start and end of the step (N m), never beyond Ts; the ends of a
+            line that represents a jump can be. A recorder uses the mean of the end of one step and
+            the start of the next: the straight lines of the inputs cause a lag of each.
+        direction: of sliding at the end of the step; 0: stuck.
+        rate_end: relative rate then (rad/s); 0 if stuck.
+        motion: change of the relative angle over the step (rad).
+        leaves: share of the step at which the initial direction ends; 1 if it does not.
+        begins: share of the step at which the final direction begins.
     """
 
     mean: float
@@ -87,7 +87,7 @@ class DryStep(NamedTuple):
 
 @called
 def holding_line(rate: float, motion: float, response: Response) -> tuple[float, float]:
-    """Mean and change of the torque line that takes `rate` and `motion` off the end of a step."""
+    """Mean and change of the torque line that reduces rate and motion by `rate` and `motion`."""
     per = 1.0 / (
         response.rate_mean * response.angle_change - response.rate_change * response.angle_mean
     )
@@ -99,10 +99,10 @@ def holding_line(rate: float, motion: float, response: Response) -> tuple[float,
 
 @called
 def crossing(v0: float, v1: float, mean_rate: float) -> float:
-    """Share of a step at which a rate from v0 to v1, of other sign, is zero; in 0 .. 1.
+    """Share of a step at which a rate from v0 to v1, of opposite sign, is zero; in 0 .. 1.
 
-    The root of v0 + (v1 - v0) u - bend u (1 - u), by Newton's method from the straight line's: one
-    step leaves what is of third order in the step.
+    Root of v0 + (v1 - v0) u - bend u (1 - u), by one Newton step from the root of the straight
+    line; the error is of third order in the step.
     """
     fall = v1 - v0
     part = -v0 / (fall if fall != 0.0 else 1.0)
@@ -116,9 +116,9 @@ def crossing(v0: float, v1: float, mean_rate: float) -> float:
 def beyond(
     first: float, last: float, least: float, most: float
 ) -> tuple[float, float, float, float]:
-    """What of a line from `first` to `last` lies beyond least .. most.
+    """Part of a line from `first` to `last` beyond least .. most.
 
-    Its mean and its change, as of the line with the same first moment; its sign, 0 if nothing does;
+    Returns mean and change of the line with the same first moment; its sign, 0 without such a part;
     and the share of the step at which it begins.
     """
     over_first = first - min(max(first, least), most)
@@ -145,28 +145,28 @@ def step_of(
     start: float,
     end: float,
 ) -> DryStep:
-    """The step from relative rate v0; v1 and `motion` are what it ends with without this friction.
+    """Solve a step from relative rate v0; v1 and `motion`: its end without this friction.
 
-    start, end: sliding torques (N m, unsigned) at v0 and at the rate that sliding on leads to. No
-    branch that could not be a choice between numbers that are there already.
+    start, end: sliding torques (N m, unsigned) at v0 and at the end of continued sliding. Every
+    branch is a choice between computed numbers.
     """
     stuck = direction == 0.0
     way = -1.0 if direction < 0.0 else 1.0
     low = limits.holds_back if way > 0.0 else limits.holds
     high = limits.holds if way > 0.0 else limits.holds_back
 
-    # Sliding on.
+    # Continued sliding.
     mean, change = way * 0.5 * (start + end), way * (end - start)
     reached = v1 - response.rate_mean * mean - response.rate_change * change
     moved = motion - response.angle_mean * mean - response.angle_change * change
     slides = not stuck and way * reached > 0.0
 
-    # Stopping, and holding what is left.
+    # Stopping, and holding over the rest of the step.
     part = 0.0 if stuck else crossing(v0, reached, moved / step)
     stopped = 0.5 * v0 * part * step
     hold, slope = holding_line(v1, motion - stopped, response)
 
-    # Turning round, where in the rest of the step that would be more than friction can hold.
+    # Reversal, if the rest of the step needs more torque than friction can hold.
     until = way * 0.5 * (start + limits.starts)
     left = way * (hold - until * part)
     too_much = left < -limits.holds_back * (1.0 - part) or left > limits.holds * (1.0 - part)
@@ -175,7 +175,7 @@ def step_of(
     turned = until * part + after * (1.0 - part)
     jump = 6.0 * (after - until) * part * (1.0 - part)
 
-    # Breaking away: what is beyond the limits is not held, and sliding may take less than rest.
+    # Breakaway: torque beyond the limits is not held, and sliding can need less than rest.
     first, last = hold - 0.5 * slope, hold + 0.5 * slope
     excess, bent, broken, began = beyond(first, last, -low, high)
     least = limits.holds - limits.starts if broken > 0.0 else limits.holds_back - limits.starts_back

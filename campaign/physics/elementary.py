@@ -1,27 +1,27 @@
 """exp, expm1, log, power, sin, cos, tanh with reproducible bits.
 
-A loop over lanes is compiled to SIMD instructions, its remainder and a single call to scalar ones.
-Mathematical libraries use another algorithm for a vector than for a number, and another one on
-another system, so a trial's last digits would depend on how many trials ran beside it, and where.
-Here every result is made of operations that IEEE 754 rounds in exactly one way (sum, product,
-quotient, fma) and of bit patterns, in an order that is written down. LLVM keeps that order as long
-as no fastmath flag is on; **none may be in a function that calls these**, since `reassoc` rounds
-vectors and scalars differently, and `contract` may.
+A loop over lanes is compiled to SIMD instructions; its remainder and a single call are scalar.
+Mathematical libraries use different algorithms for vectors, for numbers, and on other systems. The
+last digits of a trial would depend on the system and on the number of parallel trials. Here every
+result consists of operations that IEEE 754 rounds in exactly one way (sum, product, quotient, fma)
+and of bit patterns, in a fixed order. LLVM keeps that order without fastmath flags; **no function
+that calls these may have one**, since `reassoc` rounds vectors and scalars differently, and
+`contract` may.
 
-No function branches: each lane computes every case and selects its own, so that they work on
-vectors of lanes (`campaign.physics.vector`), and loops over them become SIMD loops (in a loop of
-one's own, Python's `/` prevents that: see `divide`). A NaN stays a NaN; its sign and payload, which
-IEEE 754 leaves open, are left open.
+No function branches: each lane computes every case and selects its own. So they work on vectors of
+lanes (`campaign.physics.vector`), and loops over them become SIMD loops (Python's `/` in such a
+loop prevents that: see `divide`). A NaN stays a NaN; its sign and payload are undefined, as in
+IEEE 754.
 
-Largest errors found in millions of arguments, in units in the last place (ulp):
+Largest errors in millions of arguments, in units in the last place (ulp):
 
     exp 0.87   expm1 1.3   log 0.56   sin, cos 1.5 (|x| <= 1e6)   tanh 2.5
     power 1.1 where the result is within e^-10 to e^10; 7e-15 of any result
 
-The kernels are minimax polynomials, found by Remez' exchange algorithm in 60 digits; the leading
-coefficients were rounded to doubles one after the other, the rest fitted anew each time. "Off by"
-is the relative error that a kernel alone adds; half an ulp is 1.1e-16. A processor without fused
-multiply-add gives the same bits, but slowly: there fma is a call.
+The kernels are minimax polynomials from Remez' exchange algorithm in 60 digits; the leading
+coefficients were rounded to doubles one by one, the rest fitted again each time. "Off by" is the
+relative error that a kernel alone adds; half an ulp is 1.1e-16. A processor without fused
+multiply-add gives the same bits, but slower: fma is then a call.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from campaign.physics.compilation import pasted
 from campaign.physics.vector import Vector, call_llvm, splat, vector_among
 
 _TO_INTEGER = 1.5 * 2.0**52
-"""Added to |x| < 2^51 it rounds x to an integer, which then stands in the sum's lowest bits."""
+"""Added to |x| < 2^51, it rounds x to an integer in the lowest bits of the sum."""
 _SIGN_BIT = -(2**63)
 _MANTISSA_BITS = 52
 _EXPONENT_MASK = 0x7FF
@@ -45,12 +45,12 @@ _BIAS = 1023
 _SMALLEST_NORMAL = 2.0**-1022
 _BITS_OF_2_TO_52 = (_BIAS + 52) << _MANTISSA_BITS
 _FROM_SQRT_HALF_TO_ONE = 0x3FF0000000000000 - 0x3FE6A09E667F3BCD
-"""1.0 less sqrt(1/2), both as bits. Added to the bits of x, it carries into the exponent just where
-the mantissa is sqrt(2) or more."""
+"""1.0 minus sqrt(1/2), both as bits. Added to the bits of x, it carries into the exponent if and
+only if the mantissa is at least sqrt(2)."""
 
 _LOG2_E = 1.4426950408889634
 _LN2 = (0.6931471805599453, 2.3190468138462996e-17)
-"""ln 2 = the sum: a double, and the double nearest to what is left."""
+"""ln 2 = the sum: a double, and the double nearest to the remainder."""
 _LN2_SHORT = (float.fromhex("0x1.62e42fefa38p-1"), 5.497923018708371e-14)
 """The same, the first in 42 bits: its product with an exponent is exact."""
 
@@ -88,7 +88,7 @@ _LOG = (
 
 _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
-"""pi/2 = the sum, each the double nearest to what is left."""
+"""pi/2 = the sum, each the double nearest to the remainder."""
 
 _SIN = (
     -0.1666666666666663,
@@ -115,7 +115,7 @@ _LARGEST_ANGLE = 1e15
 
 @intrinsic
 def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
-    """Give a b + c, rounded once."""
+    """Return a b + c, rounded once."""
     number = vector_among((a, b, c)) or types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -126,7 +126,7 @@ def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
 
 @intrinsic
 def divide(typingctx: Any, a: Any, b: Any) -> Any:
-    """Give a / b as IEEE 754 has it; Python's `/` looks for zero and raises, which is a branch."""
+    """Return a / b of IEEE 754; Python's `/` raises for zero, which is a branch."""
     number = vector_among((a, b)) or types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -137,7 +137,7 @@ def divide(typingctx: Any, a: Any, b: Any) -> Any:
 
 @intrinsic
 def nearest(typingctx: Any, x: Any) -> Any:
-    """Give the nearest whole number, the even one of two."""
+    """Return the nearest integer; a tie rounds to even."""
     number = vector_among((x,)) or types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -148,9 +148,9 @@ def nearest(typingctx: Any, x: Any) -> Any:
 
 @intrinsic
 def where(typingctx: Any, condition: Any, yes: Any, no: Any) -> Any:
-    """`yes if condition else no` of two numbers that are there already.
+    """`yes if condition else no` of two computed numbers.
 
-    Of vectors, lane by lane.
+    Vectors lane by lane.
     """
     number = vector_among((yes, no)) or types.float64
     if isinstance(condition, Vector) and number == types.float64:
@@ -164,7 +164,7 @@ def where(typingctx: Any, condition: Any, yes: Any, no: Any) -> Any:
 
 @intrinsic
 def any_of(typingctx: Any, condition: Any) -> Any:
-    """Whether a condition holds in any lane: what none of them needs may be left out."""
+    """Whether a condition is true in any lane: the caller can omit work that no lane needs."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         if not isinstance(condition, Vector):
@@ -177,7 +177,7 @@ def any_of(typingctx: Any, condition: Any) -> Any:
 
 @intrinsic
 def bits_of(typingctx: Any, x: Any) -> Any:
-    """Give the 64 bits of a double as an integer."""
+    """Return the 64 bits of a double as an integer."""
     bits = Vector(types.int64, x.lanes) if isinstance(x, Vector) else types.int64
     number = x if isinstance(x, Vector) else types.float64
 
@@ -189,7 +189,7 @@ def bits_of(typingctx: Any, x: Any) -> Any:
 
 @intrinsic
 def double_of(typingctx: Any, bits: Any) -> Any:
-    """Give the double that has these 64 bits."""
+    """Return the double with these 64 bits."""
     number = Vector(types.float64, bits.lanes) if isinstance(bits, Vector) else types.float64
     bits = bits if isinstance(bits, Vector) else types.int64
 
@@ -201,11 +201,11 @@ def double_of(typingctx: Any, bits: Any) -> Any:
 
 @intrinsic
 def polynomial(typingctx: Any, x: Any, coefficients: Any) -> Any:
-    """Give c[0] + c[1] x + c[2] x^2 + ... of a tuple of doubles, by Estrin's scheme in fma.
+    """Return c[0] + c[1] x + c[2] x^2 + ... of a tuple of doubles, by Estrin's scheme with fma.
 
-    Neighbours are joined, (c[0] + c[1] x) + (c[2] + c[3] x) x^2 + ..., and then the pairs in the
-    same way. Eleven coefficients take four steps that wait for each other, in Horner's scheme ten,
-    and for a single trial it is the waiting that costs.
+    It joins neighbors, (c[0] + c[1] x) + (c[2] + c[3] x) x^2 + ..., and then the pairs in the same
+    way. Eleven coefficients take four dependent steps, in Horner's scheme ten. For a single trial
+    the latency determines the time.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -233,7 +233,7 @@ def exp(x: float) -> float:
 
 @pasted
 def expm1(x: float) -> float:
-    """e^x - 1, with a small relative error where x is nearly 0 too."""
+    """e^x - 1, with a small relative error near x = 0 too."""
     half_scale, r, curve = _reduced_exp(x, 0.0)
     half = fma(half_scale, curve, fma(half_scale, r, half_scale - 0.5))
     result = where(abs(x) < _EXPM1_IS_X, x, 2.0 * half)
@@ -274,9 +274,9 @@ def power(x: float, y: float) -> float:
 
 @pasted
 def sin(x: float) -> float:
-    """Sine of x (rad): to 1.5 ulp for |x| <= 1e6, also where it is nearly 0.
+    """Sine of x (rad): to 1.5 ulp for |x| <= 1e6, also near its zeros.
 
-    The error grows to 5e-16 at 1e15. Beyond, NaN: neighbouring doubles are 0.1 rad and more apart.
+    The error grows to 5e-16 at 1e15. NaN beyond: adjacent doubles differ by 0.1 rad and more.
     """
     result: float = where(x != 0.0, _sine_from_quarter(x, 0), x)
     return result
@@ -300,7 +300,7 @@ def tanh(x: float) -> float:
 
 @pasted
 def _exp_of_sum(x: float, low: float) -> float:
-    """e^(x + low), |low| being no more than some ulp of x."""
+    """e^(x + low), |low| at most some ulp of x."""
     half_scale, r, curve = _reduced_exp(x, low)
     result = where(x < _EXP_VANISHES, 0.0, 2.0 * fma(half_scale, r + curve, half_scale))
     last: float = where(x > _EXP_OVERFLOWS, math.inf, result)
@@ -311,12 +311,12 @@ def _exp_of_sum(x: float, low: float) -> float:
 def _reduced_exp(x: float, low: float) -> tuple[float, float, float]:
     """2^(k-1), r and e^r - 1 - r, where x + low = k ln 2 + r, |r| <= ln(2)/2 and -707 <= x <= 710.
 
-    Half of 2^k, since 2^1024 is no double and the largest results need it.
+    It returns half of 2^k, because the largest results need 2^1024, which is no double.
     """
     shifted = fma(x, _LOG2_E, _TO_INTEGER)
     k = shifted - _TO_INTEGER
     half_scale = double_of((bits_of(shifted) + (_BIAS - 1)) << _MANTISSA_BITS)
-    main = fma(k, -_LN2[0], x)  # exact: a multiple of 2^-53 below 1 (or x itself, k being 0)
+    main = fma(k, -_LN2[0], x)  # exact: a multiple of 2^-53 below 1 (or x itself if k = 0)
     rest = fma(k, -_LN2[1], low)
     r = main + rest
     lost = rest - (r - main)
@@ -325,7 +325,7 @@ def _reduced_exp(x: float, low: float) -> tuple[float, float, float]:
 
 @pasted
 def _log_in_two(x: float) -> tuple[float, float]:
-    """Natural logarithm, 0 < x < inf, as a sum of two doubles that is good to 2^-56 of it.
+    """Natural logarithm, 0 < x < inf, as a sum of two doubles; relative error 2^-56.
 
     With x = 2^k m, sqrt(1/2) <= m < sqrt(2), and s = (m - 1) / (m + 1): ln m = 2 artanh(s).
     """
@@ -334,7 +334,7 @@ def _log_in_two(x: float) -> tuple[float, float]:
     biased = ((bits + _FROM_SQRT_HALF_TO_ONE) >> _MANTISSA_BITS) & _EXPONENT_MASK
     m = double_of(bits - ((biased - _BIAS) << _MANTISSA_BITS))
     k = double_of(biased | _BITS_OF_2_TO_52) - (2.0**52 + _BIAS) - where(subnormal, 54.0, 0.0)
-    # s + s_low: the quotient, and what its own rounding and that of m + 1 took from it.
+    # s + s_low: the quotient, and the rounding errors of it and of m + 1.
     divisor = m + 1.0
     divisor_low = m - (divisor - 1.0)
     inverse = divide(1.0, divisor)
@@ -351,10 +351,10 @@ def _log_in_two(x: float) -> tuple[float, float]:
 
 @pasted
 def _sine_from_quarter(x: float, quarter: int) -> float:
-    """sin(x + quarter pi/2): x = k pi/2 + r, |r| <= pi/4, and sin or cos of r as k says.
+    """sin(x + quarter pi/2): x = k pi/2 + r, |r| <= pi/4, and sin or cos of r according to k.
 
     pi/2 is subtracted in three parts (Cody and Waite). The first difference is exact, a multiple of
-    2^-53 below 1; the third part matters only where r, and with it the sine, is nearly 0.
+    2^-53 below 1; the third part is relevant only if r, and thus the sine, is nearly 0.
     """
     shifted = fma(x, _TWO_OVER_PI, _TO_INTEGER)
     k = shifted - _TO_INTEGER

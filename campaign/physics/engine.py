@@ -1,19 +1,17 @@
 """The engine: loop, friction and controller, step by step, compiled.
 
-Scheme: everything linear is exact (`campaign.physics.loop.discretise`). Each friction model is
-asked once per step for its torque as a straight line over the step, from the relative rate at the
-start, the rate expected at the end and their mean; that line is then an input of the linear part.
-The result is of second order in the step for friction with a state.
+Scheme: the linear part is exact (`campaign.physics.loop.discretise`). Each friction model returns
+its torque once per step as a straight line over the step, from the relative rate at the start, the
+predicted rate at the end and the mean rate. This line is an input of the linear part. The result
+is of second order in the step for friction with a state.
 
-Rates at the end of a step are expected from the torques as they were when it began: one prediction
-for the plant's friction and for the models of it that compensate, so that what should cancel
-cancels.
+Rates at the end of a step are predicted from the torques at its start. The plant's friction and its
+models in the compensation share one prediction, so that equal torques cancel.
 
 The engine knows no friction model, compensation or controller form by name. It advances one trial,
-or a block of LANES trials of one structure: the same lines of code, in which a number is a double
-or a vector with a lane for each trial (`campaign.physics.vector`). Nothing that a lane computes
-depends on its neighbours, and no rounding depends on how many there are: sums have one order, and
-products are fused only where `fma` says so.
+or a block of LANES trials of one structure, with the same code: a number is a double, or a vector
+with a lane per trial (`campaign.physics.vector`). Results of a lane are independent of the other
+lanes, and so is rounding: sums have one order, and products are fused only by `fma`.
 """
 
 from __future__ import annotations
@@ -95,7 +93,7 @@ def _begin(system: System, friction: Elements, memory: Memory, known: Array) -> 
 
 @inlined
 def _hold(system: System, memory: Memory, changes: bool, known: Array) -> None:
-    """What a sampled controller puts out: it is held until the next one is due."""
+    """Hold the output of a sampled controller until the next one is due."""
     if changes:
         memory.held[1] = memory.held[0]
     known[memory.x.shape[0] + 2 * system.plant_inputs] = memory.held[1]
@@ -103,7 +101,7 @@ def _hold(system: System, memory: Memory, changes: bool, known: Array) -> None:
 
 @inlined
 def _read_inputs(system: System, memory: Memory, signals: Array, now: int, known: Array) -> None:
-    """The inputs that act on the plant, at the start of the step and at its end."""
+    """Inputs of the plant at the start and at the end of the step."""
     inputs, states = system.plant_inputs, memory.x.shape[0]
     for which in range(inputs):
         known[states + which] = signals[which, now]
@@ -112,7 +110,7 @@ def _read_inputs(system: System, memory: Memory, signals: Array, now: int, known
 
 @inlined
 def _base_rates(system: System, signals: Array, now: int) -> tuple[float, float]:
-    """Rates of the hull when the step begins and when it ends (rad/s)."""
+    """Rates of the hull at the start and at the end of the step (rad/s)."""
     start, end, row = 0.0, 0.0, system.acts[BASE_RATE]
     if row >= 0:
         start, end = signals[row, now], signals[row, now + 1]
@@ -121,7 +119,7 @@ def _base_rates(system: System, signals: Array, now: int) -> tuple[float, float]
 
 @inlined
 def _times(matrix: Array, known: Array, new: Array) -> None:
-    """What follows of what is known: new = matrix known, some columns at a time."""
+    """Multiply: new = matrix known, several columns at a time."""
     rows = matrix.shape[2]
     for row in range(rows):
         new[row] = 0.0
@@ -146,7 +144,7 @@ def _expect(
     base_start: float,
     base_end: float,
 ) -> None:
-    """What friction meets over the step, should all torques stay as they are."""
+    """Predict the inputs of friction over the step, with constant torques."""
     met, held = friction.met[0], friction.answer[HELD]
     end = fma(system.by_friction[MEAN, RATE], held, new[RATE])
     angle = fma(system.by_friction[MEAN, RELATIVE_ANGLE], held, new[RELATIVE_ANGLE])
@@ -168,7 +166,7 @@ def _expect(
 def _compensate(
     lanes: int, system: System, friction: Elements, compensation: Elements, x: Array, new: Array
 ) -> None:
-    """What continuous compensation answers."""
+    """Compute the torque lines of continuous compensation."""
     dry = friction.dry.address.shape[0] > 0
     _expect_seen(system, friction, compensation, x, new)
     if dry and system.seen != RATE:
@@ -183,7 +181,7 @@ def _compensate(
 def _expect_seen(
     system: System, friction: Elements, compensation: Elements, x: Array, new: Array
 ) -> None:
-    """The same of the rate that continuous compensation sees, which may be filtered."""
+    """Predict the rate that continuous compensation uses, which can be filtered."""
     met, plant, row = compensation.met[0], friction.met[0], system.seen
     if row == RATE:
         met[MEETS_RATE_START], met[MEETS_RATE_END] = plant[MEETS_RATE_START], plant[MEETS_RATE_END]
@@ -192,7 +190,7 @@ def _expect_seen(
         end = fma(system.by_friction[MEAN, row], friction.answer[HELD], new[row])
         end = fma(system.by_compensation[MEAN, row], compensation.answer[HELD], end)
         met[MEETS_RATE_START], met[MEETS_RATE_END] = x[row], end
-        # What the low-pass has let through: the way, less what it still holds back.
+        # The output of the low-pass: the displacement minus the lag of the filter.
         held_back = system.low_pass * (end - x[row]) * met[MEETS_PER_STEP]
         met[MEETS_RATE_MEAN] = plant[MEETS_RATE_MEAN] - held_back
 
@@ -206,7 +204,7 @@ def _take(
     new: Array,
     x: Array,
 ) -> None:
-    """Add to the new states what follows of the torque lines."""
+    """Add the effect of the torque lines to the new states."""
     by, mean, change = system.friction_rows, friction.answer[MEAN], friction.answer[CHANGE]
     also, added, rising = (
         system.compensation_rows, compensation.answer[MEAN], compensation.answer[CHANGE],
@@ -220,7 +218,7 @@ def _take(
 
 @inlined
 def _ended_line(elements: Elements) -> float:
-    """Where the line ends of all models but the dry ones, whose line is added to the answer."""
+    """End of the line of all models without the dry ones; adds the dry line to the answer."""
     ended = end_of_line(elements)
     if elements.dry.address.shape[0] > 0:
         add_line(elements)
@@ -229,7 +227,7 @@ def _ended_line(elements: Elements) -> float:
 
 @inlined
 def _torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float:
-    """The torque of all models as a step begins (N m), dry ones included."""
+    """Torque of all models, dry ones included, at the start of a step (N m)."""
     torque = torque_as_it_begins(elements, ended, first)
     if elements.dry.address.shape[0] > 0:
         torque = torque + dry_torque_as_it_begins(elements.dry.numbers, first)
@@ -240,12 +238,12 @@ def _torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float
 def _record_states(
     system: System, x: Array, base_rate: float, torque: float, out: Array, place: int
 ) -> None:
-    """A sample of a loop with a continuous controller, which reads the states themselves.
+    """Record a sample of a loop with a continuous controller, from the states.
 
-    torque: of the compensation's friction models; its linear part is added here.
+    torque: of the compensation's friction models, without its linear part.
     """
     out[OUT_GYRO, place] = x[RATE]
-    # A filter has taken the base's rate away already.
+    # A filtered rate is already relative to the base.
     out[OUT_RELATIVE_RATE, place] = x[system.seen] - (base_rate if system.seen == RATE else 0.0)
     out[OUT_ANGLE, place] = x[RELATIVE_ANGLE]
     out[OUT_CURRENT, place] = x[CURRENT]
@@ -257,7 +255,7 @@ def _record_states(
 
 @inlined
 def _record_readings(kept: Array, out: Array, place: int) -> None:
-    """A sample of a loop with a sampled controller: what the controller knows."""
+    """Record a sample of a loop with a sampled controller, from its readings."""
     out[OUT_GYRO, place] = kept[KEPT_GYRO]
     out[OUT_RELATIVE_RATE, place] = kept[KEPT_LOAD_RATE]
     out[OUT_ANGLE, place] = kept[KEPT_ENCODER]
@@ -267,7 +265,7 @@ def _record_readings(kept: Array, out: Array, place: int) -> None:
 
 
 def _advancing(lanes: int) -> Any:
-    """`advance` of so many lanes."""
+    """`advance` for a number of lanes."""
 
     def advance(
         system: System,
@@ -280,9 +278,9 @@ def _advancing(lanes: int) -> Any:
         every: int,
         out: Array,
     ) -> None:
-        """Advance over one stretch and record every `every`-th step.
+        """Advance over one segment and record every `every`-th step.
 
-        signals: (inputs, steps + 1) at the step grid, those that act on the plant first.
+        signals: (inputs, steps + 1) at the step grid, inputs of the plant first.
         noise: (samples, noisy sensors), in sensor units.
         out: (8, steps / every), rows as OUTPUTS; the sample at the start of each `every` steps.
         """
@@ -293,7 +291,7 @@ def _advancing(lanes: int) -> Any:
         sampled = controller.every > 0
         compensates = not sampled and compensation.viscous.shape[0] > 0
         dry = friction.dry.address.shape[0] > 0
-        # What is known when a step begins, the states first; and what follows of it alone.
+        # Known values at the start of a step, states first; and the states that follow from them.
         known, new = rows_on_the_stack(lanes), rows_on_the_stack(lanes)
         known_rows, known_columns, new_rows = in_rows(known), in_columns(known), in_rows(new)
         _begin(system, friction, memory, known)
@@ -339,7 +337,7 @@ def _advancing(lanes: int) -> Any:
         for row in range(memory.x.shape[0]):
             memory.x[row] = known[row]
 
-    advance.__qualname__ = "advance_one" if lanes == 1 else "advance_block"  # its file
+    advance.__qualname__ = "advance_one" if lanes == 1 else "advance_block"  # names its file
     return entry(advance)
 
 

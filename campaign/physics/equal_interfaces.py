@@ -1,7 +1,7 @@
 """Friction interfaces of one model, evaluated in one call.
 
-In a single trial the processor then computes them side by side, as it does the lanes of a block:
-what it waits for (an exponential after a division after an exponential) it waits for once.
+In a single trial the processor then computes them in parallel, like the lanes of a block. Latency
+(an exponential after a division after an exponential) then occurs once.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from collections.abc import Hashable, Sequence
 from campaign.physics.blocks import Array, zeros
 
 SIZES = (4, 2, 1)
-"""How many may go together: vectors have a power of two of lanes."""
+"""Sizes of groups: vectors have a power of two of lanes."""
 
 
 def alike(kinds: Sequence[Hashable], alone: Sequence[bool]) -> list[slice]:
-    """Neighbours of one kind, as slices; those that are `alone` have one to themselves.
+    """Slices of adjacent interfaces of one kind; each one that is `alone` has a separate slice.
 
-    Neighbours only: torques are summed in the order in which the bench has the interfaces.
+    Only adjacent ones: torques are summed in the order of the interfaces in the bench.
     """
     groups: list[slice] = []
     while (first := groups[-1].stop if groups else 0) < len(kinds):
@@ -31,7 +31,7 @@ def alike(kinds: Sequence[Hashable], alone: Sequence[bool]) -> list[slice]:
 
 
 def side_by_side(rows: Array, groups: Sequence[slice]) -> Array:
-    """(interfaces, rows, lanes), but in the place of each group (rows, its interfaces, lanes)."""
+    """Rearrange (interfaces, rows, lanes) to (rows, interfaces, lanes) within each group."""
     arranged = zeros(*rows.shape)
     for group in groups:
         by_row = rows[group].transpose(1, 0, 2)

@@ -1,4 +1,4 @@
-"""Friction models prepared for the engine: of one trial, and of several."""
+"""Friction models prepared for the engine, of one trial and of several."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ from campaign.physics.step_function import (
 
 @dataclass(frozen=True)
 class DryInterface:
-    """What an interface has where the engine solves for its friction; see `DryFriction`.
+    """Additional data of an interface if the engine solves for its friction; see `DryFriction`.
 
     Attributes:
         options, parameters: of the model.
-        torque: at the load of one N m of the interface (N m).
+        torque: torque at the load per N m of the interface (N m).
     """
 
     dry: DryFriction
@@ -60,20 +60,20 @@ class DryInterface:
 
     @cached_property
     def limits(self) -> tuple[float, float, float, float]:
-        """Torques (N m at the load) that it holds, forwards and backwards; and those of the slowest
-        sliding, whose compiled function is loaded for it.
+        """Holding torques (N m at the load), forwards and backwards, and those of the slowest
+        sliding; this loads the compiled sliding function.
         """
-        ways = (1.0, -1.0)
-        holds = [self.torque * self.dry.static_torque(self.options, way) for way in ways]
+        signs = (1.0, -1.0)
+        holds = [self.torque * self.dry.static_torque(self.options, sign) for sign in signs]
         starts = [
-            self.torque * single_sliding(self.sliding, self.parameters, way, 0.0) for way in ways
+            self.torque * single_sliding(self.sliding, self.parameters, sign, 0.0) for sign in signs
         ]
         return holds[0], holds[1], starts[0], starts[1]
 
 
 @dataclass(frozen=True)
 class Interface:
-    """One friction model of one trial, as plant or as compensation."""
+    """One friction model of one trial, as plant or compensation."""
 
     step: Callable[..., Any]
     parameters: Array
@@ -89,9 +89,9 @@ class Interface:
     def of(
         cls, options: FrictionOptions, gain: float, bench: CompleteBench, solved: bool, step: float
     ) -> Interface:
-        """`solved`: by the engine, if the model is dry; else its step function says all.
+        """Prepare a model. `solved`: the engine solves it if it is dry; else by its step function.
 
-        step: s, over which it is asked.
+        step: s, of its step function.
         """
         model = friction_models()[options.model]  # type: ignore[attr-defined]
         torque, rate = at_load(options, bench)
@@ -113,12 +113,12 @@ class Interface:
         )
 
     def address(self, lanes: int, members: int) -> int:
-        """Of its step function, compiled for so many lanes of so many interfaces like this one."""
+        """Address of its step function, compiled for `lanes` lanes of `members` such interfaces."""
         return address_of(self.step, lanes, members, len(self.parameters), self.state_size)
 
     @property
     def model(self) -> tuple[Hashable, ...]:
-        """What is compiled of it."""
+        """Key of its compiled functions."""
         dry = None if self.dry is None else self.dry.sliding
         return self.step, dry, len(self.parameters), self.state_size
 
@@ -128,7 +128,7 @@ class Interface:
 
 
 def torque_at(interface: Interface, rate: float, angle: float) -> float:
-    """Torque at the load (N m) as a trial begins, at a relative rate (rad/s) and angle (rad)."""
+    """Torque at the load (N m) at the start of a trial, for relative rate (rad/s), angle (rad)."""
     amplitude, periods, phase = interface.ripple
     motion = Motion.at(rate * interface.rate, rate * interface.rate, AN_INSTANT, position=angle)
     state = np.zeros(interface.state_size)
@@ -139,9 +139,9 @@ def torque_at(interface: Interface, rate: float, angle: float) -> float:
 def plant_elements(
     interfaces: Sequence[Sequence[Interface]], steps: Sequence[float], rates: Sequence[float]
 ) -> Elements:
-    """The bench's friction. `interfaces`: of each lane, in one order.
+    """Friction of the bench. `interfaces`: of each lane, in one order.
 
-    steps: of each lane (s).   rates: relative rates when the trials begin (rad/s).
+    steps: of each lane (s).   rates: relative rates at the start of the trials (rad/s).
     """
     return _elements(interfaces, steps, rates, in_plant=True, reads_sensors=False)
 
@@ -149,7 +149,7 @@ def plant_elements(
 def compensation_elements(
     interfaces: Sequence[Sequence[Interface]], steps: Sequence[float], *, reads_sensors: bool
 ) -> Elements:
-    """Those that compensate. A sampled controller sets the steps of its models itself."""
+    """Friction models of compensation. A sampled controller sets the steps of its models."""
     rates = [0.0] * len(steps)
     return _elements(interfaces, steps, rates, in_plant=False, reads_sensors=reads_sensors)
 
@@ -170,7 +170,7 @@ def _elements(
     met = zeros(2, MEETS, width)
     met[:, MEETS_STEP], met[:, MEETS_PER_STEP] = steps, 1.0 / np.asarray(steps)
     met[:, MEETS_RIPPLE] = 1.0
-    # A model without a state takes what those before it leave: it must be asked by itself.
+    # A model without a state gets the torque that previous ones leave: it needs a separate call.
     yields = [in_plant and each.state_size == 0 for each in first]
     sides = [each.motor_side and reads_sensors for each in both[0]]
     alone = [one or each.ripple[0] != 0.0 for one, each in zip(yields, first, strict=True)]
@@ -234,7 +234,7 @@ def _dry(interfaces: Sequence[Sequence[Interface]], rates: Sequence[float]) -> D
 
 
 def _fixed(interfaces: Sequence[Sequence[Interface]], *, in_plant: bool) -> Array:
-    """What is fixed of each, shape (interfaces, HAS + parameters, lanes)."""
+    """Constants of each interface, shape (interfaces, HAS + parameters, lanes)."""
     first = interfaces[0]
     most = max((len(each.parameters) for each in first), default=0)
     fixed = zeros(len(first), HAS + most, len(interfaces))
@@ -261,5 +261,5 @@ def _ripples(interfaces: Sequence[Sequence[Interface]]) -> Array:
 
 
 def _addresses(rows: Array) -> NDArray[np.uintp]:
-    """Where each element's rows begin in memory, shape (elements,)."""
+    """Memory address of the rows of each element, shape (elements,)."""
     return rows.ctypes.data + np.arange(len(rows), dtype=np.uintp) * np.uintp(rows.strides[0])

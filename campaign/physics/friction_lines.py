@@ -23,7 +23,7 @@ AMPLITUDE, PERIODS, PHASE = range(3)
 
 @inlined
 def ask(elements: Elements) -> None:
-    """The sum of all lines, in `elements.answer`; what they meet stands in `elements.met`."""
+    """Sum all torque lines into `elements.answer`, for the motion in `elements.met`."""
     answer = elements.answer
     answer[MEAN], answer[CHANGE], answer[HELD] = 0.0, 0.0, 0.0
     for e in range(elements.address.shape[0]):
@@ -45,23 +45,23 @@ def ask(elements: Elements) -> None:
 
 @inlined
 def on_a_line(met: Array) -> None:
-    """The mean of a rate that is a straight line over the step."""
+    """Set the mean of a rate that is a straight line over the step."""
     met[MEETS_RATE_MEAN] = 0.5 * (met[MEETS_RATE_START] + met[MEETS_RATE_END])
 
 
 @inlined
 def halfway(angle: float, met: Array) -> None:
-    """Put the angle in the middle of the step, from the one when it begins (rad)."""
+    """Set the angle in the middle of the step, from the angle at its start (rad)."""
     way = 3.0 * met[MEETS_RATE_START] + met[MEETS_RATE_END]
     met[MEETS_POSITION] = angle + 0.125 * met[MEETS_STEP] * way
 
 
 @inlined
 def torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float:
-    """The torque of all models, its linear part included, as a step begins (N m).
+    """Torque of all models, linear part included, at the start of a step (N m).
 
-    ended: where the line before ended; in the first step, what the torque is when it begins, or NaN
-    where nobody knows. The lines that end and begin here need not meet: their mean lags by nothing.
+    ended: end of the previous line; in the first step the initial torque, or NaN if it is unknown.
+    The two lines need not meet at this point: their mean has no lag.
     """
     answer, met = elements.answer, elements.met[0]
     start = answer[MEAN] - 0.5 * answer[CHANGE]
@@ -74,6 +74,6 @@ def torque_as_it_begins(elements: Elements, ended: float, first: bool) -> float:
 
 @inlined
 def end_of_line(elements: Elements) -> float:
-    """Where the line ends, for the next record (N m)."""
+    """End of the torque line, for the next record (N m)."""
     end: float = elements.answer[MEAN] + 0.5 * elements.answer[CHANGE]
     return end

@@ -1,8 +1,8 @@
 """Paths to friction parameters of a bench, and the tables that use them.
 
-`coulomb_torque` (or `*.coulomb_torque`) means every interface whose model declares it, and
-`load.coulomb_torque` that of one interface. In a table such a path is a key, or a key within the
-table of its interface: `load.coulomb_torque = 0.03` is TOML's way to write the latter.
+`coulomb_torque` (or `*.coulomb_torque`) matches every interface whose model declares it,
+`load.coulomb_torque` one interface. In a table such a path is a key, or a key within the table of
+its interface: TOML reads `load.coulomb_torque = 0.03` as the latter.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 Keys = tuple[str | int, ...]
 EVERY = "*"
 INTERFACE = "interface"
-"""Pydantic's label of the table of one interface, among the values of a table of paths."""
+"""Pydantic's label of an interface's table among the values of a table of paths."""
 
 
 @dataclass(frozen=True)
 class Wrong:
-    """A path that means nothing: its keys in the normalised table, and the message."""
+    """An invalid path: its keys in the normalised table, and the message."""
 
     keys: Keys
     message: str
 
 
 def changeable(options: Any) -> tuple[str, ...]:
-    """What may change of one interface: declared by its model, and not left out here."""
+    """Parameters of an interface that can change: declared by its model and set here."""
     from campaign.physics.friction import friction_models
 
     names = friction_models()[options.model].may_change()
@@ -52,13 +52,13 @@ def split(path: str) -> tuple[str, str]:
 
 
 def plain(path: str) -> str:
-    """The path as it is compared: `*.` left out."""
+    """The path for comparisons, without `*.`."""
     interface, parameter = split(path)
     return parameter if interface == EVERY else path
 
 
 def matched(path: str, declared: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
-    """Interface and parameter, wherever `path` leads; `declared`: parameters by interface."""
+    """Interface and parameter of each match of `path`; `declared`: parameters by interface."""
     wanted, parameter = split(path)
     for interface, parameters in declared.items():
         if wanted in (EVERY, interface) and parameter in parameters:
@@ -66,11 +66,11 @@ def matched(path: str, declared: Mapping[str, Sequence[str]]) -> Iterator[tuple[
 
 
 def why_not(path: str, declared: Mapping[str, Sequence[str]], what: str) -> str:
-    """Why `path` leads nowhere, with what is allowed; "" when it leads somewhere.
+    """Why `path` has no match, with the allowed names; "" if it has one.
 
-    `what`: which parameters are declared, e.g. "that can change". An interface that lacks the
-    parameter is no mistake as long as `*` finds it at another. Where there is no interface at all
-    nothing can be wrong: experiments take all friction away.
+    `what`: kind of declared parameters, e.g. "that can change". With `*`, one interface with the
+    parameter is enough. Without any interface every path is valid: experiments can remove all
+    friction.
     """
     if not declared or next(matched(path, declared), None) is not None:
         return ""
@@ -87,7 +87,7 @@ def why_not(path: str, declared: Mapping[str, Sequence[str]], what: str) -> str:
 
 
 def choices(word: str, names: Iterable[str]) -> str:
-    """What is allowed instead of `word`, and what it may be a slip for."""
+    """Text with the allowed names instead of `word`, and the closest of them."""
     listed = list(names)
     close = difflib.get_close_matches(word, listed, n=1)
     hint = f"; did you mean '{close[0]}'?" if close else ""
@@ -95,9 +95,9 @@ def choices(word: str, names: Iterable[str]) -> str:
 
 
 def nested(tree: Any) -> Any:
-    """A table of paths with every path in one spelling: quoted and `*.` ones as if they were not.
+    """A table of paths in one spelling: quoted paths as nested keys, and without `*.`.
 
-    Raises pydantic's error for a path that stands there twice. What is no table is left alone.
+    Raises pydantic's error for a duplicate path. A value that is no table is returned unchanged.
     """
     if not isinstance(tree, Mapping):
         return tree
@@ -116,13 +116,13 @@ def nested(tree: Any) -> Any:
 
 
 def _merge(tree: dict[str, Any], more: Mapping[str, Any]) -> str:
-    """Put `more` into `tree`; the dotted path of what both have, or ""."""
+    """Merge `more` into `tree`; returns the dotted path of a duplicate, or ""."""
     for key, value in more.items():
-        there = tree.get(key)
+        present = tree.get(key)
         if key not in tree:
             tree[key] = dict(value) if isinstance(value, Mapping) else value
-        elif isinstance(there, dict) and isinstance(value, Mapping):
-            again = _merge(there, value)
+        elif isinstance(present, dict) and isinstance(value, Mapping):
+            again = _merge(present, value)
             if again:
                 return f"{key}.{again}"
         else:
@@ -131,7 +131,7 @@ def _merge(tree: dict[str, Any], more: Mapping[str, Any]) -> str:
 
 
 def without(tree: Mapping[str, Any], keys: Sequence[str | int]) -> dict[str, Any]:
-    """A copy of nested tables without what stands at `keys`, nor a table that this empties."""
+    """A copy of nested tables without the value at `keys`, and without tables that become empty."""
     copy = dict(tree)
     key, *rest = keys
     if rest and isinstance(copy.get(str(key)), Mapping):
@@ -142,7 +142,7 @@ def without(tree: Mapping[str, Any], keys: Sequence[str | int]) -> dict[str, Any
 
 
 def as_written(raw: Any, keys: Keys) -> Keys:
-    """Where `keys` of a normalised table stand in what was written, with pydantic's labels."""
+    """Location of `keys` of a normalised table in the original one, with pydantic's labels."""
     if not isinstance(raw, Mapping):
         return keys
     table, *rest = keys
@@ -162,12 +162,12 @@ def as_written(raw: Any, keys: Keys) -> Keys:
 
 
 def invalid(wrong: Iterable[tuple[Keys, str]]) -> ValidationError:
-    """The error that pydantic reports with each message at its own place."""
+    """Pydantic's error with each message at its location."""
     return ValidationError.from_exception_data(
         "Bench",
         [
             InitErrorDetails(
-                # A brace in a message would be taken for a placeholder.
+                # Pydantic would interpret a brace in a message as a placeholder.
                 type=PydanticCustomError("friction_path", "{message}", {"message": message}),
                 loc=keys,
                 input=None,

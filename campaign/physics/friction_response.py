@@ -1,7 +1,7 @@
 """Torque of a friction model along a given motion.
 
-No loop is closed and no drive simulated, so that nothing of a rig needs to be known: friction meets
-the rate with its own state.
+It simulates neither loop nor drive, so no values of a rig are necessary: the model gets the rate,
+and has its own state.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ _NOBODYS: Mapping[str, Any] = {
         ("angle", "rate", "acceleration", "torque", "current", "duration"), 1e9
     ),
 }
-"""What a simulation asks for; a prescribed motion uses none of it."""
+"""Values that a simulation requires; a prescribed motion uses none of them."""
 
 
 class Along:
-    """A motion, ready to be met by friction again and again."""
+    """A motion, prepared for repeated evaluations of friction."""
 
     def __init__(self, task: Task) -> None:
-        """task: prescribed, of a rate in rad/s (or m/s); a sample is a step at most."""
+        """task: prescribed rate in rad/s (or m/s); a step is one sample at most."""
         self._count = round(task.duration * task.sample_rate)
         self._met = FrictionAlong(_nobody(), task, 1.0 / task.sample_rate)
 
@@ -59,7 +59,7 @@ class Along:
 
     @classmethod
     def sine(cls, rate: float, frequency: float, cycles: int, per_cycle: int) -> Along:
-        """rate: amplitude (rad/s); it begins at an end of the way, with rate 0."""
+        """rate: amplitude (rad/s); it begins at an end position, with rate 0."""
         sample_rate = per_cycle * frequency
         command = Sine(amplitude=rate, frequency=frequency)
         start = -rate / (2.0 * np.pi * frequency)

@@ -34,17 +34,17 @@ class GearOptions(Options):
     @model_validator(mode="before")
     @classmethod
     def _ratio_of_lead(cls, tree: Any, info: ValidationInfo) -> Any:
-        """With a lead N = 2 pi / lead, in radians of the motor per metre of the load."""
+        """Set N = 2 pi / lead, in radians of the motor per meter of the load, from a lead."""
         if not isinstance(tree, Mapping) or tree.get("lead") is None:
             return tree
         archived = isinstance(info.context, Mapping) and info.context.get("si")
-        if "ratio" in tree and not archived:  # an archived one is from the lead, and it may change
+        if "ratio" in tree and not archived:  # an archived ratio is that of an earlier lead
             raise invalid([(("ratio",), "'ratio' follows from 'lead'; remove one of the two")])
         return {**tree, "ratio": _ratio(tree["lead"])}
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without a lead it is archived as before there was one: fingerprints stay."""
+        """The archived tree without a lead lacks the field: older fingerprints stay valid."""
         tree: dict[str, Any] = dump(self)
         if self.lead is None:
             tree.pop("lead", None)
@@ -52,7 +52,7 @@ class GearOptions(Options):
 
 
 def _ratio(lead: Any) -> float:
-    """Of a lead as written or in SI; of one that is none, which its own field complains of, 1."""
+    """Ratio of a lead, as text or in SI; 1 for an invalid lead, which its own field reports."""
     try:
         travel = LEAD.parse(lead) if isinstance(lead, str) else float(lead)
     except (TypeError, ValueError):

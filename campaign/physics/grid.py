@@ -12,9 +12,9 @@ from campaign.signals import MultiSine, Sine
 from campaign.trial import Task
 
 FINEST_DELAY = 4
-"""How many times finer the steps may become to meet the controller's delay."""
+"""Maximum factor by which the steps become finer to match the controller's delay."""
 STEPS_PER_CYCLE = 80
-"""of the fastest sine; at 80 a straight-line input loses 5e-4 of its amplitude."""
+"""Of the fastest sine; at 80 a straight-line input loses 5e-4 of its amplitude."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Grid:
         step: integration step (s).
         every: steps per recorded sample.
         per_control: steps per controller sample; 0 for a continuous controller.
-        samples: recorded samples in all.
-        because: what the trial needs so short a step for; empty when it has the longest there is.
+        samples: total number of recorded samples.
+        because: reason for a step below the longest; else empty.
     """
 
     step: float
@@ -39,9 +39,9 @@ class Grid:
 def make_grid(bench: CompleteBench, task: Task, longest_step: float | None = None) -> Grid:
     """Steps that divide both the recording's and the controller's sample time.
 
-    `longest_step` (s) is what the trial needs (`step_choice`) when None. Raises ValueError when the
-    recording's rate and the controller's do not divide each other, and when the trial needs steps
-    finer than there are.
+    `longest_step` (s): None for the step that the trial needs (`step_choice`). Raises ValueError if
+    the controller's rate is no multiple of the recording's, and if the trial needs a step below the
+    finest.
     """
     control_rate = bench.controller.sample_rate
     continuous = control_rate is None or task.mode in ("prescribed", "spring")
@@ -88,7 +88,7 @@ def _choice(bench: CompleteBench, task: Task) -> StepChoice:
 
 
 def _with_delay(per_control: int, delay: float) -> int:
-    """More steps per sample, a few times over, if a `delay` (samples) then is whole steps."""
+    """Multiply the steps per sample until a `delay` (samples) is a whole number of steps."""
     for times in range(1, FINEST_DELAY + 1):
         steps = delay * per_control * times
         if abs(steps - round(steps)) < 1e-6:

@@ -1,4 +1,4 @@
-"""Trials prepared for the engine: one lane each, several side by side."""
+"""Trials prepared for the engine: one lane per trial, several in parallel."""
 
 from __future__ import annotations
 
@@ -53,20 +53,20 @@ from campaign.signals import Signal, Zero
 from campaign.trial import Task
 
 AT_REST = 1e-12
-"""rad/s; what rounding leaves of a hull that stands still is no sliding."""
+"""rad/s; a hull rate below it is rounding error, and not sliding."""
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A trial made ready: everything but its state.
+    """A trial prepared for the engine, without its state.
 
     Attributes:
-        bench: the one that is simulated, as it is in this trial.
-        stated: whose numbers the software of the controller has: N, Kt, and what compensation is
-            built for. The same bench, unless the simulation has a truth of its own.
-        f, g, h: the discretised loop; see `loop.discretise`. Made when it is first asked for: a
-            plan only asks for the step and the structure.
-        inputs: those that act on the loop, in the order of their signals.
+        bench: the simulated bench, with the scatter of this trial.
+        stated: source of the numbers in the controller's software: N, Kt, and the design values of
+            compensation. It is the same bench, unless the simulation has a separate truth.
+        f, g, h: the discretised loop; see `loop.discretise`. Computed at first use: a plan needs
+            only the step and the structure.
+        inputs: inputs that act on the loop, in the order of their signals.
     """
 
     bench: CompleteBench
@@ -89,7 +89,7 @@ class Lane:
         longest_step: float | None = None,
         stated: CompleteBench | None = None,
     ) -> Lane:
-        """Raises ValueError when the task's rates do not fit the bench's.
+        """Prepare a trial. Raises ValueError if the task's and the bench's rates do not match.
 
         `stated`: see the attribute; None for `bench`.
         """
@@ -134,17 +134,17 @@ class Lane:
 
     @property
     def states(self) -> int:
-        """Of the loop."""
+        """Number of states of the loop."""
         return len(self.loop.a)
 
     @property
     def prescribed(self) -> bool:
-        """Whether there is no plant: the motion is what it is said to be."""
+        """Whether the motion is prescribed: there is no plant."""
         return self.task.mode == "prescribed"
 
     @property
     def structure(self) -> Hashable:
-        """Trials with equal structures can be simulated together."""
+        """Key of the trials that can be simulated together."""
         grid, mode = self.grid, "plant" if self.grid.per_control else self.task.mode
         sensors = [(sensor.noise > 0.0, sensor.delay) for sensor in self.bench.sensors.in_order]
         block = self.compensator.linear
@@ -172,7 +172,7 @@ class Lane:
 
 @dataclass(frozen=True)
 class Lanes:
-    """Trials side by side, with their state."""
+    """Parallel trials with their state."""
 
     width: int
     trials: tuple[Lane, ...]
@@ -196,7 +196,7 @@ class Lanes:
         )
 
     def signals(self, at: Array) -> Array:
-        """The inputs over the step grid `at` (steps + 1,), shape (inputs, steps + 1, width)."""
+        """Inputs over the step grid `at` (steps + 1,), shape (inputs, steps + 1, width)."""
         inputs = self.trials[0].inputs
         signals = zeros(len(inputs), len(at), self.width)
         for row, which in enumerate(inputs):
@@ -208,7 +208,7 @@ class Lanes:
         return signals
 
     def noise(self, steps: int) -> Array:
-        """Of the noisy sensors, in their units, shape (samples, sensors, width)."""
+        """Noise of the noisy sensors, in their units, shape (samples, sensors, width)."""
         every = self.controller.every
         samples = steps // every if every else 0
         sigmas = [_sigmas(trial) for trial in self.trials]
@@ -220,7 +220,7 @@ class Lanes:
 
 
 def together(trials: Sequence[Lane], width: int) -> Lanes:
-    """Trials of one structure side by side; lanes without a trial repeat the first one."""
+    """Join trials of one structure; lanes without a trial repeat the first one."""
     if not 0 < len(trials) <= width:
         raise ValueError(f"{len(trials)} trials cannot be simulated together, but 1 to {width}")
     lanes = [*trials, *[trials[0]] * (width - len(trials))]
@@ -243,7 +243,7 @@ def together(trials: Sequence[Lane], width: int) -> Lanes:
 
 
 def _plant(bench: CompleteBench, step: float, *, moves: bool) -> tuple[Interface, ...]:
-    """Its friction; `moves`: there is a plant, so that the engine solves for what is dry."""
+    """Friction of a bench; `moves`: there is a plant, so the engine solves for dry friction."""
     return tuple(Interface.of(each, 1.0, bench, moves, step) for each in bench.friction.values())
 
 
@@ -259,7 +259,7 @@ def _loop(
 
 
 def _inputs(task: Task, grid: Grid) -> tuple[int, ...]:
-    """The inputs that act; a sampled controller reads the command, and it comes last."""
+    """Active inputs; the command comes last if a sampled controller reads it."""
     if task.mode == "prescribed":
         return (DRIVE,)
     order = (DRIVE, BASE_RATE, FRICTION)
@@ -276,17 +276,17 @@ def _acting(task: Task, which: int) -> Signal:
 
 
 def _sampled(tasks: Sequence[Task], which: int, at: Array) -> list[Array]:
-    """An input of each task; tasks mostly have one in common, which is sampled once."""
+    """Samples of an input for each task; a shared signal is sampled once."""
     known: list[tuple[Signal, Array]] = []
-    found = []
+    inputs = []
     for task in tasks:
         signal = _acting(task, which)
         samples = next((values for each, values in known if each == signal), None)
         if samples is None:
             samples = _signal(task, which, at)
             known.append((signal, samples))
-        found.append(samples)
-    return found
+        inputs.append(samples)
+    return inputs
 
 
 def _signal(task: Task, which: int, at: Array) -> Array:
@@ -327,11 +327,11 @@ def _system(lanes: Sequence[Lane]) -> System:
 
 
 def _known(lane: Lane, plant: Sequence[int], columns: int, rows: int) -> Array:
-    """What follows in a step of the states, and of each input at its start and at its end.
+    """Effect of the states, and of each input at the start and the end, in a step.
 
-    Transposed, and filled up with zeros: shape (columns / COLUMNS, COLUMNS, rows).
+    Transposed, and padded with zeros: shape (columns / COLUMNS, COLUMNS, rows).
     """
-    # A disturbance drives the load forwards, friction holds it back: the same input, negative.
+    # A disturbance accelerates the load, friction decelerates it: the same input, negative.
     signs = np.array([-1.0 if which == FRICTION else 1.0 for which in plant])
     at_start, at_end = (lane.g - lane.h)[:, list(plant)] * signs, lane.h[:, list(plant)] * signs
     held = lane.g[:, [DRIVE]] if lane.grid.per_control else np.zeros((lane.states, 0))
@@ -340,18 +340,18 @@ def _known(lane: Lane, plant: Sequence[int], columns: int, rows: int) -> Array:
 
 
 def _torque_columns(lane: Lane, which: int, rows: int) -> Array:
-    """What follows of a torque line: per N m of its mean, and of its change over the step."""
+    """Effect of a torque line: per N m of its mean, and of its change over the step."""
     columns = np.stack([lane.g[:, which], lane.h[:, which] - 0.5 * lane.g[:, which]])
     return _filled_up(columns, (2, rows))
 
 
 def _filled_up(array: Array, shape: tuple[int, int]) -> Array:
-    """With zeros behind what there is."""
+    """Pad an array with zeros to a shape."""
     return np.pad(array, [(0, most - have) for most, have in zip(shape, array.shape, strict=True)])
 
 
 def _sigmas(lane: Lane) -> Array:
-    """Standard deviations of the sensors that are noisy."""
+    """Standard deviations of the noisy sensors."""
     return np.array([sensor.noise for sensor in lane.bench.sensors.in_order if sensor.noise > 0.0])
 
 
@@ -407,7 +407,7 @@ def _filter_pole(lane: Lane) -> float:
 
 
 def _discrete_block(lane: Lane) -> tuple[Array, Array, Array, Array]:
-    """The linear compensation of a sampled controller, which holds its readings over a sample."""
+    """Linear compensation of a sampled controller, with readings constant over a sample."""
     block = lane.compensator.linear
     if block is None or not lane.grid.per_control:
         return np.zeros((0, 0)), np.zeros((0, 3)), np.zeros(0), np.zeros(3)
@@ -435,11 +435,11 @@ def _memory(lanes: Sequence[Lane], controller: Controller) -> Memory:
 
 
 def _torques_at_start(lane: Lane) -> tuple[float, float]:
-    """Friction and continuous compensation when the trial begins (N m), their linear part apart.
+    """Friction and continuous compensation at the start (N m), without their linear parts.
 
-    The load is at rest in space, with undeflected bristles, and the hull may be under way: what the
-    models say of so short a time that nothing moves. NaN where a model of the plant has no state:
-    what it takes follows from what is applied. Dry ones are recorded apart.
+    The load is at rest in space, with undeflected bristles; the hull can move. The torques are
+    those of the models over an infinitesimal time. NaN if a model of the plant has no state: its
+    torque depends on the applied one. Dry models are recorded separately.
     """
     rate, angle = _rate_at_start(lane), lane.task.start_angle
     seen = 0.0 if lane.loop.seen != RATE and not lane.prescribed else rate
@@ -453,7 +453,7 @@ def _torques_at_start(lane: Lane) -> tuple[float, float]:
 
 
 def _rate_at_start(lane: Lane) -> float:
-    """The relative rate (rad/s); what rounding leaves of a hull at rest is none."""
+    """Relative rate at the start (rad/s); 0 below rounding error."""
     which, sign = (DRIVE, 1.0) if lane.prescribed else (BASE_RATE, -1.0)
     rate = sign * float(_signal(lane.task, which, np.zeros(1))[0])
     return rate if abs(rate) > AT_REST else 0.0

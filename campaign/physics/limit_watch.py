@@ -1,27 +1,27 @@
 """Limit checks of measured samples, for simulation, host and C.
 
-Angle, drive torque and motor current are judged at every sample. The rate is not: a rate that is
-made by differencing an encoder shows one count of it as `resolution * sample_rate`, which may be
-beyond any limit while the axis creeps. It is judged by its mean over the last n samples,
+Angle, drive torque and motor current are checked at every sample. The rate is not: the difference
+of encoder samples shows one count as `resolution * sample_rate`, which can exceed any limit while
+the axis creeps. The check applies to its mean over the last n samples,
 
     n = T * sample_rate, rounded down, at least 1      T = min(rate_time, 0.01 * angle / rate)
 
-with `rate_time`, `angle` and `rate` of the bench's limits. Samples before the trial count as zero:
-the bench was at rest. The same holds for samples that were lost: of them nothing is known.
+with `rate_time`, `angle` and `rate` of the bench's limits. Samples before the trial count as zero,
+because the bench was at rest. Lost samples count as zero too, because nothing is known of them.
 
-**How far the axis can go further for it.** As long as no mean is beyond the limit, the axis moves
-by at most `rate * T` in any n samples: that is what a mean is. Let no sample have been beyond the
-limit until sample k, and all from k on, in one direction: a runaway. n samples beyond the limit
-have a mean beyond it, so the trial ends at sample k + n - 1 at the latest. Until the sample before
-the one that ends it, the last n samples add up to at most `n * rate`; of those, the ones before k
-take away less than `rate` each, if the axis came from the other direction. So from k on it moved by
-less than `2 n * rate` samples, which is `2 * rate * T`, or 2 % of the angle limit: T is half of
-what a motion from rest would allow. The sample that ends the trial is the same as it would be if
-each were judged alone; what a single sample jumps by, no judgement of samples can hold back.
+**Additional travel.** While no mean exceeds the limit, the axis moves by at most `rate * T` in any
+n samples, by definition of the mean. Consider a runaway: no sample before sample k exceeds the
+limit, and all samples from k on exceed it in one direction. The mean of n such samples exceeds the
+limit, so the trial ends at sample k + n - 1 at the latest. At the sample before the last, the last
+n samples sum to at most `n * rate`. Those before k subtract less than `rate` each if the axis came
+from the other direction. So from k on the axis moves by less than `2 n * rate` samples. This is
+`2 * rate * T`, or 2 % of the angle limit: T is half the value that a motion from rest would allow.
+The last sample adds the same travel as in a check of single samples; no check can limit the jump
+of a single sample.
 
-The mean is computed without drift and in one order, whichever way the samples were cut into
-blocks, and bit by bit as `firmware/campaign_limits.c` does: the sum of the window that began at a
-whole multiple of n, and of the window before it what has not gone yet.
+The mean is computed without drift and in one order, independent of the division into blocks. It is
+bit-identical to `firmware/campaign_limits.c`: the sum of the window that began at a whole multiple
+of n, plus the samples of the window before it that are still among the last n.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ from campaign.units import in_words
 Array = NDArray[np.float64]
 
 SHARE = 0.01
-"""Of the angle limit, at the rate limit: the longest time over which a rate is judged. Twice that
-is how far the axis can go further."""
+"""Share of the angle limit; at the rate limit it gives the longest averaging time of the rate. The
+additional travel is less than twice this share."""
 ROUNDING = 1e-9
-"""Relative; a mean right at the limit must not fail by how it was summed."""
+"""Relative; rounding of the sum must not fail a mean at the limit."""
 
 
 @dataclass(frozen=True)
 class WatchedLimit:
-    """A limit that is watched in motion, and the channel that it is watched in.
+    """A limit monitored during motion, and its channel.
 
     Units are those of a rotary axis.
     """
@@ -65,7 +65,7 @@ WATCHED = (
     WatchedLimit("torque", "drive_torque", "N m", "N m"),
     WatchedLimit("current", "motor_current", "A", "A"),
 )
-"""In this order: of several limits that break at one sample, the first is named."""
+"""If several limits are exceeded at one sample, the violation names the first in this order."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class Violation:
 
     Attributes:
         sample: number of the sample in the trial, from 0.
-        index: its place in the block that was looked at.
-        value: the sample's, or the mean that ends with it.
-        text: what, when and which limit, for people.
+        index: its index in the block.
+        value: value of the sample, or the mean that ends with it.
+        text: message with value, time and limit.
     """
 
     sample: int
@@ -89,13 +89,13 @@ class Violation:
 
 
 def judged_samples(limits: LimitsOptions, sample_rate: float) -> int:
-    """Over how many samples the rate is averaged; `sample_rate` in Hz."""
+    """Number of samples in the mean of the rate; `sample_rate` in Hz."""
     longest = min(limits.rate_time, SHARE * limits.angle / limits.rate)
     return max(1, math.floor(longest * sample_rate + ROUNDING))
 
 
 class LimitWatch:
-    """Watches one trial, block by block.
+    """Monitor of one trial, block by block.
 
     Attributes:
         unwatched: limits whose channel is not recorded.
@@ -108,12 +108,12 @@ class LimitWatch:
         channels: Sequence[str],
         sides: Sides = BOTH_ROTARY,
     ) -> None:
-        """A watch over one trial.
+        """Start the monitor of one trial.
 
         Args:
             sample_rate: of the recording (Hz).
             channels: names, in the order of the blocks.
-            sides: how the bench moves, for the words of a violation.
+            sides: kind of axis, for the text of a violation.
         """
         self._sides = sides
         rows = {name: row for row, name in enumerate(channels)}
@@ -126,15 +126,15 @@ class LimitWatch:
         self._seen = 0
         self._count = judged_samples(limits, sample_rate)
         self._sample_rate = sample_rate
-        # The window before the one that is being filled, and what there is of that.
+        # The last complete window, and the samples of the present one.
         self._rates = np.zeros(self._count)
 
     def look(self, time: Array, block: Array) -> Violation | None:
-        """The first sample of the next `block` (channels, n) at `time` (n,) that breaks a limit.
+        """First sample of the next `block` (channels, n) at `time` (n,) that exceeds a limit.
 
-        To be asked no more once one has. An undefined value breaks none.
+        Do not call it again after a violation. An undefined value exceeds no limit.
         """
-        first, found = len(time), None
+        first, violation = len(time), None
         for watched, row, bound in self._watched:
             values, beyond = block[row], bound
             if watched.limit == "rate":
@@ -147,19 +147,19 @@ class LimitWatch:
                 value = float(values[first])
                 if watched.limit == "rate":
                     value /= self._count
-                found = self._violation(watched, first, value, bound, float(time[first]))
+                violation = self._violation(watched, first, value, bound, float(time[first]))
         self._seen += len(time)
-        return found
+        return violation
 
     def skip(self, count: int) -> None:
-        """The next `count` samples were lost."""
+        """Account for `count` lost samples."""
         self._remember(np.concatenate([self._rates, np.zeros(count)]), count)
         self._seen += count
 
     def _sums(self, rates: Array, bound: float) -> tuple[Array, float]:
-        """Of the last n rates, at each of them; and what their magnitude must not pass.
+        """Sums of the last n rates at each sample, and the bound of their magnitude.
 
-        None where no rate is beyond `bound`: then no mean is.
+        Empty if no rate exceeds `bound`: then no mean does.
         """
         count, since = self._count, self._seen % self._count
         beyond = bound * count * (1.0 + ROUNDING)
@@ -178,7 +178,7 @@ class LimitWatch:
         return sums, beyond
 
     def _remember(self, joined: Array, more: int) -> None:
-        """Keep of `joined` what the next block needs, once `more` samples have been seen."""
+        """Keep the part of `joined` that the next block needs, after `more` new samples."""
         kept = self._count + (self._seen + more) % self._count
         self._rates = joined[len(joined) - kept :].copy()
 
@@ -202,6 +202,6 @@ class LimitWatch:
 
 
 def _within(values: Array, bound: float) -> bool:
-    """Whether all are at most `bound` either way, none undefined; faster than by magnitudes."""
+    """Whether no magnitude exceeds `bound` and no value is undefined; faster than by `abs`."""
     low, high = np.min(values, initial=0.0), np.max(values, initial=0.0)
     return bool(-bound <= low and high <= bound)

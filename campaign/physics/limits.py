@@ -1,9 +1,9 @@
-"""Distance of a command to a bench's limits before anything moves.
+"""Margins of a command to a bench's limits, before any motion.
 
-The motion is the commanded one: the load follows its command exactly, and where the hull moves
-under it the relative motion is the difference. Torque and current follow from a rigid body with the
-worst of the true friction. What the loop does beyond its command is watched during the trial. Where
-there is no motor, its torque and current are zero, and a spring pulls with what it is stretched by.
+The load follows its command exactly; relative motion is the difference of load and hull. Torque and
+current follow from a rigid body with the worst of the true friction. The trial itself monitors any
+motion beyond the command. Without a motor, torque and current are zero; a spring's torque follows
+from its extension.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ Limit = Literal["angle", "rate", "acceleration", "torque", "current", "duration"
 TINY_RATE = 1e-6
 """rad/s; a jump of a rate command below this is rounding, not a step."""
 POINTS_PER_CYCLE = 64
-"""of a sine added to something else; its extreme is then missed by less than 0.13 %."""
+"""Of a sine added to another signal; the error of its extreme is then less than 0.13 %."""
 MOST_POINTS = 64_000
-"""of such a sum that are looked at: of more than 1000 cycles fewer points each."""
+"""Maximum number of points of such a sum; above 1000 cycles each has fewer points."""
 POINTS_OF_A_LINE = 1001
-"""at which a polyline is looked at besides its knots."""
+"""Points at which a polyline is evaluated besides its knots."""
 _SHARES = np.concatenate([side * np.geomspace(1e-12, 1.0, 121) for side in (-1.0, 1.0)])
-"""Of the largest rate, at which friction is looked at."""
+"""Shares of the largest rate at which friction is evaluated."""
 
 
 _CALLED = {("angle", "m"): "position", ("torque", "N"): "force"}
@@ -41,10 +41,10 @@ _CALLED = {("angle", "m"): "position", ("torque", "N"): "force"}
 
 @dataclass(frozen=True)
 class Margin:
-    """One limit and what a task comes to, both in `unit` (SI).
+    """A limit (`bound`) and the value of a task, both in `unit` (SI).
 
-    `value` is infinite for the acceleration of a rate command that jumps. `sensor`: the one whose
-    single count reads as `value`; empty where it is the task that comes to it.
+    `value` is infinite for the acceleration of a rate command that jumps. `sensor`: the sensor
+    whose single count is `value`; empty if `value` is that of the task.
     """
 
     limit: Limit
@@ -55,17 +55,17 @@ class Margin:
 
     @property
     def fraction(self) -> float:
-        """Share of the limit that is used; above 1 it is broken."""
+        """Used share of the limit; above 1 the limit is exceeded."""
         return self.value / self.bound
 
     @property
     def called(self) -> str:
-        """The limit in words: a linear axis has a position and a force, under the same names."""
+        """Display name of the limit; a linear axis has a position and a force."""
         return _CALLED.get((self.limit, self.unit), self.limit)
 
     @property
     def broken(self) -> bool:
-        # A command right at its limit, such as 60 deg/s^2 of 60, must not fail by a rounding.
+        # Rounding must not fail a command at its limit, such as 60 deg/s^2 of 60.
         return not self.fraction <= 1 + 1e-9
 
 
@@ -83,19 +83,19 @@ class Extremes:
 
 
 def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
-    """What `task` comes to beside each limit of `bench`.
+    """Values of `task` beside each limit of `bench`.
 
-    In torque mode and behind a spring the motion is not predicted, because friction decides it: the
-    angle counts as the start angle (or how far the spring's end goes) and the rate as zero, and
-    only the trial itself can tell. Torque and current are left out where the bench does not say
-    what they follow from: `unpredicted` names them. Raises IncompleteBenchError without limits.
+    In torque mode and behind a spring the motion depends on friction and is not predicted: the
+    angle is the start angle (or the travel of the spring's end), and the rate is zero. Only the
+    trial shows the motion. Torque and current are absent if the bench lacks the values for them:
+    `unpredicted` names them. Raises IncompleteBenchError without limits.
     """
     limits, extremes = limits_of(bench), motion(task)
     torque = _drive_torque(bench, task, extremes)
     current = _current(bench, task, torque)
     acceleration = max(extremes.load_acceleration, extremes.hull_acceleration)
     units = units_of(bench)
-    found: tuple[tuple[Limit, float | None, float, str], ...] = (
+    rows: tuple[tuple[Limit, float | None, float, str], ...] = (
         ("angle", extremes.angle, limits.angle, units["rad"]),
         ("rate", extremes.rate, limits.rate, units["rad/s"]),
         ("acceleration", acceleration, limits.acceleration, units["rad/s^2"]),
@@ -105,28 +105,28 @@ def margins(bench: Bench, task: Task) -> tuple[Margin, ...]:
     )
     return tuple(
         Margin(limit, value, bound, unit)
-        for limit, value, bound, unit in found
+        for limit, value, bound, unit in rows
         if value is not None and math.isfinite(bound)
     )
 
 
 def units_of(bench: Bench) -> dict[str, str]:
-    """Units (SI) of the bench's axis, by those of a rotary one."""
+    """Units (SI) of the bench's axis, by those of a rotary axis."""
     return {unit: axis_unit(unit, bench.sides) for unit in ("rad", "rad/s", "rad/s^2", "N m")}
 
 
 def unpredicted(bench: Bench, task: Task) -> dict[Limit, tuple[str, ...]]:
-    """Limits that `margins` cannot tell of a task, with the fields that the bench lacks for it."""
+    """Limits that `margins` cannot predict for a task, with the fields that the bench lacks."""
     if task.mode in ("prescribed", "spring"):
         return {}
     torque = lacking(bench, ("axis.inertia",)) if task.mode == "rate" else ()
     current = (*torque, *lacking(bench, ("motor.torque_constant",)))
-    found: dict[Limit, tuple[str, ...]] = {"torque": torque, "current": current}
-    return {limit: paths for limit, paths in found.items() if paths}
+    missing: dict[Limit, tuple[str, ...]] = {"torque": torque, "current": current}
+    return {limit: paths for limit, paths in missing.items() if paths}
 
 
 def _current(bench: Bench, task: Task, torque: float | None) -> float | None:
-    """Largest motor current (A); None where nobody can say."""
+    """Largest motor current (A); None if unknown."""
     if task.mode in ("prescribed", "spring"):
         return 0.0
     per_ampere = bench.torque_per_current
@@ -134,11 +134,11 @@ def _current(bench: Bench, task: Task, torque: float | None) -> float | None:
 
 
 def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float | None:
-    """Largest torque (N m) that motor or spring has to give at the load; None: nobody can say."""
+    """Largest torque (N m) of motor or spring at the load; None if unknown."""
     match task.mode:
         case "prescribed":  # the motion is given; nothing drives it
             return 0.0
-        case "spring":  # as if the load never moved
+        case "spring":  # upper bound: the load does not move
             return task.spring_stiffness * _stretch(task)
         case "torque":
             return _largest(task.command, task.duration)
@@ -149,7 +149,7 @@ def _drive_torque(bench: Bench, task: Task, extremes: Extremes) -> float | None:
 
 
 def _stretch(task: Task) -> float:
-    """How far the spring's end goes from where the load stands at the start (rad)."""
+    """Travel of the spring's end from the start position of the load (rad)."""
     match task.command:
         case Polyline(times=times, values=values):
             from_start = tuple(value - task.start_angle for value in values)
@@ -158,8 +158,8 @@ def _stretch(task: Task) -> float:
 
 
 def motion(task: Task) -> Extremes:
-    """The commanded motion of load against hull; where friction decides it, what is known."""
-    # A prescribed motion is relative to the hull, whatever that does.
+    """Commanded motion of load against hull; its known part if it depends on friction."""
+    # A prescribed motion is relative to the hull, independent of the hull's motion.
     hull = Zero() if task.mode == "prescribed" else task.base_acceleration
     hull_acceleration = _largest(hull, task.duration)
     if task.mode in ("torque", "spring"):
@@ -181,9 +181,9 @@ def motion(task: Task) -> Extremes:
 def worst_friction(bench: Bench, rate: float) -> float:
     """Largest friction torque at the load (N m) of sliding up to `rate` (rad/s); 0 at rest.
 
-    The largest of the curve without its viscous part, which is the static torque where a model has
-    one, plus the viscous part at `rate`, in the worse of both directions and at the worst position,
-    on the bench's day and under its preload. What acts at the motor counts N times.
+    Sum of the largest torque without its viscous part (the static torque of models that have one)
+    and the viscous part at `rate`; in the worse direction and at the worst position, on the bench's
+    day and under its preload. Torques at the motor count N times.
     """
     from campaign.physics.friction import friction_models
     from campaign.physics.variation import of_its_day
@@ -202,7 +202,7 @@ def worst_friction(bench: Bench, rate: float) -> float:
 
 
 def _grid(task: Task) -> Array:
-    """Times at which the motion is extreme, or as good as that; shape (n,), increasing."""
+    """Times that include all extremes of the motion, or times close to them; (n,), increasing."""
     duration = task.duration
     signals = (task.command, task.base_acceleration)
     times = [np.array([0.0, duration])]
@@ -220,24 +220,24 @@ def _grid(task: Task) -> Array:
 
 
 def _within(time: Array, duration: float) -> Array:
-    """Those of [0, duration], once each and increasing."""
+    """Times in [0, duration], unique and increasing."""
     return np.unique(time[(time >= 0) & (time <= duration)])
 
 
 def _quarters(sine: Sine) -> Array:
-    """The first times at which sine and cosine, and so every integral, are extreme or zero."""
+    """First times at which sine and cosine, and thus every integral, are extreme or zero."""
     shift = (-sine.phase / (2 * math.pi)) % (1 / 4)
     return np.asarray((np.arange(4) / 4 + shift) / sine.frequency)
 
 
 def _dense_times(frequency: float, duration: float) -> Array:
-    """Even times over the whole of an irregular motion: its largest swing may come anywhere."""
+    """Even times over a whole irregular motion: its largest swing can be anywhere."""
     step = max(1 / (POINTS_PER_CYCLE * frequency), duration / MOST_POINTS)
     return np.append(np.arange(0.0, duration, step), duration)
 
 
 def _zero_crossings(polyline: Polyline) -> Array:
-    """Where the line crosses zero: there its integral is extreme."""
+    """Times of zero crossings, at which the integral is extreme."""
     time, value = np.asarray(polyline.times), np.asarray(polyline.values)
     crossing = value[:-1] * value[1:] < 0
     share = value[:-1][crossing] / (value[:-1] - value[1:])[crossing]
@@ -261,8 +261,8 @@ def _load_motion(command: Signal, time: Array) -> tuple[Array, Array]:
 def _hull_motion(acceleration: Signal, time: Array) -> tuple[Array, Array]:
     """Rate (rad/s) and angle from the start (rad) of the hull, each shape (n,).
 
-    A sine is a steady oscillation whose rate has zero mean, and so is a sum of sines; anything
-    else starts from rest.
+    A sine or sum of sines is a steady oscillation whose rate has zero mean; any other motion
+    starts from rest.
     """
     match acceleration:
         case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
@@ -278,7 +278,7 @@ def _hull_motion(acceleration: Signal, time: Array) -> tuple[Array, Array]:
 
 
 def _from_start(sines: MultiSine, time: Array, order: int) -> Array:
-    """An integral of a sum of sines that begins at zero."""
+    """Integral of a sum of sines from t = 0."""
     return np.asarray(sines.integral(time, order) - sines.integral(np.zeros(1), order))
 
 
@@ -292,22 +292,22 @@ def _integrated(polyline: Polyline, time: Array) -> tuple[Array, Array]:
 
 
 def _after(polyline: Polyline, time: Array) -> Array:
-    """Limits from the right: at a jump, the value after it."""
+    """Right-hand limits: at a jump, the value after it."""
     return _at(polyline, time, "right")
 
 
 def _before(polyline: Polyline, time: Array) -> Array:
-    """Limits from the left: at a jump, the value before it."""
+    """Left-hand limits: at a jump, the value before it."""
     return _at(polyline, time, "left")
 
 
 def _at(polyline: Polyline, time: Array, side: Literal["left", "right"]) -> Array:
-    """Limits from one side; held beyond the ends."""
+    """One-sided limits; constant beyond the ends."""
     knots, values = np.asarray(polyline.times), np.asarray(polyline.values)
     next_knot = np.searchsorted(knots, time, side=side)
     high = np.minimum(next_knot, len(knots) - 1)
     low = np.maximum(next_knot - 1, 0)
-    span = knots[high] - knots[low]  # 0 beyond the ends only, where both have one value
+    span = knots[high] - knots[low]  # 0 only beyond the ends, where both values are equal
     share = (time - knots[low]) / np.where(span > 0, span, 1.0)
     return np.asarray(values[low] + share * (values[high] - values[low]))
 
@@ -329,12 +329,12 @@ def _largest(signal: Signal, duration: float) -> float:
 
 
 def _steepest(command: Signal, duration: float) -> float:
-    """Largest acceleration of a rate command (rad/s^2), infinite where it jumps; it starts at 0."""
+    """Largest acceleration of a rate command (rad/s^2) from 0; infinite if it jumps."""
     match command:
         case Sine(amplitude=amplitude, frequency=frequency, phase=phase):
             if abs(amplitude * math.sin(phase)) > TINY_RATE:
                 return math.inf
-            return 2 * math.pi * frequency * abs(amplitude)  # at once, where it begins at zero
+            return 2 * math.pi * frequency * abs(amplitude)  # at the start if it begins at zero
         case MultiSine():
             if abs(command.sample(np.zeros(1)).item()) > TINY_RATE:
                 return math.inf

@@ -1,10 +1,10 @@
 """Friction linearized at rest or in sliding.
 
-Stuck: every interface in presliding, a spring and a damper. Sliding: every interface far above its
-Stribeck velocity, where only what grows with the rate is left. Between the two friction *falls*
-with the rate; that is what makes stick-slip, and no linear loop stands for it.
+Stuck: every interface is in presliding, a spring and a damper. Sliding: every interface is far
+above its Stribeck velocity, where only the part that grows with the rate remains. Between the two,
+friction *falls* with the rate; this causes stick-slip, and no linear loop represents it.
 
-Ripple over position counts at its mean of zero, and what differs by direction at the mean of both.
+Ripple over position counts at its mean of zero; parameters by direction count at their mean.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ REGIMES: tuple[Regime, ...] = ("stuck", "sliding")
 
 
 class NoLoopError(ValueError):
-    """There is no linear loop in this regime; the message says why, for a reader."""
+    """There is no linear loop in this regime; the message states the reason for the user."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class FrictionPath:
 
     Attributes:
         stiffness: N m/rad.
-        damping, viscous: N m s/rad; apart, because the matrices of a loop hold the viscous part.
+        damping, viscous: N m s/rad; separate, because a loop's matrices contain the viscous part.
         motor_side: whether a sampled compensation reads it from the resolver.
     """
 
@@ -43,7 +43,7 @@ class FrictionPath:
 
 
 def bench_friction(bench: CompleteBench, regime: Regime) -> FrictionPath:
-    """All friction of the bench itself, summed. Raises NoLoopError."""
+    """Sum of all friction of the bench. Raises NoLoopError."""
     if regime == "stuck" and not bench.friction:
         raise NoLoopError("the bench has no friction to be stuck in")
     paths = [
@@ -60,7 +60,7 @@ def bench_friction(bench: CompleteBench, regime: Regime) -> FrictionPath:
 def compensation_friction(
     bench: CompleteBench, compensator: Compensator, regime: Regime
 ) -> tuple[FrictionPath, ...]:
-    """The friction models that compensation runs, with its gains. Raises NoLoopError."""
+    """Friction models of the compensation, with its gains. Raises NoLoopError."""
     return tuple(
         _path(options, bench, _as_compensation(options, regime), gain)
         for options, gain in compensator.friction

@@ -1,7 +1,7 @@
 """The stabilization loop of Figure 5.3 as a linear system without friction.
 
-Everything linear is one matrix: rigid axis, gear, motor with back-EMF, the current loop, viscous
-friction, and, where the controller is continuous, the rate loop, the filter of the relative rate
+The linear part is one matrix: rigid axis, gear, motor with back-EMF, current loop and viscous
+friction. With a continuous controller it includes the rate loop, the filter of the relative rate
 and the linear part of the compensation. Friction and friction-model compensation are inputs.
 
     J dw/dt = N Kt i - sigma2 (w - wb) - T
@@ -48,14 +48,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Loop:
-    """dx/dt = A x + B u, with what the engine reads from it.
+    """Linear system dx/dt = A x + B u, and outputs that the engine reads.
 
     Attributes:
         a: (n, n), per second and SI.
         b: (n, 4), columns DRIVE, BASE_RATE, FRICTION (N m at the load), COMPENSATION (N m).
-        seen: the state that compensation reads as the relative rate: RATE, of which the base's is
-            taken, or that of the filter.
-        linear_compensation: (n,) and (4,): torque of the linear compensation block, of x and u.
+        seen: state that compensation uses as the relative rate: RATE, minus the base's rate, or
+            that of the filter.
+        linear_compensation: (n,) and (4,): torque of the linear compensation block per x and u.
     """
 
     a: Array
@@ -65,7 +65,7 @@ class Loop:
 
 
 def make_compensator(bench: CompleteBench, name: str) -> Compensator:
-    """The compensation that a test asked for by name, built for this bench."""
+    """Compensation with this name, built for this bench."""
     if name == "none":
         return Compensator()
     options = bench.compensation[name]
@@ -74,12 +74,12 @@ def make_compensator(bench: CompleteBench, name: str) -> Compensator:
 
 
 def at_load(friction: FrictionOptions, bench: Bench) -> tuple[float, float]:
-    """What one N m of this interface counts at the load, and its rate per load relative rate."""
+    """Torque at the load per N m of this interface, and its rate per load relative rate."""
     return bench.at_load(friction)
 
 
 def viscous_at_load(friction: FrictionOptions, bench: Bench) -> float:
-    """Viscous friction of one interface as the load's relative rate meets it (N m s/rad)."""
+    """Viscous friction of one interface at the load (N m s/rad)."""
     torque, rate = at_load(friction, bench)
     model = friction_models()[friction.model]  # type: ignore[attr-defined]
     return model.viscous(friction) * torque * rate
@@ -91,10 +91,10 @@ def make_loop(
     compensator: Compensator,
     stated: CompleteBench | None = None,
 ) -> Loop:
-    """The loop with a continuous controller, closed on the rate or open for a torque command.
+    """Loop with a continuous controller, closed on the rate or open for a torque command.
 
-    `stated`: the bench by whose N Kt the controller makes torques of currents and currents of
-    torques, where that is not the one it drives.
+    `stated`: the bench with the N Kt by which the controller converts currents and torques, if it
+    differs from `bench`.
     """
     block = compensator.linear
     per_current = (stated or bench).torque_per_current
@@ -142,11 +142,11 @@ def make_loop(
 
 
 def make_spring(bench: CompleteBench, stiffness: float) -> Loop:
-    """The load without its motor, pulled through a spring; DRIVE is the far end's angle (rad)."""
+    """Load without motor, pulled through a spring; DRIVE is the angle of the spring's end (rad)."""
     order = _plant_order(bench)
     a, b = _plant(bench, order)
     a[RATE, CURRENT] = 0.0
-    a[CURRENT], b[CURRENT] = 0.0, 0.0  # no motor: nor does back-EMF drive a current
+    a[CURRENT], b[CURRENT] = 0.0, 0.0  # without a motor, back-EMF drives no current
     inertia = bench.axis.inertia - (bench.appendage.inertia if bench.appendage else 0.0)
     a[RATE, RELATIVE_ANGLE] -= stiffness / inertia
     b[RATE, DRIVE] += stiffness / inertia
@@ -154,7 +154,7 @@ def make_spring(bench: CompleteBench, stiffness: float) -> Loop:
 
 
 def make_plant(bench: CompleteBench) -> Loop:
-    """The axis with its current loop; DRIVE is the commanded current that a controller holds."""
+    """Axis with its current loop; DRIVE is the current command, held by the controller."""
     order = _plant_order(bench)
     a, b = _plant(bench, order)
     command_u = np.zeros(INPUTS)
@@ -188,7 +188,7 @@ def _plant(bench: CompleteBench, size: int) -> tuple[Array, Array]:
 
 
 def _add_appendage(a: Array, appendage: AppendageOptions, body: float) -> None:
-    """Deflection and rate of the appendage, elastically hung on the load."""
+    """Add deflection and rate of the appendage, elastically coupled to the load."""
     omega = 2.0 * np.pi * appendage.frequency
     stiffness = omega**2 * appendage.inertia
     damping = 2.0 * appendage.damping_ratio * omega * appendage.inertia

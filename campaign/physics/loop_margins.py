@@ -1,8 +1,8 @@
 """Crossover, margins and poles of the open loop L.
 
-The closed loop is 1 / (1 + L). Every crossing of |L| = 1 and every crossing of the negative real
-axis counts, either way: the worst is the margin. All are computed on a frequency grid that follows
-the poles of open and closed loop, and every crossing is then refined.
+The closed loop is 1 / (1 + L). Every crossing of |L| = 1 and of the negative real axis counts, in
+either direction; the worst determines the margin. They are computed on a frequency grid that
+follows the poles of open and closed loop, and then refined.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ Complex = NDArray[Any]
 """complex128"""
 
 STANDING = 1e-3
-"""1/s; a mode slower than this neither grows nor decays in any trial: it stands where it was left,
-as the bristles and the integral of a stuck axis do, which hold each other at any angle."""
+"""1/s; a slower mode neither grows nor decays in any trial. Example: bristles and integral of a
+stuck axis, which are in equilibrium at any angle."""
 FORGOTTEN = 1e-6
-"""Poles of a sampled loop closer to zero than this are delays; rounding decides where they lie."""
+"""Poles of a sampled loop closer to zero are delays; their positions are rounding errors."""
 PER_DECADE = 24
 NEARLY_STILL = 1e-2
-"""Times the lowest frequency of the grid: there L is what it is at standstill."""
+"""Times the lowest frequency of the grid: there L is equal to L at zero frequency."""
 BESIDE_POLES = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Grid points beside each oscillating pole, in half-widths of its resonance."""
 NARROWEST = 1e-4
-"""Of its frequency; the half-width of a resonance without damping."""
+"""Half-width of a resonance without damping, relative to its frequency."""
 LOW_PHASE_MARGIN = math.radians(20.0)
 LOW_GAIN_MARGIN = 3.0
-"""dB; below either a loop is stable and hardly so."""
+"""dB; below either limit a loop is stable with a low margin."""
 
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins and poles of one loop, SI; None where there is no such crossing.
+    """Margins and poles of one loop, SI; None without such a crossing.
 
     Attributes:
-        crossovers: every frequency at which |L| = 1 (rad/s), rising.
-        crossover: the one of them at which the phase margin is (rad/s).
-        phase_margin: smallest turn of L, either way, that makes it -1 (rad).
-        gain_margin: the factor on L nearest to 1 that makes it -1; below 1 for a loop that becomes
-            unstable when its gain *falls*.
-        gain_crossing: where that is (rad/s).
-        delay_margin: shortest additional delay (s) that makes it unstable.
-        poles: of the closed loop (1/s), the fastest growing first, without those that stand still.
+        crossovers: all frequencies with |L| = 1 (rad/s), rising.
+        crossover: the crossover of the phase margin (rad/s).
+        phase_margin: smallest rotation of L to -1, in either direction (rad).
+        gain_margin: factor nearest to 1 that makes L = -1; below 1 if a *lower* gain makes the loop
+            unstable.
+        gain_crossing: frequency of the gain margin (rad/s).
+        delay_margin: shortest additional delay (s) that makes the loop unstable.
+        poles: of the closed loop (1/s), fastest growth first, without those slower than `STANDING`.
         period: s; None for a continuous loop.
     """
 
@@ -69,12 +69,12 @@ class LoopMargins:
 
     @property
     def stable(self) -> bool:
-        # What swings for ever is not unstable for a rounding error.
+        # Rounding must not make an undamped oscillation unstable.
         return self.growth < STANDING
 
     @property
     def gain_margin_db(self) -> float | None:
-        """20 lg of the gain margin; negative for a gain that may not fall that far."""
+        """20 lg of the gain margin; negative if a lower gain makes the loop unstable."""
         return None if self.gain_margin is None else 20.0 * math.log10(self.gain_margin)
 
     @property
@@ -89,7 +89,7 @@ class LoopMargins:
 
     @property
     def tightness(self) -> float:
-        """Share that the worse margin is of what is no longer low; negative when unstable."""
+        """Worse margin relative to its limit of a low margin; negative if unstable."""
         if not self.stable:
             return -1.0 - self.growth
         phase = math.inf if self.phase_margin is None else self.phase_margin / LOW_PHASE_MARGIN
@@ -98,7 +98,7 @@ class LoopMargins:
 
 
 class Response:
-    """L at any frequency, fast: the Schur form makes each frequency one triangular solution."""
+    """L at any frequency; by the Schur form each frequency needs one triangular solution."""
 
     def __init__(self, loop: OpenLoop) -> None:
         from scipy.linalg import schur
@@ -147,7 +147,7 @@ def margins_of(loop: OpenLoop) -> LoopMargins:
 
 
 def in_time(poles: Complex, period: float | None) -> Complex:
-    """Poles from sample to sample as those of continuous time (1/s), delays left out."""
+    """Convert poles of a sampled loop to continuous time (1/s), without delays."""
     if period is None:
         return poles
     kept = poles[np.abs(poles) > FORGOTTEN].astype(complex)
@@ -155,7 +155,7 @@ def in_time(poles: Complex, period: float | None) -> Complex:
 
 
 def frequency_grid(poles: Complex, period: float | None) -> Array:
-    """Frequencies (rad/s), rising, that no pole's resonance falls between."""
+    """Frequencies (rad/s), rising, which resolve the resonance of every pole."""
     sizes = np.abs(poles)[np.abs(poles) > STANDING]
     low = 0.01 * float(np.min(sizes, initial=100.0))
     high = 100.0 * float(np.max(sizes, initial=100.0)) if period is None else math.pi / period
@@ -165,13 +165,13 @@ def frequency_grid(poles: Complex, period: float | None) -> Array:
     widths = np.maximum(np.abs(oscillating.real), NARROWEST * oscillating.imag)
     near = oscillating.imag[:, None] + widths[:, None] * BESIDE_POLES
     near = near[(near > low) & (near < high)]
-    # The last sampled frequency is Nyquist's, where L is real and may lie on the negative axis.
+    # A sampled loop ends at the Nyquist frequency, where L is real and can be negative.
     return np.unique(np.concatenate([np.geomspace(low, high, count), near.ravel(), [high]]))
 
 
 def _phase_margins(response: Response, crossovers: Array) -> tuple[Array, Array]:
     """Phase margin (rad) and delay margin (s) at each crossover."""
-    turn = np.angle(response(crossovers)) + np.pi  # 0 to 2 pi; lag takes it down to 0
+    turn = np.angle(response(crossovers)) + np.pi  # 0 to 2 pi; lag reduces it to 0
     margins = np.minimum(turn, 2.0 * np.pi - turn)
     return margins, turn / crossovers
 
@@ -179,9 +179,9 @@ def _phase_margins(response: Response, crossovers: Array) -> tuple[Array, Array]
 def _gain_margin(
     response: Response, omega: Array, value: Complex
 ) -> tuple[float | None, float | None]:
-    """The factor nearest to 1 that takes L to -1, and at which frequency (rad/s)."""
+    """Factor nearest to 1 that makes L = -1, and its frequency (rad/s)."""
     crossings = _refined(response, omega, value, lambda l: l.imag)
-    # At standstill L is real and finite, but for integrators; at Nyquist's frequency it is real.
+    # At zero frequency L is real and finite without integrators; at the Nyquist frequency, real.
     still = NEARLY_STILL * omega[0] * np.array([1.0, 2.0])
     first, second = response(still)
     ends = still[:1] if abs(second - first) < 1e-3 * abs(first) else np.empty(0)
@@ -197,7 +197,7 @@ def _gain_margin(
 
 
 def _refined(response: Response, omega: Array, value: Complex, sign_of: Any) -> Array:
-    """Where `sign_of(L)` changes its sign (rad/s), each to about nine digits."""
+    """Frequencies at which `sign_of(L)` changes its sign (rad/s), to about nine digits."""
     level = sign_of(value)
     at = np.flatnonzero(np.signbit(level[:-1]) != np.signbit(level[1:]))
     low, high = omega[at], omega[at + 1]

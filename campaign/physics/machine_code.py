@@ -1,10 +1,10 @@
-"""Machine code for simulations, compiled ahead.
+"""Machine code for simulations, compiled in advance.
 
 The engine has four entry points, for one trial and for a block of LANES trials, with a plant and
-at a prescribed motion; each has one signature, whatever the bench. Friction models have functions
-of their own, compiled for the lanes of either, for the sizes that their options give, and for how
-many of a kind a bench has side by side: what a trial needs is made when it is made ready. All of it
-is kept on disk (`campaign.physics.compilation`), so it is made once per installation.
+with a prescribed motion. Each has one signature, independent of the bench. Friction models have
+separate functions, compiled for the number of lanes, the sizes from their options, and the number
+of equal interfaces of a bench, when a trial is prepared. All code is cached on disk
+(`campaign.physics.compilation`), so it is compiled once per installation.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ WIDTHS = (1, LANES)
 
 @dataclass(frozen=True)
 class Part:
-    """Machine code that is made at once.
+    """A unit of machine code.
 
     Attributes:
-        name: for people.
-        make: loads it from the disk, or compiles it and keeps it there.
+        name: for display.
+        make: loads it from the disk, or compiles and caches it.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Part:
 
 @dataclass(frozen=True)
 class CompiledPart:
-    """A part that is there now; seconds on the clock, and whether it had to be compiled."""
+    """A loaded part; wall-clock seconds, and whether it was compiled."""
 
     name: str
     seconds: float
@@ -56,13 +56,13 @@ class CompiledPart:
 
 
 def folder() -> Path | None:
-    """Where the engine is kept; None: the user's cache cannot be used."""
+    """Cache folder of the engine; None if the user's cache is not usable."""
     kept = cache_folder(__name__)
     return kept if kept is not None and is_kept_for_good(kept) else None
 
 
 def parts(width: int, benches: Sequence[CompleteBench]) -> Iterator[Part]:
-    """What simulating `benches` needs, for one trial (`width` 1) or for LANES side by side."""
+    """Parts for simulations of `benches`, for one trial (`width` 1) or LANES in parallel."""
     yield engine(width, benches[0])
     for bench in benches:
         name = f"friction models of the bench {bench.name}, {_side_by_side(width)}"
@@ -71,16 +71,14 @@ def parts(width: int, benches: Sequence[CompleteBench]) -> Iterator[Part]:
 
 
 def engine(width: int, bench: CompleteBench, mode: str = "rate") -> Part:
-    """The engine alone, which is the same for any bench: `mode` is that of a loop, or a prescribed
-    motion.
-    """
+    """The engine, which is the same for any bench; `mode`: of a loop, or `prescribed`."""
     what = "engine, prescribed motion" if mode == "prescribed" else "engine"
     make = partial(_simulate, bench.with_friction({}), mode, width)
     return Part(f"{what}, {_side_by_side(width)}", make)
 
 
 def make(part: Part) -> CompiledPart:
-    """Make one part, and say what it took."""
+    """Make one part; returns its time."""
     compiling = _Compiling()
     began = time.perf_counter()
     with event.install_listener("numba:run_pass", compiling):
@@ -89,13 +87,13 @@ def make(part: Part) -> CompiledPart:
 
 
 def is_made(width: int) -> bool:
-    """Whether the engine was made already, on a machine of this kind."""
+    """Whether the engine is already compiled for this kind of machine."""
     note = _note(width)
     return note is not None and note.exists()
 
 
 def note_made(width: int) -> None:
-    """From now on `is_made` is true, until a source or the processor changes."""
+    """Record that the engine is compiled: `is_made` until a source or the processor changes."""
     note = _note(width)
     if note is not None:
         with suppress(OSError):
@@ -103,7 +101,7 @@ def note_made(width: int) -> None:
 
 
 class _Compiling(event.Listener):  # type: ignore[misc]
-    """Notices that a pass of the compiler runs, which none does for what comes from the disk."""
+    """Detector of compiler passes; code from the disk causes none."""
 
     def __init__(self) -> None:
         self.seen = False
@@ -116,7 +114,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
 
 
 def _note(width: int) -> Path | None:
-    """An empty file, named by what numba distinguishes besides what names the folder."""
+    """Path of an empty marker file; its name has the processor, which the folder's name lacks."""
     kept = folder()
     if kept is None:
         return None
@@ -129,14 +127,14 @@ def _side_by_side(width: int) -> str:
 
 
 def _make_ready(bench: CompleteBench, width: int) -> None:
-    """Trials of a bench in every mode, with every compensation."""
+    """Prepare trials of a bench in every mode, with every compensation."""
     for mode in ("rate", "prescribed"):
         for compensation in ("none", *bench.compensation):
             together([Lane.of(bench, _some_task(bench, mode, compensation), 0)], width)
 
 
 def _simulate(bench: CompleteBench, mode: str, width: int) -> None:
-    """Some milliseconds of a bench without friction, so that nothing else is compiled."""
+    """Simulate some milliseconds of a bench without friction, so that only the engine compiles."""
     for _ in simulate_together([Lane.of(bench, _some_task(bench, mode), 0)] * width):
         pass
 

@@ -1,7 +1,7 @@
 """Effect of a disturbance observer on the linear loop (Equations 5.4, 5.5).
 
-The thesis derives both for a rate controller that is one constant G_cv. A bench has a PI, and may
-give its observer an inertia J' of its own. Without delay and with an ideal current loop, with
+The thesis derives both for a constant rate controller G_cv. A bench has a PI controller, and its
+observer can have a separate inertia J'. Without delay and with an ideal current loop, with
 G(s) = N Kt (Kp + Ki / s) and a = N K0 / J', in terms of the readings y = w + n:
 
     motor torque     Tm = -G y - T'          T' = a / (s + a) (J' s y - Tm)         (Eq. 5.1)
@@ -10,7 +10,7 @@ G(s) = N Kt (Kp + Ki / s) and a = N K0 / J', in terms of the readings y = w + n:
     noise coupling   w / n  = -C / (J s + C)                                        (Eq. 5.5)
 
 For J' = J the first is s / ((J s + G)(s + a)), which is Eq. 5.4 with G for G_cv, and the second is
-Eq. 5.5. Neither knows a delay, so neither says where the loop becomes unstable; see `stability`.
+Eq. 5.5. Neither includes a delay, so neither predicts instability; see `stability`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def corner_frequency(bench: CompleteBench, gain: float, inertia: float | None = 
 
 
 def gain_for(bench: CompleteBench, corner: float, inertia: float | None = None) -> float:
-    """The gain K0 (N m s/rad at the motor) with this corner frequency (Hz)."""
+    """Gain K0 (N m s/rad at the motor) for this corner frequency (Hz)."""
     return TWO_PI * corner * (inertia or bench.axis.inertia) / bench.gear.ratio
 
 
@@ -58,9 +58,9 @@ def noise_coupling(
 def noise_rate(bench: CompleteBench, corner: float, inertia: float | None) -> float:
     """Standard deviation (rad/s) of the load's rate that the gyro's noise causes.
 
-    The integral of |w/n|^2 over the noise's spectrum: white from sample to sample, and held in
-    between, 2 sigma^2 T (sin(pi f T) / (pi f T))^2 per hertz. Rounding to a count q adds q^2 / 12.
-    0 for a continuous controller, which sees everything exactly.
+    Integral of |w/n|^2 over the spectrum of noise that is white per sample and held in between,
+    2 sigma^2 T (sin(pi f T) / (pi f T))^2 per hertz. Rounding to a count q adds q^2 / 12.
+    0 for a continuous controller, which has ideal sensors.
     """
     rate = bench.controller.sample_rate
     if rate is None:

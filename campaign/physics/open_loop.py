@@ -1,17 +1,17 @@
 """The open loop of a bench: linear, with delays, filters and compensation.
 
-The **rate loop** is opened at the error of the rate controller, r - w as the gyro reads w: one
-signal, the one that the gain Kpv multiplies and that the experiment `frequency_response` opens by
-computation. Everything else stays closed: current loop, back-EMF, friction, and compensation,
-which so is part of the plant. L is the rate controller times that plant, and 1 + L = 0 are the
-poles of everything together.
+The **rate loop** is opened at the error of the rate controller, r - w with the gyro's reading w:
+the signal that the gain Kpv multiplies. The experiment `frequency_response` opens the loop at the
+same point by computation. All other loops stay closed: current loop, back-EMF, friction, and
+compensation, which is thus part of the plant. L is the rate controller times that plant; the
+solutions of 1 + L = 0 are the poles of the whole system.
 
-Under a commanded torque there is no rate loop. Then compensation alone closes one, and it is opened
-at the compensation torque.
+With a commanded torque there is no rate loop. Compensation alone then closes a loop, which is
+opened at the compensation torque.
 
-A continuous loop is dx/dt = A x + B u, y = C x. A sampled one is the same from sample to sample, as
-the engine's controller computes it: readings late by whole samples, relative rates as backward
-differences behind their low-pass, the held output late by any share of a sample.
+A continuous loop is dx/dt = A x + B u, y = C x. A sampled loop is the same per sample, as in the
+engine's controller: readings are late by whole samples, relative rates are low-passed backward
+differences, and the held output is late by any share of a sample.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from campaign.signals import Array
 
 Mode = Literal["rate", "torque"]
 MOST_DELAYS = 400
-"""Most samples that all delays together may last; beyond, the matrix would fill the memory."""
+"""Maximum number of states, most of them delayed samples; larger matrices fill the memory."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class OpenLoop:
 
     @property
     def closed(self) -> Array:
-        """The matrix of the closed loop (n, n)."""
+        """Matrix of the closed loop (n, n)."""
         return self.a - np.outer(self.b, self.c)
 
 
 def open_loop(bench: CompleteBench, compensation: str, mode: Mode, regime: Regime) -> OpenLoop:
-    """The loop on the bench's day. Raises NoLoopError where there is no linear one."""
+    """Open loop on the bench's day. Raises NoLoopError if there is no linear loop."""
     bench = of_its_day(bench)
     compensator = make_compensator(bench, compensation)
     if mode == "torque" and compensator.linear is None and not compensator.friction:
@@ -92,8 +92,8 @@ def _continuous(
     loop = make_loop(bench, "torque", compensator)  # compensation is closed, the rate loop open
     seen, low_pass = np.zeros(len(loop.a)), bench.controller.relative_rate_filter
     seen[loop.seen] = 1.0
-    # The bristles of a model move with the integral of the rate it sees; behind a low-pass that
-    # is the angle less what the low-pass still holds back.
+    # The bristles of a model move with the integral of its input rate; behind a low-pass this is
+    # the angle minus the lag of the filter.
     angle = np.zeros(len(seen))
     angle[RELATIVE_ANGLE] = 1.0
     jumping = sum((m.stiffness * (angle - low_pass * seen) + m.damping * seen for m in models), 0.0)
@@ -122,12 +122,12 @@ def _continuous(
 
 
 class _Sampled:
-    """Builds a sampled loop: each signal is a row over the states and, last, the input.
+    """Builder of a sampled loop: each signal is a row over the states and, last, the input.
 
     States: plant, rate integral, linear compensation, filtered relative rates of encoder and
-    resolver, then past readings (gyro, angle, current) and past outputs, the newest first. Where
-    nothing holds the load in place, the angle counts from sample to sample: where it stands has
-    no effect, and would only add a pole at 1.
+    resolver, then past readings (gyro, angle, current) and past outputs, newest first. Without
+    stiffness the angle state is its change over a sample: its value has no effect, and would only
+    add a pole at 1.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class _Sampled:
         ]
         delay = bench.controller.delay / self.period
         self.late_output = math.floor(delay + 1e-9)
-        self.share = max(0.0, delay - self.late_output)  # of a sample, until the output changes
+        self.share = max(0.0, delay - self.late_output)  # of a sample, before the output changes
         self.share = 0.0 if self.share < 1e-9 else self.share
         self.anchored = friction.stiffness != 0.0 or any(model.stiffness for model in models)
         gyro, encoder, resolver, current = self.sensor_delays
@@ -222,14 +222,14 @@ class _Sampled:
         )
 
     def relative_rates(self, angle: Array) -> list[Array]:
-        """Relative rate by encoder and by resolver: backward difference, then the low-pass."""
+        """Relative rates of encoder and resolver: backward difference, then low-pass."""
         low_pass = self.bench.controller.relative_rate_filter
         pole = math.exp(-self.period / low_pass) if low_pass > 0.0 else 0.0
-        found = []
+        filtered = []
         for before, late in zip(self.state("rates"), self.sensor_delays[1:3], strict=True):
             change = angle[late] - angle[late + 1] if self.anchored else angle[late]
-            found.append(pole * before + (1.0 - pole) / self.period * change)
-        return found
+            filtered.append(pole * before + (1.0 - pole) / self.period * change)
+        return filtered
 
     def compensation(
         self, gyro: Array, current: Array, angle: Array, rates: list[Array]
@@ -245,8 +245,7 @@ class _Sampled:
             now = rates[side]
             torque = torque + (model.viscous + model.damping) * now
             if model.stiffness:
-                # z, the sum of the filtered differences, is the angle less what the low-pass
-                # still holds back.
+                # z, the sum of the filtered differences, is the angle minus the filter's lag.
                 behind = self.period * pole / (1.0 - pole)
                 z = angle[self.sensor_delays[1 + side]] - behind * now
                 torque = torque + model.stiffness * z
@@ -256,7 +255,7 @@ class _Sampled:
         return torque, a @ state + b @ y
 
     def moved(self, outputs: Array, indices: list[int]) -> Array:
-        """The plant's next state: the older output until its share of the sample is over."""
+        """Next state of the plant: the older output acts for its share of the sample."""
         loop = make_plant(self.bench)
         a, b = loop.a.copy(), loop.b[:, [DRIVE]]
         a[:, RELATIVE_ANGLE] += loop.b[:, FRICTION] * self.friction.stiffness

@@ -25,11 +25,11 @@ from campaign.trial import Task
 
 @dataclass(frozen=True)
 class LoopUse:
-    """One loop and the trial that closes it.
+    """A loop and the trial that closes it.
 
     Attributes:
-        trial: number of the trial with the least margin, the first of them.
-        mode: `rate`, or `torque` where compensation alone closes a loop.
+        trial: number of the first trial with the least margin.
+        mode: `rate`, or `torque` if compensation alone closes a loop.
     """
 
     trial: int
@@ -40,10 +40,10 @@ class LoopUse:
 
 
 def loops_used(items: Iterable[tuple[int, Task, Bench]]) -> tuple[LoopUse, ...]:
-    """The worst loop of each compensation, mode and regime among trials, the worst first.
+    """Worst loop of each compensation, mode and regime in the trials; worst first.
 
-    `items`: number, task and bench of each trial. Regimes in which there is no linear loop, trials
-    without a motor, and benches that lack what a loop needs are left out.
+    `items`: number, task and bench of each trial. It omits regimes without a linear loop, trials
+    without a motor, and incomplete benches.
     """
     by_bench: dict[Hashable, tuple[Bench, tuple[LoopUse, ...]]] = {}
     by_values: dict[Hashable, tuple[LoopUse, ...]] = {}
@@ -53,7 +53,7 @@ def loops_used(items: Iterable[tuple[int, Task, Bench]]) -> tuple[LoopUse, ...]:
             continue
         place = (id(bench), task.compensation, task.mode)
         if place not in by_bench:
-            # The bench is kept with its loops: an id is unique only while its object lives.
+            # Keeps the bench, because an id is unique only while its object exists.
             uses = _known(by_values, number, bench, task.compensation, task.mode)
             by_bench[place] = bench, uses
             for use in uses:
@@ -66,7 +66,7 @@ def loops_used(items: Iterable[tuple[int, Task, Bench]]) -> tuple[LoopUse, ...]:
 def loops_of(
     bench: Bench, compensation: str, mode: Mode
 ) -> Iterator[tuple[Regime, LoopMargins | NoLoopError]]:
-    """Each regime with its LoopMargins, or with the NoLoopError that says why there is none."""
+    """Each regime with its LoopMargins, or with a NoLoopError that states the reason."""
     try:
         bench = complete(bench, "a loop's margin")
     except IncompleteBenchError as error:
@@ -84,7 +84,7 @@ def _loops(
                 yield regime, margins_of(open_loop(bench, compensation, mode, regime))
         except NoLoopError as error:
             yield regime, error
-        except (ValueError, ArithmeticError):  # a matrix with infinite numbers has no poles
+        except (ValueError, ArithmeticError):  # a matrix with infinite values has no poles
             yield regime, NoLoopError("its numbers are beyond computing")
 
 
@@ -105,15 +105,15 @@ def _known(
     key = _values(bench, compensation, mode)
     if key not in known:
         known[key] = tuple(
-            LoopUse(number, compensation, mode, regime, found)
-            for regime, found in loops_of(bench, compensation, mode)
-            if isinstance(found, LoopMargins)
+            LoopUse(number, compensation, mode, regime, loop)
+            for regime, loop in loops_of(bench, compensation, mode)
+            if isinstance(loop, LoopMargins)
         )
     return known[key]
 
 
 def _values(bench: CompleteBench, compensation: str, mode: Mode) -> Hashable:
-    """All that the loops depend on, and nothing of what only the size of a motion depends on."""
+    """All values that the loops depend on, without those that affect only the size of a motion."""
     bench = of_its_day(bench)
     compensator = make_compensator(bench, compensation)
     block = compensator.linear

@@ -24,13 +24,13 @@ from campaign.physics.friction_paths import (
 from campaign.units import Torque, torque_text
 
 SLOWEST = 1e-9
-"""rad/s; an interface without a static torque holds with its friction of sliding this slowly."""
+"""rad/s; friction at this rate is the breakaway torque of an interface without static torque."""
 
 Share = Annotated[float, Field(ge=0, le=2)]
 
 
 def _kind(value: Any) -> str:
-    """A share, or the table of one interface."""
+    """Tag of a value: a share, or the table of one interface."""
     return INTERFACE if isinstance(value, Mapping) else "share"
 
 
@@ -72,9 +72,9 @@ class PreloadOptions(Options):
 
 
 def wrong_shares(preload: PreloadOptions, friction: Mapping[str, Any]) -> Iterator[Wrong]:
-    """Every path that leads to no torque that this preload could raise.
+    """Paths without a torque that this preload can raise.
 
-    Where no interface is preloaded it raises nothing, whatever its shares.
+    Without a preloaded interface there are none: the preload has no effect.
     """
     declared = {name: torques(options) for name, options in _loaded(friction).items()}
     for path in preload.by_path if declared else ():
@@ -88,7 +88,7 @@ def wrong_shares(preload: PreloadOptions, friction: Mapping[str, Any]) -> Iterat
 
 
 def loading(preload: PreloadOptions, friction: Mapping[str, Any]) -> PreloadOptions:
-    """`preload` without the shares that lead nowhere on this friction."""
+    """`preload` without the shares that match nothing in this friction."""
     tree = preload.model_dump(mode="json")
     for wrong in wrong_shares(preload, friction):
         tree = {"shares": {}, **without(tree, wrong.keys)}
@@ -98,11 +98,11 @@ def loading(preload: PreloadOptions, friction: Mapping[str, Any]) -> PreloadOpti
 def with_preload(
     friction: Mapping[str, Any], ratio: float, preload: PreloadOptions | None
 ) -> dict[str, Any]:
-    """Friction options by interface, with what `preload` adds to (or takes from) the nominal ones.
+    """Friction options by interface, changed from nominal by `preload`.
 
-    The axis gains what each share says; the interfaces that it names have it among them as they
-    have the breakaway torque of the axis. `ratio` is that of the gear. Raises ValueError, with a
-    message for the user, where no friction would be left.
+    The axis gains the torque of each share. The interfaces of its path divide it in proportion to
+    their breakaway torques at the load. `ratio`: of the gear. Raises ValueError, with a message for
+    the user, if no friction would remain.
     """
     if preload is None or preload.torque == preload.nominal:
         return dict(friction)
@@ -127,7 +127,7 @@ def _loaded(friction: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _breakaway(options: Any) -> float:
-    """What an interface holds with (N m at the interface)."""
+    """Breakaway torque of an interface (N m at the interface)."""
     from campaign.physics.friction import friction_models
 
     if "static_torque" in torques(options):
@@ -137,7 +137,7 @@ def _breakaway(options: Any) -> float:
 
 
 def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) -> Any:
-    """One interface with what the preload adds to its torques (N m at the interface)."""
+    """One interface with its torques changed by `added` (N m at the interface)."""
 
     def more(parameter: str, value: float) -> float:
         raised = value + added.get(parameter, 0.0)
@@ -153,7 +153,7 @@ def _raised(name: str, options: Any, added: Mapping[str, float], torque: float) 
 
 
 def changed(options: Any, change: Callable[[str, float], float]) -> Any:
-    """Friction options with everything that may change changed, in both directions."""
+    """Friction options with all changeable parameters changed, in both directions."""
     names = changeable(options)
 
     def own(of: Any) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The engine without a plant: friction and compensation at a prescribed motion."""
+"""The engine without a plant: friction and compensation with a prescribed motion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from campaign.physics.vector import LANES, by_lanes, number_by_lanes
 
 
 def _driving(lanes: int) -> Any:
-    """`drive` of so many lanes."""
+    """`drive` for a number of lanes."""
 
     def drive(
         friction: Elements,
@@ -47,7 +47,7 @@ def _driving(lanes: int) -> Any:
         every: int,
         out: Array,
     ) -> None:
-        """Move friction and compensation at a prescribed relative rate, without plant or motor.
+        """Advance friction and compensation at a prescribed relative rate, without plant, motor.
 
         rate: (steps + 1,) rad/s at the step grid.   step: s.   out: (8, steps / every), rows as
         OUTPUTS; both rates are the prescribed one and there is no current.
@@ -55,7 +55,7 @@ def _driving(lanes: int) -> Any:
         memory = memory_of(lanes, memory)
         friction, compensation = elements_of(lanes, friction), elements_of(lanes, compensation)
         rate, step, out = by_lanes(rate, lanes), number_by_lanes(step, lanes), by_lanes(out, lanes)
-        angle = memory.x[RATE]  # there is no plant, and the angle has the first row for itself
+        angle = memory.x[RATE]  # without a plant, the first row contains the angle
         for now in range(rate.shape[0] - 1):
             for met in (friction.met[0], compensation.met[0]):
                 met[MEETS_RATE_START], met[MEETS_RATE_END] = rate[now], rate[now + 1]
@@ -80,7 +80,7 @@ def _driving(lanes: int) -> Any:
             angle = angle + 0.5 * step * (rate[now] + rate[now + 1])
         memory.x[RATE] = angle
 
-    drive.__qualname__ = "drive_one" if lanes == 1 else "drive_block"  # its file
+    drive.__qualname__ = "drive_one" if lanes == 1 else "drive_block"  # names its file
     return entry(drive)
 
 

@@ -1,13 +1,13 @@
 """Meaning of the rows of simulation arrays: states, inputs, sensors, outputs.
 
-The loop's matrices, the engine and the friction models exchange arrays whose first axis has these
-rows, and whose last axis has the lanes: trials that are simulated at once, each with parameters of
-its own. Every other module uses the names.
+The loop's matrices, the engine and the friction models exchange arrays. The first axis has these
+rows. The last axis has the lanes: trials simulated in parallel, each with its own parameters. All
+other modules use the names.
 """
 
 from __future__ import annotations
 
-# States that every loop has; the appendage's two and the continuous controller's own follow.
+# States of every loop; those of the appendage (two) and of the continuous controller follow.
 RATE, ANGLE, RELATIVE_ANGLE, CURRENT, CURRENT_INTEGRAL = range(5)
 DEFLECTION, APPENDAGE_RATE = 5, 6
 PLANT_STATES = 5
@@ -18,7 +18,7 @@ INPUTS = 4
 
 SENSORS = GYRO, ENCODER, RESOLVER, CURRENT_SENSOR = 0, 1, 2, 3
 
-# What a simulation gives of every recorded sample.
+# Outputs of a simulation for each recorded sample.
 OUTPUTS = (
     "gyro_rate",
     "relative_rate",
@@ -40,7 +40,7 @@ OUTPUTS = (
     OUT_LOAD_RATE,
 ) = range(8)
 
-# What every interface meets over a step, as the load sees it.
+# Motion of an interface over a step, at the load.
 (
     MEETS_RATE_START,
     MEETS_RATE_END,
@@ -54,7 +54,7 @@ OUTPUTS = (
 ) = range(9)
 MEETS = 9
 
-# What is fixed of an interface, before the parameters of its model.
+# Constants of an interface, before the parameters of its model.
 (
     HAS_RATE,
     HAS_TORQUE,
@@ -65,16 +65,16 @@ MEETS = 9
 ) = range(6)
 HAS = 6
 
-# What an interface keeps, before the state of its model.
+# State of an interface, before the state of its model.
 KEEPS_TORQUE = 0
 KEEPS = 1
 
-# What all interfaces together answer: a torque that is a straight line over the step; and what of
-# it stands when it ends.
+# Sum of all interfaces: mean and change of a torque that is a straight line over the step. HELD:
+# end of that line, only of models with a state.
 MEAN, CHANGE, HELD = range(3)
 ANSWERS = 3
 
-# What a sampled controller keeps from sample to sample.
+# State of a sampled controller.
 (
     KEPT_INTEGRAL,
     KEPT_LOAD_RATE,
@@ -88,7 +88,7 @@ ANSWERS = 3
 ) = range(9)
 KEPT = 9
 
-# What dry friction keeps from step to step, and then what it does over one: see `dry_friction`.
+# State of dry friction, followed by its results for one step; see `dry_friction`.
 (
     DRY_DIRECTION,
     DRY_ENDED,
@@ -108,8 +108,8 @@ KEPT = 9
 ) = range(15)
 DRY = 15
 LIMITS = 4
-"""Of one dry interface: its rows DRY_HOLDS_FORWARDS to DRY_STARTS_BACKWARDS."""
+"""Number of limits of a dry interface: rows DRY_HOLDS_FORWARDS to DRY_STARTS_BACKWARDS."""
 
-# What a sliding torque is asked at.
+# Arguments of a sliding torque.
 ASKED_DIRECTION, ASKED_SPEED = range(2)
 ASKED = 2

@@ -48,10 +48,10 @@ def sample(
     noise: Array,
     reading: int,
 ) -> None:
-    """One sample of the controller: read the sensors, put the current command that is next.
+    """One sample of the controller: read the sensors, set the next current command.
 
-    x: states of the plant.   command: rad/s, or N m where there is no rate loop.
-    reading: of `noise`, counted from where it begins.
+    x: states of the plant.   command: rad/s, or N m without a rate loop.
+    reading: index in `noise`.
     """
     number = memory.counters[1]
     memory.counters[1] += 1
@@ -76,7 +76,7 @@ def sample(
 def _read_sensors(
     controller: Controller, readings: Array, place: int, x: Array, noise: Array, reading: int
 ) -> None:
-    """What the sensors read now: the truth, with noise, in whole counts; into their ring."""
+    """Write the present readings to their ring: true values, with noise, in whole counts."""
     readings[GYRO, place] = x[RATE]
     readings[ENCODER, place] = x[RELATIVE_ANGLE]
     readings[RESOLVER, place] = x[RELATIVE_ANGLE] * controller.ratio
@@ -93,7 +93,7 @@ def _read_sensors(
 
 @pasted
 def _stand_still(readings: Array) -> None:
-    """Before the first sample everything stood as it does then."""
+    """Set the readings before the first sample to those of the first sample."""
     for s in range(4):
         for before in range(1, readings.shape[1]):
             readings[s, before] = readings[s, 0]
@@ -101,7 +101,7 @@ def _stand_still(readings: Array) -> None:
 
 @pasted
 def _reading(controller: Controller, readings: Array, sensor: int, place: int) -> Any:
-    """What the controller has of a sensor by now."""
+    """Delayed reading of a sensor."""
     delayed = place - controller.delay[sensor]
     return readings[sensor, delayed if delayed >= 0 else delayed + readings.shape[1]]
 
@@ -115,9 +115,9 @@ def _rates(
     encoder: float,
     resolver: float,
 ) -> Any:
-    """Differences of the angles, filtered; and the pointing angle, the trapezoidal sum of rates.
+    """Update filtered differences of angles, and the pointing angle (trapezoidal sum of rates).
 
-    Returns the rate that the loop is fed by: the gyro's, or the encoder's where that does it.
+    Returns the feedback of the rate loop: the gyro's rate, or that of the encoder.
     """
     if first:
         kept[KEPT_ENCODER], kept[KEPT_RESOLVER] = encoder, resolver
@@ -143,7 +143,7 @@ def _compensate(
     gyro: float,
     motor_torque: float,
 ) -> float:
-    """The torque of the compensation: its linear block, and its friction models now."""
+    """Torque of the compensation: its linear block and its friction models."""
     relative, d = memory.kept[KEPT_LOAD_RATE], controller.d
     torque: float = d[0] * gyro + d[1] * motor_torque + d[2] * relative
     torque = _linear(lanes, controller, memory.linear, gyro, motor_torque, relative, torque)
@@ -160,9 +160,9 @@ def _compensate(
 
 @pasted
 def _meet(compensation: Elements, kept: Array) -> None:
-    """Give the friction models the newest filtered rates and the newest angle.
+    """Pass the newest filtered rates and angle to the friction models.
 
-    A rate is constant: a difference of angles is the mean rate of the sample that has ended.
+    A rate is constant: a difference of angles is the mean rate of the past sample.
     """
     load, motor = compensation.met[0], compensation.met[1]
     for row in (MEETS_RATE_START, MEETS_RATE_MEAN, MEETS_RATE_END):
@@ -172,10 +172,10 @@ def _meet(compensation: Elements, kept: Array) -> None:
 
 @pasted
 def _ask_over(compensation: Elements, duration: Array | float) -> None:
-    """Ask the friction models over `duration` (s).
+    """Call the friction models over `duration` (s).
 
-    Over the sample that has ended it advances their states; then, over an instant, it gives the
-    torque of the states and rates that are there now.
+    Over the past sample this advances their states; then, over an instant, it returns the torque of
+    the present states and rates.
     """
     load, motor = compensation.met[0], compensation.met[1]
     load[MEETS_STEP], motor[MEETS_STEP] = duration, duration
@@ -192,7 +192,7 @@ def _command(
     gyro: float,
     torque: float,
 ) -> None:
-    """The current command of this sample, into its ring; the one that is next comes out of it."""
+    """Write the current command of this sample to its ring, and read the next one from it."""
     kept, outputs = memory.kept, memory.outputs
     place = number % outputs.shape[0]
     if controller.closes_rate_loop:
@@ -216,7 +216,7 @@ def _linear(
     relative: float,
     torque: float,
 ) -> float:
-    """Advance the linear compensation over a sample; `torque` and its torque together."""
+    """Advance the linear compensation over a sample; returns `torque` plus its torque."""
     order, b, new = state.shape[0], controller.b, rows_on_the_stack(lanes)
     for row in range(order):
         torque = torque + controller.c[row] * state[row]

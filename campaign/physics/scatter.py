@@ -30,7 +30,7 @@ from campaign.physics.friction_paths import (
 )
 
 TORQUES = "torques"
-"""What a bench calls one draw of Coulomb and static torque together."""
+"""Name of a common draw of Coulomb and static torque in a bench."""
 
 
 class Scatter(Options):
@@ -65,11 +65,11 @@ class Scatter(Options):
 
 @dataclass(frozen=True)
 class Line:
-    """One draw.
+    """A draw.
 
     Attributes:
-        keys: where it stands in its table.
-        paths: what it multiplies.
+        keys: its keys in the table.
+        paths: parameters that it multiplies.
     """
 
     keys: tuple[str, ...]
@@ -78,12 +78,12 @@ class Line:
 
     @property
     def name(self) -> str:
-        """Its path, or what a common draw is called: its draws follow from it."""
+        """Its path, or the name of a common draw; it seeds the draws."""
         return ".".join(self.keys)
 
 
 def _kind(value: Any) -> str:
-    """A distribution, or the table of one interface."""
+    """Tag of a value: a distribution, or the table of one interface."""
     if isinstance(value, Mapping) and not value.keys() & Scatter.model_fields.keys():
         return INTERFACE
     return "Scatter"
@@ -118,12 +118,12 @@ class VariationOptions(Options):
 
     @property
     def days(self) -> tuple[Line, ...]:
-        """The draws of a day."""
+        """Draws of a day."""
         return tuple(_lines(self.day_to_day))
 
     @property
     def trials(self) -> tuple[Line, ...]:
-        """The draws of a trial."""
+        """Draws of a trial."""
         return tuple(_lines(self.trial_to_trial))
 
 
@@ -137,7 +137,7 @@ def _lines(table: Scatters) -> Iterator[Line]:
 
 
 def wrong_scatter(variation: VariationOptions, friction: Mapping[str, Any]) -> Iterator[Wrong]:
-    """Every path that leads to nothing that could scatter."""
+    """Paths without a parameter that can scatter."""
     declared = {name: changeable(options) for name, options in friction.items()}
     for table, lines in (("day_to_day", variation.days), ("trial_to_trial", variation.trials)):
         for line in lines:
@@ -154,7 +154,7 @@ def wrong_scatter(variation: VariationOptions, friction: Mapping[str, Any]) -> I
 
 
 def _no_distribution(line: Line, declared: Mapping[str, Sequence[str]]) -> str:
-    """What to say of `coulomb_torque = { relatve = 0.02 }`, which looks like an interface."""
+    """Message for `coulomb_torque = { relatve = 0.02 }`, which looks like an interface."""
     name, *parts = line.keys
     parameters = {each for names in declared.values() for each in names}
     if not parts or name in declared or name not in parameters:
@@ -163,7 +163,7 @@ def _no_distribution(line: Line, declared: Mapping[str, Sequence[str]]) -> str:
 
 
 def acting(variation: VariationOptions, friction: Mapping[str, Any]) -> VariationOptions:
-    """`variation` without what leads nowhere on this friction; no draw of the rest changes."""
+    """`variation` without paths that match nothing in this friction; other draws are unchanged."""
     tree = variation.model_dump(mode="json")
     for wrong in reversed(list(wrong_scatter(variation, friction))):
         *keys, last = wrong.keys
@@ -174,6 +174,6 @@ def acting(variation: VariationOptions, friction: Mapping[str, Any]) -> Variatio
         for key in keys:
             table = table[key]
         del table[last]
-        if not table:  # a common draw of nothing
+        if not table:  # a common draw without parameters
             tree = without(tree, keys[:-1])
     return VariationOptions.model_validate(tree)

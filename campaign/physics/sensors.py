@@ -24,7 +24,7 @@ class RateSensor(Options):
 
 
 _PER_REVOLUTION = {"counts": 1.0, "lines": 4.0}
-"""Counts for each of what a data sheet gives; a line has four edges."""
+"""Counts per unit of a data sheet; a line has four edges."""
 
 
 class _Divided(Options):
@@ -94,5 +94,5 @@ class SensorsOptions(Options):
 
     @property
     def in_order(self) -> tuple[RateSensor, AngleSensor, MotorAngleSensor, CurrentSensor]:
-        """In the order of `rows.SENSORS`."""
+        """All sensors in the order of `rows.SENSORS`."""
         return self.gyro, self.encoder, self.resolver, self.current

@@ -1,6 +1,6 @@
 """Roll of a ship in irregular beam seas: wave spectrum and second-order response.
 
-Long-crested deep-water waves meet a ship without way from abeam. With f the frequency and w = 2 pi
+Long-crested deep-water waves reach a stationary ship from abeam. With f the frequency and w = 2 pi
 f, the one-sided spectra per hertz are
 
     elevation      S(f)  = 5/16 Hs^2 fp^4 f^-5 exp(-5/4 (fp/f)^4)              (m^2/Hz)
@@ -14,8 +14,8 @@ with significant height Hs and peak frequency fp. The second is Airy's dispersio
 third is linear roll, driven by the effective wave slope e times the slope at the hull. Both are
 textbook: A. R. J. M. Lloyd, Seakeeping: Ship Behaviour in Rough Weather (1989), chapters 3 to 8.
 
-Waves shorter than the beam push up and down on one hull at once, so the slope is cut off above a
-frequency; without that, the variance of the acceleration would grow without bound.
+Waves shorter than the beam lift and lower one hull at the same time, so the slope is cut off above
+a frequency. Without this, the variance of the acceleration would grow without bound.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from campaign.signals import Array, MultiSine
 GRAVITY = 9.80665
 """m/s^2."""
 LOWEST = 0.4
-"""of the peak frequency: below it the spectrum holds 1e-21 of its energy."""
+"""Relative to the peak frequency; the spectrum below it has 1e-21 of the energy."""
 FINE = 400
-"""points per component at which the spectrum is integrated; a lightly damped roll is narrow."""
+"""Points per component in the integral of the spectrum; a lightly damped roll is narrow."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ShipRoll:
         natural_period: of roll, 2 pi / wn (s).
         damping_ratio: zeta of roll.
         slope_coefficient: e, the effective wave slope over the slope at the surface.
-        cutoff: frequency above which waves no longer roll the ship (Hz).
+        cutoff: frequency above which waves do not roll the ship (Hz).
     """
 
     significant_height: float
@@ -75,11 +75,11 @@ class ShipRoll:
 
 
 def roll_acceleration(ship: ShipRoll, components: int, seed: int) -> MultiSine:
-    """One realisation of the roll acceleration (rad/s^2): a sine for each slice of the spectrum.
+    """A realisation of the roll acceleration (rad/s^2): one sine per slice of the spectrum.
 
-    Slices are equally wide. Each sine has the energy of its slice, so that the variance is that of
-    the spectrum exactly, a frequency drawn from the slice, so that the motion does not repeat, and
-    a random phase. Raises ValueError when the cut-off leaves nothing of the sea.
+    Slices have equal widths. Each sine has the energy of its slice, so the variance is exactly that
+    of the spectrum. Its frequency is random within the slice, so the motion does not repeat; its
+    phase is random. Raises ValueError if the cut-off leaves no waves.
     """
     lowest = LOWEST / ship.peak_period
     if ship.cutoff <= lowest:

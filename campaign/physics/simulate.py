@@ -1,7 +1,7 @@
-"""Simulation of tasks on benches, in stretches of bounded memory.
+"""Simulation of tasks on benches, in segments of bounded memory.
 
-Trials of one structure can be simulated together, in blocks of lanes; each one's samples are, to
-the bit, what they are when it is simulated alone.
+Trials of one structure can be simulated together, in blocks of lanes; the samples of each are
+bit-identical to those of a separate simulation.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from campaign.trial import Task
 __all__ = ["FrictionAlong", "make_grid", "simulate", "simulate_together"]
 
 STRETCH_STEPS = 20_000
-"""Steps of a trial between two looks at limits and stops."""
+"""Steps of a trial between two checks of limits and stops."""
 BLOCK_STEPS, BLOCK_SAMPLES = 32_000, 8_000
-"""The same of a block; more samples leave the processor's cache."""
+"""The same for a block; more samples exceed the processor's cache."""
 
 
 def simulate(
     bench: CompleteBench, task: Task, seed: int, longest_step: float | None = None
 ) -> Iterator[tuple[Array, Array]]:
-    """Blocks of (time (n,), outputs (8, n) with rows as `rows.OUTPUTS`) until the task ends."""
+    """Yield blocks of (time (n,), outputs (8, n) with rows as `rows.OUTPUTS`) until the end."""
     for time, (out,) in simulate_together([Lane.of(bench, task, seed, longest_step)]):
         yield time, out
 
@@ -41,10 +41,10 @@ def simulate(
 def simulate_together(
     trials: Sequence[Lane], stretch: int | None = None
 ) -> Iterator[tuple[Array, tuple[Array, ...]]]:
-    """As `simulate`, of up to LANES trials of one structure: outputs of each, in their order.
+    """As `simulate`, for up to LANES trials of one structure: outputs of each, in their order.
 
-    It goes on until the longest ends; one that has ended has outputs of shape (8, 0). `stretch` is
-    how many samples come at a time, where the steps are not to decide that.
+    It ends with the longest trial; after its end a trial has outputs of shape (8, 0). `stretch`:
+    samples per block; None: from the number of steps.
     """
     alone = len(trials) == 1
     lanes = together(trials, 1 if alone else LANES)
@@ -57,7 +57,7 @@ def simulate_together(
         at = _steps(grid, first, count)
         out = zeros(len(OUTPUTS), count, lanes.width)
         _advance(lanes, trials[0].prescribed, alone, at, grid.every, out)
-        # n / rate, not n steps: whoever knows the rate has the same times to the bit.
+        # n / rate, not n steps: the times are bit-identical to those computed from the rate.
         time = (first + np.arange(count)) / trials[0].task.sample_rate
         left = (max(0, min(count, trial.grid.samples - first)) for trial in trials)
         by_trial = np.empty((lanes.width, len(OUTPUTS), count))
@@ -67,10 +67,10 @@ def simulate_together(
 
 
 class FrictionAlong:
-    """A prescribed motion, made ready once for friction that meets it again and again."""
+    """A prescribed motion, prepared once for repeated evaluations of friction."""
 
     def __init__(self, bench: CompleteBench, task: Task, longest_step: float) -> None:
-        """Raises ValueError when the task's rates do not fit the bench's."""
+        """Prepare it. Raises ValueError if the task's and the bench's rates do not match."""
         lane = Lane.of(bench, task, 1, longest_step)
         self._lanes, self._every = together([lane], 1), lane.grid.every
         stretch = samples_at_a_time(lane.grid, alone=True)
@@ -81,7 +81,7 @@ class FrictionAlong:
             self._stretches.append((count, rates))
 
     def of(self, friction: Mapping[str, Any]) -> Array:
-        """Friction torque (N m, or N), shape (samples,), as `simulate` of the bench with it."""
+        """Friction torque (N m, or N), shape (samples,), as from `simulate` with this friction."""
         lanes = self._lanes.with_friction_at_rest(friction)
         parts = []
         for count, rates in self._stretches:
@@ -95,12 +95,12 @@ class FrictionAlong:
 
 
 def _steps(grid: Grid, first: int, count: int) -> Array:
-    """Times (s) of the step grid over so many samples, shape (steps + 1,)."""
+    """Times (s) of the step grid over `count` samples, shape (steps + 1,)."""
     return np.asarray((first * grid.every + np.arange(count * grid.every + 1.0)) * grid.step)
 
 
 def samples_at_a_time(grid: Grid, *, alone: bool) -> int:
-    """Samples between two looks, so that memory and the time between two of them are bounded."""
+    """Samples per block; bounds memory and the time between two checks."""
     if alone:
         return max(1, STRETCH_STEPS // grid.every)
     return max(1, min(BLOCK_SAMPLES, BLOCK_STEPS // grid.every))
@@ -109,7 +109,7 @@ def samples_at_a_time(grid: Grid, *, alone: bool) -> int:
 def _advance(
     lanes: Lanes, prescribed: bool, alone: bool, at: Array, every: int, out: Array
 ) -> None:
-    """Over the step grid `at` (steps + 1,), filling `out` (8, samples, lanes)."""
+    """Advance over the step grid `at` (steps + 1,); fills `out` (8, samples, lanes)."""
     signals = lanes.signals(at)
     if prescribed:
         drive = drive_one if alone else drive_block

@@ -1,12 +1,12 @@
 """Sliding torque of a dry friction model, and its call from the engine.
 
-It is plain Python of a few lines, for one interface of one trial, compiled as a step function is
-(`campaign.physics.step_function`), and has the same to call and to avoid::
+It is a short function in plain Python for one interface of one trial. Compilation and restrictions
+are those of a step function (`campaign.physics.step_function`)::
 
     sliding(parameters, direction, speed) -> float
 
-parameters: the model's numbers.   direction: 1.0 or -1.0.   speed: rad/s of the interface, in that
-direction, 0 or more. It returns a torque against the motion (N m, 0 or more), without the viscous
+parameters: of the model.   direction: 1.0 or -1.0.   speed: rad/s of the interface in that
+direction, 0 or more. It returns the torque against the motion (N m, 0 or more), without the viscous
 part.
 """
 
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 def address_of_sliding(sliding: Callable[..., Any], lanes: int, parameters: int) -> int:
-    """Address of the function compiled for so many lanes and parameters; it stays valid."""
+    """Address of the compiled function for these numbers of lanes, parameters; it stays valid."""
     with _COMPILING:
         return int(_compiled_once(sliding, lanes, parameters).address)
 
@@ -40,7 +40,7 @@ def address_of_sliding(sliding: Callable[..., Any], lanes: int, parameters: int)
 def single_sliding(
     sliding: Callable[..., Any], parameters: Array, direction: float, speed: float
 ) -> float:
-    """The torque of one interface, through the code that the engine runs."""
+    """Torque of one interface, with the engine's compiled code."""
     fixed = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0, *parameters])
     wave, asked, answer = np.ones(1), np.array([direction, speed]), np.zeros(1)
     address = address_of_sliding(sliding, 1, len(parameters))
@@ -66,7 +66,7 @@ def _known_to_numba(sliding: Callable[..., Any]) -> None:
 
 
 def _by_lanes(sliding: Any, lanes: int, parameters: int) -> Callable[..., None]:
-    """Add the torque at the load, for so many lanes; arrays as in `step_function`."""
+    """Function that adds the torque at the load for `lanes` lanes; arrays as in `step_function`."""
     own_end = HAS + parameters
 
     def by_lanes(fixed: Any, wave: Any, asked: Any, answer: Any) -> None:

@@ -15,21 +15,21 @@ from campaign.physics.true_values import true_value
 
 LEVEL = 0.95
 SMALL = 1e-3
-"""Share of a value by which it is moved, to see whether a number depends on it."""
+"""Relative change of a value for the test whether a number depends on it."""
 
 
 def stated_value(
     bench: Bench, quantity: str, conditions: Mapping[str, Any], unit: str
 ) -> Estimate | None:
-    """The number (SI) that the bench's own values come to, with the interval that they give it.
+    """Number (SI) that results from the bench's stated values, with its interval.
 
-    To first order in the stated standard uncertainties, with the stated correlations (GUM 5.1.2,
-    5.2.2); *measured* where all that it comes from was, else *given*. None where the bench has no
-    such number, or where one of the values of friction that it comes from has no stated
-    uncertainty: the interval would leave that out.
+    First order in the stated standard uncertainties, with the stated correlations (GUM 5.1.2,
+    5.2.2). Its origin is *measured* if all values were measured, else *given*. None if the bench
+    has no such number, or if a friction or known value that it depends on has no uncertainty: the
+    interval would not include it.
 
     Args:
-        quantity, conditions: as of a finding (`true_value`).
+        quantity, conditions: of a finding (`true_value`).
         unit: of the finding.
     """
     value = true_value(bench, quantity, conditions)
@@ -38,11 +38,11 @@ def stated_value(
     effects: dict[str, float] = {}
     origins = set()
     for path in dict.fromkeys((*_of_friction(bench), *bench.known.values)):
-        found = number_at(bench, path)
-        if found is None:
+        number = number_at(bench, path)
+        if number is None:
             continue
         sigma = bench.known_uncertainty(path)
-        moved = _moved(bench, path.split("."), found[0] + (sigma or SMALL * (found[0] or 1.0)))
+        moved = _moved(bench, path.split("."), number[0] + (sigma or SMALL * (number[0] or 1.0)))
         other = true_value(moved, quantity, conditions)
         if other == value:
             continue
@@ -75,7 +75,7 @@ def _variance(effects: Mapping[str, float], bench: Bench) -> float:
 
 
 def _of_friction(bench: Bench) -> Iterator[str]:
-    """Paths of all that could be a number of its friction."""
+    """Paths of all options of the bench's friction."""
     for name, options in bench.friction.items():
         for field in type(options).model_fields:
             if isinstance(getattr(options, field), BaseModel):
@@ -86,7 +86,7 @@ def _of_friction(bench: Bench) -> Iterator[str]:
 
 
 def _moved(tree: Any, keys: list[str], value: float) -> Any:
-    """The same bench with another number at a path."""
+    """A copy of the bench with another value at a path."""
     if not keys:
         return value
     key, *rest = keys

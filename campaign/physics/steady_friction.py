@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 def steady_friction(bench: Bench, rate: Array) -> tuple[Array, Array]:
     """Torque at the load (N m) at constant relative `rate` (rad/s): dry part, viscous part; (n,).
 
-    The dry part carries the sign of the rate: it is s(v) sgn(v) of Equation 4.6. It is the friction
-    of the bench's day and preload, at the mean of its ripple over position.
+    The dry part has the sign of the rate: s(v) sgn(v) of Equation 4.6. Friction is that of the
+    bench's day and preload, at the mean of the ripple over position.
     """
     from campaign.physics.friction import friction_models
     from campaign.physics.variation import of_its_day

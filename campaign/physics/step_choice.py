@@ -1,57 +1,56 @@
 """The integration step of a trial from its bench and task.
 
-Everything linear is exact at any step (`campaign.physics.loop.discretise`). What a step must
-resolve is friction with bristles, and what it excites. At the load, with sums over the interfaces
-that have bristles, and J without the appendage:
+The linear part is exact at any step (`campaign.physics.loop.discretise`). A step must resolve
+friction with bristles, and the motion that it excites. At the load, with sums over the interfaces
+with bristles, and J without the appendage:
 
-    tau_c = J / sum of sigma1        the bristles' damping. The engine predicts the rate at the end
-                                     of a step with the torques held, which is stable only while
-                                     h sum(sigma1) / J is well below 1.
+    tau_c = J / sum of sigma1        damping of the bristles. The engine predicts the rate at the
+                                     end of a step with constant torques, which is stable only
+                                     while h sum(sigma1) / J is well below 1.
     tau_k = sqrt(J / sum of sigma0)  the load on its bristles, as on a spring.
-    tau_r = sqrt(z / a)              how long a reversal takes to bend the bristles over. z is
+    tau_r = sqrt(z / a)              time in which a reversal bends the bristles over. z is
                                      sum of s / sum of sigma0, s the least torque of steady sliding;
                                      a the amplitude of the base's acceleration plus that of a rate
-                                     command. Behind a low-pass of time T a friction model that
-                                     compensates meets a hull under way at v0 with v0 / T more.
-    tau_p = 1 / max |p|              the fastest pole p of what is continuous, stuck on bristles:
+                                     command. With a friction model as compensation behind a
+                                     low-pass of time T, an initial hull rate v0 adds v0 / T to a.
+    tau_p = 1 / max |p|              the fastest pole p of the continuous part, stuck on bristles:
                                      the loop with controller and compensation, or only the load.
-    tau_l                            the same of the load alone on its bristles.
+    tau_l                            the same for the load alone on its bristles.
     tau_o                            ringing over the whole trial, see `_ringing`.
 
-What is wrong after one reversal is of second order both in h / tau_r, as the bristles bend, and in
-h / tau_p, as the loop answers: their geometric mean counts, which no derivation gives, but which
+The error after one reversal is of second order in h / tau_r (bending of the bristles) and in
+h / tau_p (response of the loop). The limit uses their geometric mean. It has no derivation, but
 fits the benches below better than either. Each limit is a constant times a time; the least decides:
 
     DAMPING tau_c                 always
-    REVERSAL sqrt(tau_p tau_r)    where base or command reverse the rate
-    HELD tau_l                    where the hull is under way when the trial begins, and then shakes
-                                  the load with less than a tenth of its friction: nothing that
-                                  follows is as large as what the start leaves
-    RESTING tau_k                 under a commanded torque, or pulled through a spring
+    REVERSAL sqrt(tau_p tau_r)    if base or command reverse the rate
+    HELD tau_l                    if the hull moves at the start of the trial, and later excites
+                                  the load with less than a tenth of its friction: the initial
+                                  transient is then the largest motion
+    RESTING tau_k                 with a commanded torque, or a spring
     RINGING tau_o                 always
-    JUMPS tau_p                   where the friction or its compensation jumps, and the loop answers
-    FED tau_p                     where both do: what is left is the difference of two jumps
-    DRY                           where friction is dry
-    OWN times `fastest`           of each model that states a time of its own
+    JUMPS tau_p                   if the friction or its compensation jumps, and the loop responds
+    FED tau_p                     if both jump: the difference of two jumps remains
+    DRY                           if friction is dry
+    OWN times `fastest`           for each model that states its own time
 
-JUMPS, FED and DRY are for dry friction, bristles or not: what compensates it passes its jumps on to
-the fast poles, which a step meets by their mean and first moment alone. Against the event-switched
-reference (benchmarks/dry_friction.py) the largest error of a channel of the thesis' loop is then
-2.7e-4; at 1 ms it was 1.5e-3, and 2.7e-3 behind the observer. Against the engine itself at 1/128
-ms, over nine curves in modes rate and torque and over five static compensations, exact and not,
-each of 1 to 2 s, no channel is off by 1e-3. Not so the friction torque where it jumps once in a
-second, which a single sample may show on the wrong side (2.9e-3); nor curves that rise infinitely
-steep from rest: 4.6e-3 with a Stribeck exponent of 0.2.
+JUMPS, FED and DRY apply to dry friction, with or without bristles: its compensation passes its
+jumps to the fast poles, and a step represents them by mean and first moment only. Against the
+event-switched reference (benchmarks/dry_friction.py) the largest error of a channel of the thesis'
+loop is 2.7e-4; at 1 ms it was 1.5e-3, and 2.7e-3 behind the observer. Against the engine itself at
+1/128 ms no channel is off by 1e-3 (nine curves in modes rate and torque, five static compensations,
+exact and not, 1 to 2 s each). Exceptions: a friction torque that jumps once in a second, which a
+single sample may show on the wrong side (2.9e-3); curves with infinite slope at rest, 4.6e-3 with a
+Stribeck exponent of 0.2.
 
 Evidence for the others: random benches (tests/physics/random_benches.py) with continuous control,
-in modes rate and torque, against scipy's LSODA at 1e-10. The error is that of a channel over 5 s,
-relative to its RMS; the largest of all channels counts. Form and constants were chosen with 235
-ordinary and 114 extreme benches in view. Then 140 ordinary and 60 extreme ones that nobody had seen
-were tried: one extreme one is refused, one has a reference that does not agree with itself (its
-rate and what compensates by it, 1e-4 of the friction torque), and the largest error of the others
-is 4.0e-4. `make soak` runs 200 others: two extreme ones are refused, none is off by 1e-3. Mostly
-steps are 4 times shorter than needed. Sampled controllers and springs have no such reference: for
-them this is an extrapolation.
+in modes rate and torque, against scipy's LSODA at 1e-10. The error is the largest of all channels
+over 5 s, relative to the RMS of its channel. Form and constants were tuned on 235 ordinary and 114
+extreme benches, and validated on 140 ordinary and 60 extreme others. Of these, one extreme bench is
+refused. One has an inconsistent reference (its rate and the compensation by that rate, 1e-4 of the
+friction torque). The largest error of the rest is 4.0e-4. `make soak` runs 200 others: two extreme
+ones are refused, none is off by 1e-3. Most steps are 4 times shorter than needed. Sampled
+controllers and springs have no such reference: for them the rule is an extrapolation.
 """
 
 from __future__ import annotations
@@ -84,13 +83,13 @@ JUMPS, FED, OWN = 1.5, 0.09, 0.25
 DRY = LONGEST / 4.0
 """s."""
 BARELY_SHAKEN = 0.1
-"""Of friction: J times the base's acceleration, below which HELD counts."""
+"""Share of friction: HELD applies if J times the base's acceleration is below it."""
 AT_REST = 1e-9
-"""rad/s; a sine that begins at its crest leaves this much by rounding."""
+"""rad/s; rounding error of the initial rate of a sine that begins at its crest."""
 STANDING = 1.0
 """1/s; slower poles are integrators and do not ring."""
 SPEEDS = np.concatenate([side * np.logspace(-7.0, 2.0, 91) for side in (-1.0, 1.0)])
-"""rad/s at the interface, at which the least torque of steady sliding is looked for."""
+"""rad/s at the interface; grid of the search for the least torque of steady sliding."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +97,10 @@ class StepChoice:
     """The step of a trial.
 
     Attributes:
-        step: s, LONGEST / 2^k; the finest there is when the trial is refused.
-        needed: s, what was rounded down to it; LONGEST when no more is needed.
-        because: what decided, in plain words.
-        refused: what is too stiff for the finest step; None when nothing is.
+        step: s, LONGEST / 2^k; the finest step if the trial is refused.
+        needed: s, the value before rounding down; LONGEST without a shorter limit.
+        because: text of the rule that decided.
+        refused: text of the rule that needs a step below the finest; else None.
     """
 
     step: float
@@ -112,7 +111,7 @@ class StepChoice:
 
 @dataclass(frozen=True)
 class _Limit:
-    """The longest step (s) that one of the rules allows."""
+    """Longest step (s) that a rule allows."""
 
     step: float
     because: str
@@ -120,12 +119,12 @@ class _Limit:
 
 @dataclass(frozen=True)
 class _Contact:
-    """One interface with bristles as the load meets it.
+    """An interface with bristles, at the load.
 
     Attributes:
-        place: where the bench says it.
+        place: path in the bench.
         stiffness, damping: N m/rad, N m s/rad.
-        torque: the least of steady sliding (N m).
+        torque: least torque of steady sliding (N m).
     """
 
     place: str
@@ -135,10 +134,10 @@ class _Contact:
 
 
 def longest_step(bench: CompleteBench, task: Task) -> StepChoice:
-    """The longest step of the ladder that a trial is right with.
+    """Longest step LONGEST / 2^k that satisfies all rules for a trial.
 
-    bench: with the friction of the trial, as `variation.as_it_is` gives it. Friction models that do
-    not declare their answer to small motions, and dry ones, have no bristles that count here.
+    bench: with the friction of the trial, from `variation.as_it_is`. Dry friction models, and those
+    without a declared small-signal response, count as models without bristles.
     """
     limits = [] if task.mode == "prescribed" else list(_limits(bench, task))
     least = min(limits, key=lambda limit: limit.step, default=_Limit(LONGEST, ""))
@@ -216,14 +215,14 @@ def _own_times(friction: list[tuple[str, FrictionOptions]]) -> Iterator[_Limit]:
 
 
 def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench) -> list[_Contact]:
-    found = []
+    contacts = []
     for place, options in friction:
         bristles = _bristles(options)
         if bristles is not None:
             model = friction_models()[options.model]  # type: ignore[attr-defined]
             torque, rate = at_load(options, bench)
             sliding = model.steady_state(options, SPEEDS)
-            found.append(
+            contacts.append(
                 _Contact(
                     place,
                     torque * rate * bristles.stiffness,
@@ -231,7 +230,7 @@ def _contacts(friction: list[tuple[str, FrictionOptions]], bench: CompleteBench)
                     torque * float(np.min(np.abs(sliding))),
                 )
             )
-    return found
+    return contacts
 
 
 def _bristles(options: FrictionOptions) -> Presliding | None:
@@ -259,31 +258,31 @@ def stuck_poles(bench: CompleteBench, task: Task, compensator: Compensator) -> P
             stuck = model.small_signal(options).stuck_compensation
         if stuck is not None:
             added = loop.b[:, COMPENSATION] * gain * math.prod(at_load(options, bench))
-            # Behind the low-pass the bristles move by the angle less what it still holds back.
+            # Behind the low-pass, the bristles move by the angle minus the lag of the filter.
             a[:, RELATIVE_ANGLE] += added * stuck.stiffness
             a[:, loop.seen] += added * (stuck.damping - low_pass * stuck.stiffness)
     return np.linalg.eigvals(a).astype(complex)
 
 
 def _load_poles(inertia: float, damping: float, stiffness: float) -> Poles:
-    """Poles (1/s) of the load on its bristles, and on the spring that it is pulled through."""
-    # As `np.roots` has it, without its search for zeros: there are none.
+    """Poles (1/s) of the load on its bristles and on the spring of mode `spring`."""
+    # As in `np.roots`, without its search for zero coefficients.
     return np.linalg.eigvals([[-damping / inertia, -stiffness / inertia], [1.0, 0.0]]).astype(
         complex
     )
 
 
 def _fastest(poles: Poles) -> float:
-    """1/s."""
+    """Largest magnitude of a pole (1/s)."""
     return float(np.max(np.abs(poles)))
 
 
 def _ringing(poles: Poles, duration: float) -> float:
-    """tau_o (s): 1 / tau_o^2 is the largest |p|^3 t sqrt(t / T) of a pole p that rings.
+    """tau_o (s): 1 / tau_o^2 is the largest |p|^3 t sqrt(t / T) of an oscillating pole p.
 
-    A step of h turns a mode wrong by (h |p|)^2 of its angle. That adds up over the time that the
-    mode lasts, t = 1 / (2 max(-Re p, 1 / T)), and is in the record for t of the trial's T, of which
-    an RMS takes the square root.
+    In a step h the phase of a mode has a relative error of (h |p|)^2. It accumulates over the
+    duration of the mode, t = 1 / (2 max(-Re p, 1 / T)). The error is present for t of the trial's
+    T, which contributes sqrt(t / T) to an RMS.
     """
     modes = poles[np.abs(poles) > STANDING]
     if not len(modes):
@@ -294,7 +293,7 @@ def _ringing(poles: Poles, duration: float) -> float:
 
 
 def _amplitude(signal: Signal) -> float:
-    """The most that a signal can be."""
+    """Upper bound of a signal's magnitude."""
     match signal:
         case Sine():
             return abs(signal.amplitude)
@@ -306,7 +305,7 @@ def _amplitude(signal: Signal) -> float:
 
 
 def _steepest(signal: Signal) -> float:
-    """The most that a signal can change by per second; a jump does not count."""
+    """Upper bound of a signal's rate of change per second; jumps do not count."""
     match signal:
         case Sine():
             return 2.0 * math.pi * signal.frequency * abs(signal.amplitude)

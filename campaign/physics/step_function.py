@@ -1,21 +1,21 @@
 """The step function of a friction model, and its call from the engine.
 
-A step function is plain Python of a few lines, for one interface of one trial::
+A step function is a short function in plain Python, for one interface of one trial::
 
     step(parameters, state, motion) -> tuple[float, float]
 
-parameters: the model's numbers, read only.   state: the model's numbers, advanced in place.
-motion: what the interface meets over the step, see `Motion`.
+parameters: parameters of the model, read only.   state: states of the model, advanced in place.
+motion: motion of the interface over the step, see `Motion`.
 It returns the mean torque over the step and its change over the step (N m): the torque enters the
-plant as that straight line. The viscous part is not in it. It must not raise: native code cannot
-pass an exception on, and what is not a number ends the trial as diverged.
+plant as that straight line. It excludes the viscous part. It must not raise, because native code
+cannot propagate an exception. A NaN ends the trial as diverged.
 
 The same function serves one trial and many. numba compiles it to native code with a fixed
-signature, in which its numbers are vectors (`campaign.physics.vector`): of a block's lanes, or, in
-a single trial, of the interfaces that have this model. For that a function has no branches but
-`elementary.where`, and calls nothing but `campaign.physics.elementary`. Any other function works
-and is slower. The engine gets addresses, so one compiled engine serves every model, of this package
-or of another.
+signature, with vectors as numbers (`campaign.physics.vector`): of a block's lanes, or, in a single
+trial, of the interfaces with this model. Such a function has no branches except
+`elementary.where`, and calls only `campaign.physics.elementary`. Any other function works, but
+slower. The engine gets addresses, so one compiled engine serves every model, of this package or of
+another.
 """
 
 from __future__ import annotations
@@ -64,28 +64,27 @@ from campaign.physics.vector import add_up, rows_at
 Array = NDArray[np.float64]
 
 ROOM_TEMPERATURE = 293.15
-"""K; no bench tells another one yet."""
+"""K; no bench states another temperature yet."""
 AN_INSTANT = 1e-15
-"""s; over it nothing moves, and differences are still numbers."""
+"""s; without motion over this time, differences are still finite."""
 
 
 class Motion(NamedTuple):
-    """What one interface meets over a step, in its own units: the motor's, for a motor-side one.
+    """Motion of an interface over a step, in its own units: the motor's at the motor side.
 
     Attributes:
-        rate_start: relative rate when the step begins (rad/s).
-        rate_end: the rate expected when it ends if all torques stay as they are.
-        rate_mean: its mean over the step, expected likewise; a straight line would have the mean
-            of both ends.
-        applied: mean torque of all else on the interface over the step (N m): what friction would
-            have to hold to keep the rate; 0 where there is no compliance.
-        position: relative angle (rad) in the middle of the step, of the load.
+        rate_start: relative rate at the start of the step (rad/s).
+        rate_end: predicted rate at its end with constant torques.
+        rate_mean: predicted mean over the step; a straight line would have the mean of both ends.
+        applied: mean torque of all other sources on the interface over the step (N m): the friction
+            that would keep the rate constant; 0 without compliance.
+        position: relative angle (rad) of the load in the middle of the step.
         temperature: K.
         normal_load: of the interface, relative to the nominal one.
         step: s.
         per_step: its reciprocal.
-        compliance: how much the rate at the end falls per N m of mean torque (rad/s per N m); 0
-            where the rate does not answer within the step, as in compensation.
+        compliance: decrease of the rate at the end per N m of mean torque (rad/s per N m); 0 if the
+            rate does not respond within the step, as in compensation.
     """
 
     rate_start: float
@@ -111,7 +110,7 @@ class Motion(NamedTuple):
         normal_load: float = 1.0,
         compliance: float = 0.0,
     ) -> Motion:
-        """A motion of which little is to be said, for tests of a model."""
+        """A motion with default values, for tests of a model."""
         return Motion(
             rate_start, rate_end, 0.5 * (rate_start + rate_end), applied, position, temperature,
             normal_load, step, 1.0 / step, compliance,
@@ -125,16 +124,16 @@ SIGNATURE = types.void(_DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 def address_of(
     step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
 ) -> int:
-    """Address of the step function as `compiled_step` compiles it; it stays valid."""
+    """Address of the step function compiled by `compiled_step`; it stays valid."""
     return int(compiled_step(step, lanes, members, parameters, states).address)
 
 
 def compiled_step(
     step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
 ) -> Any:
-    """The step function compiled for so many lanes, interfaces, parameters and states.
+    """Compile the step function for these numbers of lanes, interfaces, parameters and states.
 
-    It is kept for the process. `step` may be compiled already: then it is what it was compiled of.
+    The result is cached in the process. A compiled `step` is replaced by its Python function.
     """
     with _COMPILING:
         sizes = lanes, members, parameters, states
@@ -149,7 +148,7 @@ def _compiled_once(
     step: Callable[..., Any], lanes: int, members: int, parameters: int, states: int
 ) -> Any:
     _known_to_numba(step)
-    # What goes into a vector: the lanes of a block, or the interfaces of a single trial.
+    # A vector contains the lanes of a block, or the interfaces of a single trial.
     width = lanes if lanes > 1 else members
     try:
         by_vectors = _by_vectors(step, lanes, members, width, parameters, states)
@@ -157,14 +156,14 @@ def _compiled_once(
     except NumbaError:
         if width == 1:
             raise
-    # There is something in it that a vector cannot do.
+    # The function contains an operation without a vector form.
     by_numbers = _by_vectors(step, lanes, members, 1, parameters, states)
     return compiled_callback(SIGNATURE, by_numbers, step.__module__)
 
 
 @cache
 def _known_to_numba(step: Callable[..., Any]) -> None:
-    """Compiled code may call it from now on; pasted into its caller, so that lanes go together."""
+    """Let compiled code call `step`, inlined into its caller, so that it becomes SIMD code."""
     overload(step, jit_options={"error_model": "numpy"}, inline="always", strict=False)(
         lambda parameters, state, motion: step
     )
@@ -173,9 +172,9 @@ def _known_to_numba(step: Callable[..., Any]) -> None:
 def single_step(
     step: Callable[..., Any], parameters: Array, state: Array, motion: Motion
 ) -> tuple[float, float]:
-    """One step of one interface, through the code that the engine runs: for tests of a model.
+    """One step of one interface with the engine's compiled code, for tests of a model.
 
-    parameters (p,) and state (s,) as the step function gets them; the state is advanced in place.
+    parameters (p,) and state (s,): arguments of the step function; the state is advanced in place.
     Returns mean torque and its change (N m).
     """
     fixed = np.array([1.0, 1.0, 1.0, 1.0, motion.temperature, motion.normal_load, *parameters])
@@ -195,14 +194,14 @@ def single_step(
 def _by_vectors(
     step: Any, lanes: int, members: int, width: int, parameters: int, states: int
 ) -> Callable[..., None]:
-    """The step function for so many lanes of so many alike interfaces, in vectors of `width`.
+    """The step function for `lanes` lanes of `members` equal interfaces, in vectors of `width`.
 
-    What belongs to an interface stands in arrays (rows, members, lanes), what they meet and answer
-    together in arrays (rows, lanes); `rows` names the rows.
+    Values of an interface are in arrays (rows, members, lanes), common values in arrays
+    (rows, lanes); module `rows` names the rows.
     """
     own_end, state_end = HAS + parameters, KEEPS + states
     vectors = members * lanes // width
-    shared_width = min(width, lanes)  # for a single trial, a number that all members meet
+    shared_width = min(width, lanes)  # in a single trial, one number for all members
     shared = lanes // shared_width
 
     def by_vectors(fixed: Any, kept: Any, met: Any, answer: Any) -> None:
@@ -218,9 +217,9 @@ def _by_vectors(
 
 
 def own_name(function: Any, *sizes: int) -> str:
-    """A name for what is compiled of a model's function: it has a file of its own by it.
+    """Unique name of a compiled function of a model, and thus of its own cache file.
 
-    Processes that add to one file of numba's cache at a time can exchange what is in it.
+    Processes that write one file of numba's cache at the same time can swap its contents.
     """
     name = ".".join((function.__module__, function.__qualname__, *map(str, sizes)))
     return re.sub(r"\W", "_", name)
@@ -228,9 +227,9 @@ def own_name(function: Any, *sizes: int) -> str:
 
 @pasted
 def _motion(own: int, common: int, has: Any, keeps: Any, meets: Any) -> Motion:
-    """What interfaces meet, in their own units.
+    """Motion of interfaces in their own units.
 
-    own: their place in the arrays of interfaces.   common: in the arrays that all share.
+    own: index in the arrays of interfaces.   common: index in the common arrays.
     """
     rate, ripple = has[HAS_RATE, own], meets[MEETS_RIPPLE, common]
     compliance = meets[MEETS_COMPLIANCE, common]
@@ -256,7 +255,7 @@ def _take(
     """Add the lines of interfaces to the answer, at the load."""
     torque = has[HAS_TORQUE, own] * meets[MEETS_RIPPLE, common]
     own_mean, own_change = mean * torque, change * torque
-    # A model without a state takes what the rate leaves it, and the next one does without.
+    # A model without a state takes its torque from the applied one; the next model gets the rest.
     held = has[HAS_STATE, own] * (own_mean + 0.5 * own_change)
     taken = (1.0 - has[HAS_STATE, own]) * own_mean
     meets[MEETS_PUSH, common] = add_up(meets[MEETS_PUSH, common], -taken)
@@ -268,7 +267,7 @@ def _take(
 
 @intrinsic
 def call_step(typingctx: Any, address: Any, fixed: Any, kept: Any, met: Any, answer: Any) -> Any:
-    """Call a step function by address; the rest are addresses of doubles."""
+    """Call a step function by address; the other arguments are addresses of doubles."""
     from llvmlite import ir
 
     signature = types.void(*[types.uintp] * 5)

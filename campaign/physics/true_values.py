@@ -1,8 +1,8 @@
 """True values of a simulated bench for findings.
 
-Torques are those at the load, summed over the interfaces, at the mean of their ripple over
-position, and with the preload and the scatter that the bench given has: `variation.of_its_day`,
-`variation.as_it_is` make one of that day, of one trial.
+Torques are at the load, summed over the interfaces, at the mean of the ripple over position. They
+include the preload and scatter of the given bench: `variation.of_its_day` and `variation.as_it_is`
+return the bench of a day and of one trial.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from campaign.physics.loop import at_load, viscous_at_load
 
 DIRECTIONS = {"positive": +1.0, "negative": -1.0}
 COULOMB = ("viscous_friction", "negative")
-"""What every model of sliding friction has besides a Coulomb torque."""
+"""Options that every model of sliding friction has besides a Coulomb torque."""
 SAME = 1e-9
 """Relative difference up to which two interfaces have the same Stribeck velocity."""
 
 
 def true_value(bench: Bench, quantity: str, conditions: Mapping[str, Any]) -> float | None:
-    """The true value (SI) of what a finding is about; None where it is no parameter of the bench.
+    """True value (SI) for a finding; None if its quantity is no parameter of the bench.
 
     Args:
-        quantity: as findings call it, e.g. `coulomb_torque`, `bristle_stiffness`.
+        quantity: quantity of the finding, e.g. `coulomb_torque`, `bristle_stiffness`.
         conditions: of the finding; `direction` is `positive`, `negative` or `nominal` (the mean of
-            both), `exponent` says `2` where the Stribeck exponent was held there.
+            both), `exponent` is `2` if the fit fixed the Stribeck exponent at 2.
     """
     if conditions.get("component") is not None or conditions.get("statistic") not in (None, "mean"):
-        return None  # of a part of the bench, or of the scatter of a number
+        return None  # a part of the bench, or the scatter of a number
     if quantity in _OF_ALL:
         return _OF_ALL[quantity](bench)
     if quantity not in _SLIDING:
@@ -40,8 +40,8 @@ def true_value(bench: Bench, quantity: str, conditions: Mapping[str, Any]) -> fl
     direction = str(conditions.get("direction", "nominal"))
     if direction == "nominal":
         both = [_sliding(bench, quantity, sign, conditions) for sign in DIRECTIONS.values()]
-        found = [value for value in both if value is not None]
-        return math.fsum(found) / 2.0 if len(found) == 2 else None
+        values = [value for value in both if value is not None]
+        return math.fsum(values) / 2.0 if len(values) == 2 else None
     if direction not in DIRECTIONS:
         return None
     return _sliding(bench, quantity, DIRECTIONS[direction], conditions)
@@ -50,14 +50,14 @@ def true_value(bench: Bench, quantity: str, conditions: Mapping[str, Any]) -> fl
 def _sliding(
     bench: Bench, quantity: str, sign: float, conditions: Mapping[str, Any]
 ) -> float | None:
-    """A parameter of the Stribeck curve of the whole bench, where it has such a curve."""
+    """Parameter of the Stribeck curve of the whole bench; None without such a curve."""
     values = stribeck_parameters(bench, sign)
     value = values.get(quantity)
     held = str(conditions.get("exponent", "free")) != "free"
     if not held or quantity == "stribeck_exponent":
         return None if held else value
     exponent = values.get("stribeck_exponent", math.nan)
-    # With a wrong exponent the other parameters are those of the best wrong curve, not the bench's.
+    # A fit with a wrong exponent estimates the parameters of another curve, not of the bench.
     return value if math.isclose(exponent, float(conditions["exponent"]), rel_tol=SAME) else None
 
 
@@ -73,9 +73,9 @@ _SLIDING = (
 def stribeck_parameters(bench: Bench, sign: float) -> dict[str, float]:
     """Tc, Ts (N m), sigma2 (N m s/rad), vs (rad/s) and delta of the whole bench in a direction.
 
-    Torques of interfaces add up. Stribeck velocity and exponent are those that all interfaces with
-    a Stribeck effect share; where they do not, their sum is no Stribeck curve, and both are absent.
-    Empty for a bench with another model of friction, or with none.
+    Torques of the interfaces add up. Stribeck velocity and exponent are absent if the interfaces
+    with a Stribeck effect do not share them: the sum is then no Stribeck curve.
+    Empty for a bench without friction, or with another friction model.
     """
     sums = dict.fromkeys(("coulomb_torque", "static_torque", "viscous_friction"), 0.0)
     shapes: list[tuple[float, float]] = []
@@ -90,7 +90,7 @@ def stribeck_parameters(bench: Bench, sign: float) -> dict[str, float]:
         sums["static_torque"] += torque * own["static_torque"]
         sums["viscous_friction"] += torque * rate * own["viscous_friction"]
         if own["static_torque"] != own["coulomb_torque"]:
-            # NaN, which equals nothing: of another curve than Stribeck's.
+            # NaN for a curve other than Stribeck's: it equals no other value.
             velocity = own.get("stribeck_velocity", math.nan)
             shapes.append((velocity / rate, own.get("stribeck_exponent", math.nan)))
     if not bench.friction:
@@ -105,11 +105,11 @@ def _same(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _bristles(bench: Bench) -> list[tuple[float, float]]:
-    """Static torque (N m) and stiffness (N m/rad) of each interface that has bristles, at the load.
+    """Static torque (N m) and stiffness (N m/rad) of each interface with bristles, at the load.
 
-    Empty where an interface has friction without bristles, and so no stiffness to be found.
+    Empty if an interface has friction without bristles, because it has no stiffness.
     """
-    found = []
+    bristles = []
     for options in bench.friction.values():
         small_signal = friction_models()[options.model].small_signal
         stuck = None if small_signal is None else small_signal(options).stuck
@@ -117,35 +117,35 @@ def _bristles(bench: Bench) -> list[tuple[float, float]]:
         if stuck is None or static is None:
             return []
         torque, rate = at_load(options, bench)
-        found.append((torque * static, torque * rate * stuck.stiffness))
-    return found
+        bristles.append((torque * static, torque * rate * stuck.stiffness))
+    return bristles
 
 
 def _stiffness(bench: Bench) -> float | None:
-    """sigma0 of the interface that carries the largest torque (N m/rad)."""
+    """sigma0 of the interface with the largest torque (N m/rad)."""
     return max(_bristles(bench), default=(0.0, None))[1]
 
 
 def _stiffness_at_rest(bench: Bench) -> float | None:
-    """Slope of torque over angle where every interface sticks: the sum (N m/rad)."""
+    """Slope of torque over angle while all interfaces stick: sum of sigma0 (N m/rad)."""
     bristles = _bristles(bench)
     return math.fsum(stiffness for _, stiffness in bristles) if bristles else None
 
 
 def _damping_at_rest(bench: Bench) -> float | None:
-    """Damping of small motions where every interface sticks: the sum of sigma1 and sigma2.
+    """Damping of small motions while all interfaces stick: sum of sigma1 and sigma2.
 
-    Of a sigma2 that differs by direction its mean counts: half the difference makes |v|, an even
-    function, which dampens nothing.
+    If sigma2 differs by direction, its mean counts: half the difference multiplies |v|, an even
+    function, which does not damp.
     """
-    found = []
+    dampings = []
     for options in bench.friction.values():
         own = getattr(options, "bristle_damping", None)
         if own is None:
             return None
         torque, rate = at_load(options, bench)
-        found.append(torque * rate * own + viscous_at_load(options, bench))
-    return math.fsum(found) if found else None
+        dampings.append(torque * rate * own + viscous_at_load(options, bench))
+    return math.fsum(dampings) if dampings else None
 
 
 _OF_ALL: dict[str, Callable[[Bench], float | None]] = {
@@ -157,19 +157,19 @@ _OF_ALL: dict[str, Callable[[Bench], float | None]] = {
 
 
 def true_of(bench: Bench, quantity: str) -> str:
-    """Which part of a bench with several interfaces a true value is of; "" where it has one."""
+    """Part of a bench that a true value describes; "" with fewer than two interfaces."""
     if len(bench.friction) < 2:
         return ""
     if quantity == "bristle_stiffness":
-        found = dict(zip(bench.friction, _bristles(bench), strict=False))
-        return f"friction.{max(found, key=lambda name: found[name])} alone" if found else ""
+        pairs = dict(zip(bench.friction, _bristles(bench), strict=False))
+        return f"friction.{max(pairs, key=lambda name: pairs[name])} alone" if pairs else ""
     interfaces = f"{len(bench.friction)} interfaces"
     if quantity in ("stiffness_at_rest", "damping_at_rest"):
         return f"the sum of {interfaces}, before any slips"
     if quantity in ("stribeck_velocity", "stribeck_exponent"):
-        return f"each of {interfaces}"  # or there is none
+        return f"each of {interfaces}"  # otherwise no true value exists
     return f"the sum of {interfaces}" if quantity in _SLIDING else "the axis"
 
 
 QUANTITIES = frozenset({*_OF_ALL, *_SLIDING})
-"""Those of which a bench may have a true value."""
+"""Quantities for which a bench can have a true value."""

@@ -1,8 +1,8 @@
-"""The simulated bench where it differs from the stated one.
+"""The truth: a simulated bench that differs from the stated bench.
 
-Whoever plans and analyses a trial knows the stated bench. Its controller, compensation and limits
-are software, and act on the truth as they act on a rig: with the stated inertia, the stated torque
-constant. Axis, appendage, motor, gear, friction, scatter and sensors are the truth's.
+Plan and analysis use the stated bench. Its controller, compensation and limits are software. They
+act on the truth as on a rig: with the stated inertia and torque constant. Axis, appendage, motor,
+gear, friction, scatter and sensors are those of the truth.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from campaign.trial import Tree, canonical_json
 Keys = tuple[str | int, ...]
 
 SOFTWARE = ("controller", "compensation", "limits")
-"""Tables of a bench that are always the stated one's; what a truth has there is not used."""
+"""Tables that always come from the stated bench; those of the truth are not used."""
 PROSE = ("name", "description", "given", "fitted", "known")
-"""What moves nothing."""
+"""Tables without effect on motion."""
 
 
 def plant_of(truth: Bench) -> Tree:
-    """What a truth brings to a simulation, normalised (SI): all but `SOFTWARE`."""
-    # What is known of a bench is said of the stated one, of whose tables some are not here.
+    """The part of a truth that a simulation uses, normalised (SI): all but `SOFTWARE`."""
+    # `known` is about the stated bench; some of its paths are in tables that a plant lacks.
     return truth.model_dump(mode="json", exclude={*SOFTWARE, "known"})
 
 
 def simulated(plant: Tree, stated: Bench) -> CompleteBench:
-    """The bench that is simulated: the plant of a truth under the software of `stated`.
+    """The simulated bench: the plant of a truth with the software of `stated`.
 
-    Raises ValueError when they do not go together.
+    Raises ValueError if they are incompatible.
     """
     software = stated.model_dump(mode="json", include=set(SOFTWARE))
     truth = Bench.model_validate({**plant, **software}, context={"si": True})
@@ -41,34 +41,34 @@ def simulated(plant: Tree, stated: Bench) -> CompleteBench:
             f"the gear ratio of the truth is {truth.gear.ratio:g}, the stated one "
             f"{stated.gear.ratio:g}; teeth are counted: write the same in both"
         )
-    complete(stated)  # its inertia and torque constant are what software reckons with
+    complete(stated)  # the software uses its inertia and torque constant
     return complete(truth)
 
 
 def digest(plant: Tree) -> str:
-    """SHA-256 of a plant: all that a trial says of its truth."""
+    """SHA-256 of a plant; a trial contains no other information on its truth."""
     return hashlib.sha256(canonical_json(plant).encode()).hexdigest()
 
 
 def is_setting(keys: Keys) -> bool:
-    """Whether a value at this path of a bench is turned at the rig itself, so at the truth, too."""
+    """Whether a value at this path is a setting of the rig itself, and thus of the truth too."""
     return keys[0] not in (*SOFTWARE, *PROSE)
 
 
 def settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[Keys, Any]:
-    """What somebody turned at the rig who made the normalised bench `after` of `before`."""
+    """Settings of the rig that differ between the normalised benches `before` and `after`."""
     return {keys: value for keys, value in _differing(before, after) if is_setting(keys)}
 
 
 def value_at(tree: Any, keys: Keys) -> Any:
-    """What stands at a path. Raises LookupError."""
+    """Value at a path. Raises LookupError."""
     for key in keys:
         tree = tree[key]
     return tree
 
 
 def has(plant: Tree, keys: Keys) -> bool:
-    """Whether the plant has something at that path."""
+    """Whether the plant has a value at that path."""
     try:
         value_at(plant, keys)
     except (LookupError, TypeError):
@@ -77,20 +77,20 @@ def has(plant: Tree, keys: Keys) -> bool:
 
 
 def with_settings(plant: Tree, turned: Mapping[Keys, Any]) -> Tree:
-    """The plant with what was turned at the rig, at the same paths and to the same values (SI).
+    """The plant with the rig's settings, at the same paths and with the same values (SI).
 
-    Raises ValueError for a path that it does not have: a sweep over it would change what is
-    believed of the bench, and not the bench.
+    Raises ValueError for a path that the plant lacks: a sweep over it would change the stated bench
+    only.
     """
-    found: Tree = plant
+    changed: Tree = plant
     for keys, value in turned.items():
-        if not has(found, keys):
+        if not has(changed, keys):
             raise ValueError(
                 f"the truth has no '{'.'.join(map(str, keys))}': what is changed there would be "
                 "changed in the stated bench alone"
             )
-        found = _put(found, keys, value)
-    return found
+        changed = _put(changed, keys, value)
+    return changed
 
 
 def _differing(

@@ -1,8 +1,8 @@
 """Actual friction of a bench: drift of the day, scatter of a trial, preload.
 
-A real axis is never quite the axis of yesterday. A bench says how much its friction parameters
-scatter from day to day and from trial to trial; the draw depends on seeds and the day alone, so
-the same trial always meets the same friction.
+Friction of a real axis varies. A bench states the scatter of its friction parameters from day to
+day and from trial to trial. The draws depend only on seeds and the day, so the same trial always
+has the same friction.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from campaign.physics.scatter import TORQUES, Line
 
 _Bench = TypeVar("_Bench", bound=Bench)
 SMALLEST_FACTOR = 0.05
-"""However wide the scatter, some friction is left."""
+"""Lower bound of a factor, so that friction stays positive."""
 _MOST_BENCHES = 64
 _OF_ITS_DAY: dict[int, tuple[Bench, Bench]] = {}
-"""Benches and what they are on their day, by the id of the bench."""
+"""Benches, and the same benches on their day, by the id of the bench."""
 _DAY, _TRIAL = 2, 3
-"""What tells the streams of named draws from each other, and from the first two there were."""
+"""Stream numbers: they separate the named draws of day and trial from each other and older ones."""
 
 
 def as_it_is(bench: _Bench, seed: int) -> _Bench:
@@ -41,8 +41,8 @@ def as_it_is(bench: _Bench, seed: int) -> _Bench:
 
 
 def of_its_day(bench: _Bench) -> _Bench:
-    """`bench` with the friction of its day and its preload: what its trials scatter around."""
-    kept = _OF_ITS_DAY.get(id(bench))  # the bench is kept, and so is its id
+    """`bench` with the friction of its day and its preload, the center of its trials' scatter."""
+    kept = _OF_ITS_DAY.get(id(bench))  # the cache keeps the bench, so its id stays unique
     if kept is None:
         if len(_OF_ITS_DAY) >= _MOST_BENCHES:
             _OF_ITS_DAY.clear()
@@ -61,17 +61,17 @@ def _of_its_day(bench: _Bench) -> _Bench:
 
 
 def preloaded(bench: _Bench) -> _Bench:
-    """`bench` with the friction that its preload makes of the nominal one."""
+    """`bench` with the friction that results from its preload."""
     if bench.gear is None:
         return bench
     friction = with_preload(bench.friction, bench.gear.ratio, bench.gear.preload)
     return bench.model_copy(update={"friction": friction})
 
 
-# Five parameters are drawn together, in this order, and the common draw `torques` is the first
-# number of a trial's stream: an archive must be simulated again to the bit. Every other path has a
-# stream of its own, which its name seeds; a line that is added to or removed from a bench then
-# changes no draw of another, nor does their order.
+# Five parameters have a common stream, in this order, and the common draw `torques` is the first
+# number of a trial's stream: simulations of old archives must be bit-identical. Every other path
+# has its own stream, seeded by its name. So neither an additional or removed line nor the order of
+# lines changes another draw.
 _TOGETHER = (
     "coulomb_torque",
     "static_torque",
@@ -82,7 +82,7 @@ _TOGETHER = (
 
 
 def _draw_of_day(seed: int, day: int, name: str) -> float:
-    """The standard normal number of a day for the line called `name`."""
+    """Standard normal number of a day for the line `name`."""
     if name in _TOGETHER:
         draws = np.random.Generator(np.random.PCG64([seed, day])).standard_normal(len(_TOGETHER))
         return float(draws[_TOGETHER.index(name)])
@@ -90,7 +90,7 @@ def _draw_of_day(seed: int, day: int, name: str) -> float:
 
 
 def _draw_of_trial(seed: int, trial: int, name: str) -> float:
-    """The standard normal number of the trial with the seed `trial`."""
+    """Standard normal number of the trial with the seed `trial` for the line `name`."""
     if name == TORQUES:
         return _draw([seed, trial, 1])
     return _draw([seed, trial, _TRIAL, _number(name)])
@@ -105,7 +105,7 @@ def _number(name: str) -> int:
 
 
 def _scaled(bench: _Bench, draws: Iterable[tuple[Line, float]]) -> _Bench:
-    """`bench` with what each line names times 1 plus its share of its draw, line after line."""
+    """`bench` with the parameters of each line times (1 + relative * draw), line by line."""
     declared = {name: changeable(options) for name, options in bench.friction.items()}
     factors: dict[str, dict[str, list[float]]] = {}
     for line, draw in draws:

@@ -1,11 +1,11 @@
 """Vectors of lanes: one number per trial of a block, as one value in compiled code.
 
-The engine is written as for a single trial. Compiled for a block, its numbers are vectors with a
-lane for each trial, and `a + b` adds lane by lane, in SIMD instructions of whatever width the
-processor has. Sums, products, comparisons and what `campaign.physics.elementary` gives work on
-them; `if` does not, since each lane would have an answer of its own: use `elementary.where`.
+The code of the engine is that for a single trial. Compiled for a block, its numbers are vectors
+with a lane per trial, and `a + b` adds lane by lane, in SIMD instructions of the processor's width.
+Sums, products, comparisons and the functions of `campaign.physics.elementary` accept vectors. `if`
+does not, since each lane can have a different condition: use `elementary.where`.
 
-IEEE 754 rounds a lane as it rounds a number, so both give the same bits.
+IEEE 754 rounds lanes and numbers in the same way, so both give the same bits.
 """
 
 from __future__ import annotations
@@ -22,39 +22,39 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 LANES = 16
-"""Trials of a block: fewer leave the processor's vectors empty, more its first-level cache."""
+"""Trials of a block: fewer do not fill the processor's vectors, more exceed its L1 cache."""
 ROWS = 4
-"""Rows of a single trial that are computed at once; with eight it was a quarter slower."""
+"""Rows of a single trial computed at once; eight were a quarter slower."""
 COLUMNS = 4
-"""Columns of a matrix that are summed at a time."""
+"""Columns of a matrix summed at once."""
 MOST_COLUMNS = 256
-"""Columns that a matrix may have: the numbers of an array on the stack."""
+"""Maximum number of columns of a matrix: the length of an array on the stack."""
 MOST_ROWS = 1 << 16
-"""What the compiler may assume an array at an address to have at most; nothing is as long."""
+"""Length that the compiler assumes for an array at an address; all arrays are shorter."""
 CACHE_LINE = 64
-"""Bytes; a vector that reaches from one into another is read twice."""
+"""Bytes; a vector across two cache lines is read twice."""
 
 
 class Vector(types.Type):  # type: ignore[misc]
-    """The type of a vector: of doubles, of 64-bit integers, or of truth values."""
+    """Type of a vector of doubles, 64-bit integers or truth values."""
 
     def __init__(self, element: Any, lanes: int) -> None:
-        if lanes.bit_count() != 1:  # in memory it would have gaps
+        if lanes.bit_count() != 1:  # it would have gaps in memory
             raise ValueError(f"a vector has a power of two of lanes, not {lanes}")
         self.element, self.lanes = element, lanes
         super().__init__(name=f"Vector({element}, {lanes})")
 
     def holds(self, number: Any) -> bool:
-        """Whether a number has its value in every lane: doubles hold all, integers no doubles."""
+        """Whether lanes can hold a number: doubles hold all numbers, integers no doubles."""
         kinds = {types.float64: types.Number, types.int64: types.Integer}
         return isinstance(number, kinds.get(self.element, types.Boolean))
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """A number has the same value in every lane."""
+        """Convert a number to a vector with the same value in every lane."""
         return Conversion.safe if self.holds(other) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """A variable that is a number here and a vector there is a vector."""
+        """Type of a variable that is a number in one place and a vector in another: a vector."""
         return self if self.holds(other) else None
 
 
@@ -72,7 +72,7 @@ def _in_every_lane(context: Any, builder: Any, number: Any, vector: Any, value: 
 
 
 def splat(builder: Any, value: Any, lanes: int) -> Any:
-    """A vector of `lanes` times the same value."""
+    """A vector with the same value in every lane."""
     undefined = ir.Constant(ir.VectorType(value.type, lanes), ir.Undefined)
     first = builder.insert_element(undefined, value, ir.IntType(32)(0))
     return builder.shuffle_vector(first, undefined, ir.VectorType(ir.IntType(32), lanes)(None))
@@ -84,7 +84,7 @@ def vector_among(args: Any) -> Any:
 
 
 def call_llvm(builder: Any, name: str, *args: Any) -> Any:
-    """The result of one of LLVM's functions of doubles ("fma"), of doubles or vectors of them."""
+    """Call a floating-point intrinsic of LLVM, e.g. "fma", with doubles or vectors of doubles."""
     kind = args[0].type
     suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
     function = ir.FunctionType(kind, [kind] * len(args))
@@ -103,10 +103,10 @@ def _operation(
     *,
     compares: bool = False,
 ) -> None:
-    """Let compiled code use `function` on vectors of `elements`, and on numbers beside them.
+    """Define `function` for vectors of `elements`, and for numbers beside them.
 
-    On others it cannot be compiled, and whoever needs that computes lane by lane: a truth value is
-    a number in Python, which in one bit would be another one.
+    For other vectors it does not compile, and the caller has to compute lane by lane: in Python a
+    truth value is a number, in one bit it would be another number.
     """
 
     @infer_global(function)
@@ -167,17 +167,17 @@ _operation(operator.ne, 2, _comparison("!="), _NUMBERS, compares=True)
 
 
 def numbers(lanes: int) -> Any:
-    """The type of the engine's numbers: a double for one lane, else a vector."""
+    """Type of the engine's numbers: a double for one lane, else a vector."""
     return types.float64 if lanes == 1 else Vector(types.float64, lanes)
 
 
 def _array_of(lanes: int, axes: int) -> Any:
-    """Arrays of them; unaligned, since a vector would be wanted at a multiple of its size."""
+    """Array type of the engine's numbers; unaligned, else vectors need multiples of their size."""
     return types.Array(numbers(lanes), axes, "C", aligned=lanes == 1)
 
 
 def _make_array(context: Any, builder: Any, kind: Any, data: Any, shape: list[Any]) -> Any:
-    """An array at `data` that owns nothing: rows taken of it in a loop count no references."""
+    """An array at `data` that owns no memory: its rows in a loop count no references."""
     array = context.make_array(kind)(context, builder)
     data = builder.bitcast(data, array.data.type)
     size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
@@ -199,7 +199,7 @@ def _make_array(context: Any, builder: Any, kind: Any, data: Any, shape: list[An
 def by_lanes(typingctx: Any, array: Any, lanes: Any) -> Any:
     """An array of doubles (..., lanes) as an array (...) of numbers of the engine.
 
-    `lanes` stands in the code as a number.
+    `lanes` is a literal in the code.
     """
     kind = _array_of(lanes.literal_value, array.ndim - 1)
 
@@ -215,7 +215,7 @@ def by_lanes(typingctx: Any, array: Any, lanes: Any) -> Any:
 def by_rows(typingctx: Any, array: Any, lanes: Any) -> Any:
     """As `by_lanes`, for loops over all rows of an array of doubles (..., rows, lanes).
 
-    For a single trial ROWS rows stand in a vector: their number must be a multiple of it.
+    For a single trial a vector contains ROWS rows; their number must be a multiple of ROWS.
     """
     if lanes.literal_value > 1:
         kind = _array_of(lanes.literal_value, array.ndim - 1)
@@ -234,14 +234,14 @@ def by_rows(typingctx: Any, array: Any, lanes: Any) -> Any:
 
 @intrinsic
 def in_rows(typingctx: Any, numbers: Any) -> Any:
-    """The same memory as `rows_on_the_stack`, as loops over all rows take it: see `by_rows`."""
+    """View of `rows_on_the_stack` for loops over all rows; see `by_rows`."""
     kind = numbers if isinstance(numbers.dtype, Vector) else _array_of(ROWS, 1)
     return _other_view(numbers, kind, (MOST_COLUMNS // ROWS,))
 
 
 @intrinsic
 def in_columns(typingctx: Any, numbers: Any) -> Any:
-    """The same memory as `rows_on_the_stack`, COLUMNS numbers at a time."""
+    """View of `rows_on_the_stack` in groups of COLUMNS numbers."""
     kind = types.Array(numbers.dtype, 2, "C", aligned=numbers.aligned)
     return _other_view(numbers, kind, (MOST_COLUMNS // COLUMNS, COLUMNS))
 
@@ -270,9 +270,9 @@ def number_by_lanes(typingctx: Any, array: Any, lanes: Any) -> Any:
 
 @intrinsic
 def each_lane(typingctx: Any, numbers: Any) -> Any:
-    """The same memory as an array (...) of numbers of the engine, as doubles (..., lanes).
+    """View of an array (...) of numbers of the engine as doubles (..., lanes).
 
-    For what a vector cannot do, such as `if`.
+    For operations without a vector form, such as `if`.
     """
     lanes = getattr(numbers.dtype, "lanes", 1)
     kind = types.Array(types.float64, numbers.ndim + 1, "C")
@@ -288,10 +288,10 @@ def each_lane(typingctx: Any, numbers: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def rows_on_the_stack(typingctx: Any, lanes: Any) -> Any:
-    """An array of MOST_COLUMNS numbers of the engine; gone when the function returns.
+    """An array of MOST_COLUMNS numbers of the engine; valid until the function returns.
 
-    On the stack nothing else lies: loops that write there need not be checked against every array
-    that they read.
+    The stack contains no other array: loops that write to it need no alias checks against the
+    arrays that they read.
     """
     kind = _array_of(lanes.literal_value, 1)
 
@@ -307,7 +307,7 @@ def rows_on_the_stack(typingctx: Any, lanes: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def rows_at(typingctx: Any, pointer: Any, lanes: Any, parts: Any) -> Any:
-    """Rows of `parts` numbers of the engine each, of so many lanes, that begin at an address."""
+    """Rows at an address, each with `parts` numbers of the engine of `lanes` lanes."""
     kind = _array_of(lanes.literal_value, 2)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -320,7 +320,7 @@ def rows_at(typingctx: Any, pointer: Any, lanes: Any, parts: Any) -> Any:
 
 @intrinsic
 def add_up(typingctx: Any, total: Any, number: Any) -> Any:
-    """Give total + number; of a vector that meets a single total, lane after lane."""
+    """Return total + number; adds the lanes of a vector one by one to a scalar total."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         so_far, more = args
@@ -335,7 +335,7 @@ def add_up(typingctx: Any, total: Any, number: Any) -> Any:
 
 @intrinsic
 def row_of(typingctx: Any, array: Any) -> Any:
-    """An array of one axis, as one that owns nothing."""
+    """View of an array of one axis that owns no memory."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         own = context.make_array(signature.args[0])(context, builder, args[0])

@@ -1,4 +1,4 @@
-"""Targets of `campaign export-compensation`: each file here names its own in `TARGETS`."""
+"""Targets of `campaign export-compensation`: each module here lists its own in `TARGETS`."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from campaign.controller_code.compensation import INPUTS, SampledCompensation
 
 Array = NDArray[np.float64]
 BOUND = 1e-8
-"""Share of the largest torque of the vectors by which code may be off that has the exponential
-function of its platform. Most models keep 1e-12; `leuven` has 1e-9 on its vectors, and its own
-torques can change by 1e-2 where an input changes in the last digit.
+"""Tolerance, relative to the largest torque of the vectors, of code that uses the exponential
+function of its platform. Most models keep 1e-12; `leuven` has 1e-9 on its vectors. Its torques
+can change by 1e-2 if an input changes in the last digit.
 """
 
 
 @dataclass(frozen=True)
 class Target:
-    """What `--to NAME` writes.
+    """Format of `--to NAME`.
 
-    write: texts by file name, from a compensation, lines for the head, and test inputs (n, 4).
+    write: returns texts by file name, from a compensation, head lines, and test inputs (n, 4).
     """
 
     name: str
@@ -32,7 +32,7 @@ class Target:
 
 
 def targets() -> dict[str, Target]:
-    """All of them, by name."""
+    """All targets by name."""
     names = sorted(each.name for each in pkgutil.iter_modules(__path__))
     modules = [importlib.import_module(f"{__name__}.{name}") for name in names]
     return {target.name: target for module in modules for target in module.TARGETS}
@@ -44,7 +44,7 @@ def vectors(made: SampledCompensation, inputs: Array) -> Array:
 
 
 def about(made: SampledCompensation, head: Sequence[str]) -> list[str]:
-    """Lines that stand above any code: where it comes from, and how to call it."""
+    """Head lines of any code: its origin, and how to call it."""
     period = float(made.controller.period[0])
     rate, angle, torque = map(made.unit, ("rad/s", "rad", "N m"))
     limit = f"{made.bench.limits.torque!r} {torque}"

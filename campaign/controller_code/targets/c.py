@@ -1,4 +1,4 @@
-"""C99: a struct of state, one function a sample, in doubles with the bits of the engine."""
+"""C99: a state struct and a function per sample; doubles, bit-identical to the engine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from campaign.controller_code.transpile import Program
 from campaign.physics import elementary
 
 SINGLE = 1e-3
-"""Share of the largest torque of the vectors by which single precision may be off."""
+"""Tolerance of single precision, relative to the largest torque of the vectors."""
 PRELUDE = """\
 typedef double real;
 static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
@@ -30,9 +30,9 @@ WHOLE: dict[type, str] = {
 
 
 def syntax(*, single: bool = False) -> Syntax:
-    """C in doubles; or in floats, with functions of the C library."""
+    """Syntax of C in doubles; single: in floats, with functions of the C library."""
     f = "f" if single else ""
-    # Unsigned, as a signed sum may not overflow in C; what is divided is never below 0.
+    # Unsigned: signed overflow is undefined in C. Dividends are never below 0.
     whole = {op: f"((int64_t)((uint64_t){{}} {s} (uint64_t){{}}))" for op, s in WHOLE.items()}
     names = "exp", "expm1", "log", "sin", "cos", "tanh"
     library = {getattr(elementary, name): f"{name}f" for name in names}
@@ -65,7 +65,7 @@ def syntax(*, single: bool = False) -> Syntax:
 
 
 def _literal(value: float, *, suffix: str) -> str:
-    """A number to its last bit."""
+    """Hexadecimal literal, exact to the last bit."""
     if math.isnan(value):
         return "NAN"
     if math.isinf(value):
@@ -81,7 +81,7 @@ def _integer(value: int) -> str:
 
 
 def _comment(line: str) -> str:
-    """Text of a bench file, which may end no comment and begin none."""
+    """A comment line; text of a bench file cannot end it or begin another."""
     return "/* " + " ".join(line.split()).replace("*/", "* /").replace("/*", "/ *") + " */"
 
 
@@ -92,7 +92,7 @@ def _function(
     shown = ", ".join(
         f"{'const ' * (e.rows and not e.written)}{e.kind} {e.name}" for e in arguments
     )
-    own = [f"    {told} {each};" for each, told in declared.items()]
+    own = [f"    {own_kind} {each};" for each, own_kind in declared.items()]
     return "\n".join([f"static {kind} {name}({shown})", "{", *own, *lines, "}", ""])
 
 
@@ -101,7 +101,7 @@ def _struct(name: str, fields: Mapping[str, str]) -> str:
 
 
 def c_code(made: SampledCompensation, head: Sequence[str], *, single: bool = False) -> str:
-    """The whole of `NAME.c`; head: lines that stand above it. single: in floats."""
+    """Text of `NAME.c`; head: its first lines. single: in floats."""
     name, program = made.identifier, Program(syntax(single=single))
     main, rows = sample(program, made), rows_of(made)
     literal = program.syntax.literal
@@ -142,12 +142,12 @@ int {name}_selftest(void)
 
 
 def vectors_code(made: SampledCompensation, inputs: Array, *, single: bool = False) -> str:
-    """A program that ends with 0 where the code gives the torques of `SampledCompensation.torques`.
+    """Test program; exit code 0 if all torques agree with `SampledCompensation.torques`.
 
-    To the bit; in single precision to `SINGLE` of the largest.
+    All bits have to agree; in single precision the tolerance is `SINGLE` of the largest torque.
     """
     name, rows = made.identifier, vectors(made, inputs)
-    told = ",\n".join("    {" + ", ".join(map(float.hex, row)) + "}" for row in rows.tolist())
+    table = ",\n".join("    {" + ", ".join(map(float.hex, row)) + "}" for row in rows.tolist())
     if single:
         most = SINGLE * float(np.max(np.abs(rows[:, 4])))
         promised, begins = f"all agree to {most:.3g} {made.unit('N m')}", ""
@@ -163,7 +163,7 @@ def vectors_code(made: SampledCompensation, inputs: Array, *, single: bool = Fal
 #include "{name}.c"
 
 static const double rows[][{rows.shape[1]}] = {{
-{told}
+{table}
 }};
 
 int main(void)
@@ -195,9 +195,9 @@ def _files(
     made: SampledCompensation, head: Sequence[str], inputs: Array, *, single: bool = False
 ) -> dict[str, str]:
     name = made.identifier
-    told = f"In single precision: to {SINGLE:g} of the largest torque of the test vectors."
+    precision = f"In single precision: to {SINGLE:g} of the largest torque of the test vectors."
     return {
-        f"{name}.c": c_code(made, [*head, told] if single else head, single=single),
+        f"{name}.c": c_code(made, [*head, precision] if single else head, single=single),
         f"{name}_test.c": vectors_code(made, inputs, single=single),
     }
 

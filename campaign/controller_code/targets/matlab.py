@@ -46,7 +46,7 @@ end
 
 
 def syntax() -> Syntax:
-    """MATLAB, with whole numbers as doubles: its integers saturate, and do not mix."""
+    """Syntax of MATLAB. Integers are doubles: its integer types saturate and do not mix."""
     names = {name: name for name in ("exp", "expm1", "sin", "cos", "tanh")}
     names |= {"power": "raised", "log": "logarithm"}
     return Syntax(
@@ -74,14 +74,14 @@ def syntax() -> Syntax:
 
 
 def _literal(value: float) -> str:
-    """A number to its last bit."""
+    """Decimal literal, exact to the last bit."""
     text = repr(value) if math.isfinite(value) else {"inf": "Inf", "nan": "NaN"}[f"{abs(value)}"]
     text = f"-{text}" if value == -math.inf else text
     return f"({text})" if text.startswith("-") else text
 
 
 def _comment(line: str) -> str:
-    """Text of a bench file, which stays in its line."""
+    """A comment line; text of a bench file cannot leave it."""
     return "% " + " ".join(line.split())
 
 
@@ -96,16 +96,16 @@ def _function(
 ) -> str:  # fmt: skip
     to = ", ".join(["result", *(each.name for each in arguments if each.written)])
     head = f"function [{to}] = {name}({', '.join(each.name for each in arguments)})"
-    body = [re.sub(r"\((\d+) \+ 1\)", lambda told: f"({int(told[1]) + 1})", e) for e in lines]
+    body = [re.sub(r"\((\d+) \+ 1\)", lambda match: f"({int(match[1]) + 1})", e) for e in lines]
     return "\n".join([head, *body, "end", ""])
 
 
 def m_code(made: SampledCompensation, head: Sequence[str]) -> str:
-    """The whole of `NAME.m`; head: lines that stand above it."""
+    """Text of `NAME.m`; head: its first lines."""
     name, program = made.identifier, Program(syntax())
     main, rows = sample(program, made), rows_of(made)
     states = [each for each in rows if not each.values]
-    told = [
+    notes = [
         f"This file was not run; its test: {name}_test.m. Code like it is tested with {TESTED},",
         f"to {BOUND:g} of the largest torque; not with MATLAB or Simulink.",
         "reset: true for the state as at power-up, before this sample. The state is persistent:",
@@ -118,7 +118,7 @@ def m_code(made: SampledCompensation, head: Sequence[str]) -> str:
     return "\n".join([
         f"function torque = {name}(reset, {', '.join(INPUTS)})",
         "%#codegen",
-        *map(_comment, [*about(made, head), *told]),
+        *map(_comment, [*about(made, head), *notes]),
         f"    persistent {' '.join(each.name for each in states)}",
         f"    if isempty({states[0].name}) || reset",
         *(f"        {each.name} = zeros(1, {max(1, each.size)});" for each in states),
@@ -129,15 +129,15 @@ def m_code(made: SampledCompensation, head: Sequence[str]) -> str:
 
 
 def script(made: SampledCompensation, inputs: Array) -> str:
-    """A script that ends with an error where a torque is not within `BOUND` of the largest."""
+    """Test script; an error if a torque deviates by more than `BOUND` of the largest."""
     name, rows = made.identifier, vectors(made, inputs)
     most = BOUND * float(np.max(np.abs(rows[:, 4])))
-    told = "\n".join(" ".join(map(_literal, row)) for row in rows.tolist())
+    table = "\n".join(" ".join(map(_literal, row)) for row in rows.tolist())
     unit = made.unit("N m")
     return f"""\
 % Test vectors of {name}.m: {", ".join(INPUTS)}, torque (SI). An error where one is off.
 rows = [
-{told}
+{table}
 ];
 torques = zeros(size(rows, 1), 1);
 for k = 1:size(rows, 1)

@@ -1,4 +1,4 @@
-"""JSON: numbers and test vectors, for whoever writes the code."""
+"""JSON: numbers and test vectors, for users who write the code themselves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from campaign.controller_code.targets import Array, Target, vectors
 
 
 def _files(made: SampledCompensation, head: Sequence[str], inputs: Array) -> dict[str, str]:
-    """The numbers alone, for whoever writes the code."""
+    """The JSON file by its name."""
     its = made.controller
     tree = {
         "about": [*head],

@@ -1,4 +1,4 @@
-"""IEC 61131-3 Structured Text: a function block in LREAL, with functions and types of its own."""
+"""IEC 61131-3 Structured Text: a function block in LREAL with its own functions and types."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ VAR grown : LREAL; END_VAR
     {p}tangens := SEL(x < 0.0, grown, -grown) / (grown + 2.0);
 END_FUNCTION
 """
-"""TANH by EXP."""
+"""Functions that the language lacks; TANH is evaluated by EXP."""
 
 
 def syntax(prefix: str) -> Syntax:
-    """Structured Text; all names of a project are in one scope, so that they have a prefix."""
+    """Syntax of Structured Text. All names of a project share one scope, hence the prefix."""
     own = {elementary.expm1: "expm1", elementary.power: "raised", elementary.tanh: "tangens"}
     names = {"exp": "EXP", "log": "LN", "sin": "SIN", "cos": "COS"}
     return Syntax(
@@ -77,7 +77,7 @@ def syntax(prefix: str) -> Syntax:
         element="{}[{}]",
         assign="{} := {};",
         branch=("IF {} THEN", "ELSE", "END_IF;"),
-        # FOR has its end within, and begins with it where that is below: not as Python.
+        # WHILE, as FOR includes its end, and differs from Python if the end is below the start.
         loop=("{0} := {1};\nWHILE {0} < {2} DO", "    {0} := {0} + 1;\nEND_WHILE;"),
         result="{} := {};\nRETURN;",
         call=_call,
@@ -94,7 +94,7 @@ def syntax(prefix: str) -> Syntax:
 
 
 def _literal(value: float) -> str:
-    """A number to its last bit."""
+    """Decimal literal, exact to the last bit."""
     if not math.isfinite(value):
         raise UsageError(f"{value} has no counterpart in Structured Text")
     mantissa, _, exponent = f"{value!r}".partition("e")
@@ -104,9 +104,9 @@ def _literal(value: float) -> str:
 
 
 def _comment(line: str) -> str:
-    """Text of a bench file, which may end no comment, begin none, and be no pragma."""
-    told = re.sub(r"[*{}$]+", "", " ".join(line.split()))
-    return f"(* {told} *)"
+    """A comment line; text of a bench file cannot end it, begin another, or be a pragma."""
+    text = re.sub(r"[*{}$]+", "", " ".join(line.split()))
+    return f"(* {text} *)"
 
 
 def _call(name: str, to: str, given: Mapping[str, str], written: Sequence[str]) -> str:
@@ -117,7 +117,7 @@ def _function(
     name: str, kind: str, arguments: Sequence[Argument], declared: Mapping[str, str],
     lines: Sequence[str],
 ) -> str:  # fmt: skip
-    parts = {  # what is in and out is not copied
+    parts = {  # VAR_IN_OUT is not copied
         "VAR_INPUT": {e.name: e.kind for e in arguments if not e.rows},
         "VAR_IN_OUT": {e.name: e.kind for e in arguments if e.rows},
         "VAR": declared,
@@ -134,19 +134,19 @@ def _variables(head: str, own: Mapping[str, str]) -> str:
 
 
 def _struct(name: str, fields: Mapping[str, str]) -> str:
-    told = "\n".join(f"        {n} : {kind};" for n, kind in fields.items())
-    return f"TYPE\n    {name} : STRUCT\n{told}\n    END_STRUCT;\nEND_TYPE\n"
+    members = "\n".join(f"        {n} : {kind};" for n, kind in fields.items())
+    return f"TYPE\n    {name} : STRUCT\n{members}\n    END_STRUCT;\nEND_TYPE\n"
 
 
 def st_code(made: SampledCompensation, head: Sequence[str]) -> str:
-    """The whole of `NAME.st`; head: lines that stand above it."""
+    """Text of `NAME.st`; head: its first lines."""
     name = made.identifier
     program = Program(syntax(f"{name}_"))
     main, rows = sample(program, made), rows_of(made)
     kinds = {e.name: a.kind for e, a in zip(rows, main.arguments, strict=False)}
     given = {a.name: n for a, n in zip(main.arguments, [*kinds, *INPUTS], strict=True)}
     zeroed = [f"{e.name}[{k}]" for e in rows if not e.values for k in range(max(1, e.size))]
-    told = [
+    notes = [
         f"This file was not run; its vectors: {name}.csv. Code like it is tested with",
         f"{COMPILER}, to {BOUND:g} of the largest torque;",
         "not with TwinCAT or CODESYS, and not on a controller.",
@@ -154,7 +154,7 @@ def st_code(made: SampledCompensation, head: Sequence[str]) -> str:
         f"memory: {', '.join(MEMORY)}",
     ]
     return "\n".join([
-        *map(_comment, [*about(made, head), *told]),
+        *map(_comment, [*about(made, head), *notes]),
         OWN.format(p=program.syntax.prefix), *program.texts,
         f"FUNCTION_BLOCK {name}",
         _variables("VAR_INPUT", {"reset": "BOOL", **dict.fromkeys(INPUTS, "LREAL")}),
@@ -171,7 +171,7 @@ def _start(rows: Rows) -> str:
 
 
 def csv(made: SampledCompensation, inputs: Array) -> str:
-    """Test vectors: a head, then a sample a line (SI)."""
+    """Test vectors: a header line, then one line per sample (SI)."""
     rows = vectors(made, inputs).tolist()
     return "\n".join([",".join([*INPUTS, "torque"]), *(",".join(map(repr, r)) for r in rows), ""])
 

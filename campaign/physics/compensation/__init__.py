@@ -12,9 +12,9 @@ from campaign.plugins import Kinds
 
 @cache
 def compensation_methods() -> Kinds[CompensationMethod]:
-    """Every compensation method, by name."""
+    """All compensation methods, by name."""
     return Kinds("compensation method", __name__, "COMPENSATION", CompensationMethod, tag="method")
 
 
 CompensationField = Annotated[Any, Choice("method", compensation_methods)]
-"""The options of one compensation method, told by `method`."""
+"""Options of one compensation method, selected by `method`."""

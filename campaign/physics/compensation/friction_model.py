@@ -1,7 +1,7 @@
 """Model-based compensation: friction models at the measured relative rate (section 5.2).
 
 The static and the LuGre compensation of the thesis are this method with `stribeck` or `lugre`
-friction inside; any other friction model makes its own compensation the same way.
+friction; any other friction model gives a compensation in the same way.
 """
 
 from __future__ import annotations

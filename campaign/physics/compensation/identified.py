@@ -1,4 +1,4 @@
-"""Names of identified compensations: NAME-identified, beside NAME."""
+"""Names of identified compensations: NAME-identified beside NAME."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ ENDING = "-identified"
 
 
 def identified_name(stated: str) -> str:
-    """Of a compensation's twin, which holds what was identified in place of what it held."""
+    """Name of the copy of a compensation with identified values."""
     return f"{stated}{ENDING}"
 
 
 def stated_name(name: str) -> str:
-    """Of the compensation that this one is the twin of; "" where it is none's."""
+    """Name of the compensation that this one was copied from; "" if it is no such copy."""
     return name.removesuffix(ENDING) if name.endswith(ENDING) else ""

@@ -1,8 +1,8 @@
 """The interface of a compensation: linear dynamics and friction models.
 
-Every method here, and every combination of them, is built of the same two parts. A linear block
-(an observer, a filter) reads what the controller can measure. Friction models run on the measured
-relative rate. Both add to the torque command, so the engine needs to know no method by name.
+Every method, and every combination of methods, consists of two parts. A linear block (an observer,
+a filter) reads the measurements of the controller. Friction models use the measured relative rate.
+Both add to the torque command, so the engine knows no method by name.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class LinearBlock:
 
 @dataclass(frozen=True)
 class Compensator:
-    """A compensation method made ready for one bench.
+    """A compensation method prepared for one bench.
 
     Attributes:
         linear: its linear dynamics, or None.
-        friction: friction models whose output is added, each with its gain.
+        friction: friction models, each with its gain; their torques add up.
     """
 
     linear: LinearBlock | None = None
@@ -52,9 +52,9 @@ class CompensationMethod:
     """A compensation method.
 
     Attributes:
-        name: what a bench's `method` says.
-        options: its parameters; `method: Literal[name]` is one of them.
-        build: the compensator, from validated options, inertia J (kg m^2) and gear ratio N.
+        name: value of a bench's `method`.
+        options: its parameters, among them `method: Literal[name]`.
+        build: returns the compensator from validated options, inertia J (kg m^2), gear ratio N.
     """
 
     name: str

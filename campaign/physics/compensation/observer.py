@@ -1,6 +1,6 @@
 """Single-state disturbance observer (Equations 5.1 to 5.3, Figure 5.16).
 
-J' dw'/dt = Tm + N K0 (w - w'), and N K0 (w - w') is the estimate of all that disturbs the axis: a
+J' dw'/dt = Tm + N K0 (w - w'), and N K0 (w - w') is the estimate of the total disturbance torque: a
 first-order low-pass of J dw/dt - Tm with corner N K0 / J'. K0 is a motor-side torque per rate, so
 it counts N times at the load (Equation 5.2).
 """

@@ -12,20 +12,20 @@ from campaign.plugins import Kinds
 
 @cache
 def friction_models() -> Kinds[FrictionModel]:
-    """Every friction model, by name."""
+    """All friction models, by name."""
     return Kinds("friction model", __name__, "FRICTION", FrictionModel, tag="model")
 
 
 FrictionField = Annotated[Any, Choice("model", friction_models)]
-"""The options of one friction model, told by `model`."""
+"""Options of one friction model, selected by `model`."""
 
 
 def is_dry(options: Any) -> bool:
-    """Whether a model is a set at rest, which as a plant's friction the engine solves for."""
+    """Whether a model is set-valued at rest; the engine solves for it in the plant."""
     return friction_models()[options.model].dry is not None
 
 
 def jumps(options: Any) -> bool:
-    """Whether its torque, as a compensation, has the sign of the rate."""
+    """Whether its torque as a compensation jumps with the sign of the rate."""
     dry = friction_models()[options.model].dry
     return dry is not None and dry.jumps(options)

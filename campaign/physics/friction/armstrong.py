@@ -2,23 +2,23 @@
 
 B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994) 1083.
 
-    sticks:  T = sigma0 x                   x from where the spring has no torque
+    sticks:  T = sigma0 x                   x from the position without spring torque
     slides:  T = (Tc + D / (1 + (v(t - tau_L) / vs)^2)) sgn(v)
-    D = Da + (Ts - Tc - Da) t2 / (t2 + gamma)               as it breaks away, then constant
+    D = Da + (Ts - Tc - Da) t2 / (t2 + gamma)               at breakaway, then constant
 
-and sigma2 v in both. It breaks away at |T| = Tc + D and sticks when v goes through zero, with the
-torque that it has then. t2 is how long it sticks, Da the Stribeck friction (over Tc) at the end of
-the slide before.
+and sigma2 v in both. It breaks away at |T| = Tc + D, and sticks at zero crossings of v with its
+torque at that time. t2 is the dwell time, Da the Stribeck friction (over Tc) at the end of the
+previous slide.
 
-**Read with care.** The static term of Equation 3.6 is the excess over Tc (here Ts is Tc + Fs,inf);
-Equation 3.7 lacks a bracket; the text below calls the dwell time t2 and the lag tau_d, where the
-equations say t_d and tau_L. The print has no viscous friction at rest; here sigma2 is in both
-regimes, since it is small at a spring's rates and the engine integrates it exactly.
+**Caution.** The static term of Equation 3.6 is the excess over Tc (here Ts is Tc + Fs,inf);
+Equation 3.7 lacks a bracket; the text below calls the dwell time t2 and the lag tau_d, the
+equations t_d and tau_L. The print has no viscous friction at rest; here sigma2 is in both regimes,
+since it is small at a spring's rates and the engine integrates it exactly.
 
-A trial begins rested: D = Ts - Tc. No storage function is known: D grows while nothing moves.
+A trial begins rested: D = Ts - Tc. No storage function is known: D grows without motion.
 
-Scheme: each part of a step of one direction either slides, or sticks up to where it breaks away.
-The rate of a time tau_L ago lies on a straight line between two kept ones. Second order.
+Scheme: each part of a step in one direction either slides, or sticks until breakaway. The rate at
+a time tau_L ago is interpolated between two stored rates. Second order.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ from campaign.units import AngularRate, RotationalDamping, RotationalStiffness, 
 
 CURVE = ("coulomb_torque", "static_torque", "stribeck_velocity", "viscous_friction")
 MOST_LAG = 0.05
-"""s; every step within it is one number of the state."""
+"""s; the state has a rate for each step within the lag."""
 TORQUE, WAY, RECOVERS, DWELL, DELAYED, OWN = 0, 1, 2, 3, 4, 5
-"""The state: torque; direction of sliding, 0 when stuck; the share of Ts - Tc that D lacks, as it
-broke away or began to stick; time stuck; |v| of a lag ago; then |v| as steps end, oldest first."""
+"""The state: torque; direction of sliding, 0 if stuck; missing share of D in Ts - Tc at breakaway
+or at the start of sticking; dwell time; |v| one lag ago; then |v| at step ends, oldest first."""
 
 
 class NegativeDirection(Options):
@@ -99,16 +99,16 @@ class ArmstrongOptions(FrictionOptions):
 
 def _parameters(options: ArmstrongOptions) -> Array:
     values = []
-    for way in (1.0, -1.0):
-        coulomb, static, velocity, _ = (in_direction(options, name, way) for name in CURVE)
+    for sign in (1.0, -1.0):
+        coulomb, static, velocity, _ = (in_direction(options, name, sign) for name in CURVE)
         values += [coulomb, static - coulomb, 1.0 / velocity]
-    viscous = [in_direction(options, "viscous_friction", way) for way in (1.0, -1.0)]
+    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
     own = [options.bristle_stiffness, options.memory_lag, options.dwell_time]
     return np.array([*values, 0.5 * (viscous[0] - viscous[1]), *own])
 
 
 def _state_size(options: ArmstrongOptions, step: float) -> int:
-    """Two rates more than there are whole steps in the lag; one of them is the newest."""
+    """Two rates more than whole steps in the lag; one of them is the newest."""
     return OWN + int(options.memory_lag / step + 1e-9) + 2
 
 
@@ -129,7 +129,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 @pasted
 def _delayed(lag: float, state: Any, motion: Motion) -> Any:
-    """|v| of a lag ago when the step ends; a sampled controller asks for instants, too."""
+    """|v| one lag before the end of the step; unchanged for an instant of a sampled controller."""
     lasts, count = motion.step > 2.0 * AN_INSTANT, state.shape[0] - OWN
     for i in range(count - 1):
         state[OWN + i] = where(lasts, state[OWN + i + 1], state[OWN + i])
@@ -146,19 +146,19 @@ def _slid(
 ) -> Any:
     """Advance over a part of a step; its mean torque (N m).
 
-    older, newer: |v| of a lag ago, when the part begins and when it ends.
+    older, newer: |v| one lag before the start and the end of the part.
     """
     stiffness, recovery, direction = parameters[7], parameters[9], sign_of(moved)
     torque, way, lacks, lasts = state[TORQUE], state[WAY], state[RECOVERS], time > 0.0
     slides = way * direction > 0.0
     stops = (way != 0.0) & (way * direction <= 0.0)
-    # Stuck from here on: what is left of D as the slide ends, and a new dwell.
+    # Stuck from now on: the rest of D at the end of the slide, and a new dwell time.
     _, _, per = _curve(parameters, way)
     lacks = where(stops, 1.0 - (1.0 - lacks) * _fallen(older * per), lacks)
     rested = where(stops, 0.0, state[DWELL])
     coulomb, excess, per = _curve(parameters, direction)
     pulled, w = stiffness * abs(moved), direction * torque
-    # It breaks away where the spring reaches a level that grows meanwhile.
+    # It breaks away if the spring reaches a level that grows with the dwell time.
     dwell = rested + time
     level = coulomb + excess * (1.0 - lacks * recovery / (recovery + dwell))
     breaks = (w + pulled > level) & (direction != 0.0)
@@ -167,7 +167,7 @@ def _slid(
     recovered = where(slides, lacks, lacks * recovery / (recovery + dwell))
     excess = excess * (1.0 - recovered)
     level, sliding = coulomb + excess, coulomb + excess * _fallen(newer * per)
-    # The rate of a lag ago may have left zero already: then the torque falls as it breaks away.
+    # If the rate one lag ago is not zero, the torque falls at breakaway.
     fallen = coulomb + excess * _fallen((older + part * (newer - older)) * per)
     free = slides | breaks
     new = where(free, sliding, w + pulled)
@@ -197,13 +197,13 @@ def _fallen(ratio: float) -> float:
 
 
 def steady_state(options: ArmstrongOptions, velocity: Array) -> Array:
-    """Friction torque (N m) at `velocity` (rad/s), shape (n,), of a slide that began rested."""
+    """Friction torque (N m) at `velocity` (rad/s), shape (n,), of a slide after a long rest."""
     torque = np.zeros_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity * sign > 0
+        moving = velocity * sign > 0
         coulomb, static, width, viscous = (in_direction(options, name, sign) for name in CURVE)
-        v = velocity[here]
-        torque[here] = (
+        v = velocity[moving]
+        torque[moving] = (
             sign * (coulomb + (static - coulomb) / (1.0 + (v / width) ** 2)) + viscous * v
         )
     return torque

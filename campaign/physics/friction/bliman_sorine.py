@@ -1,19 +1,19 @@
-"""Bliman-Sorine friction: a fast Dahl model less a slow one (Eq. 3.12 to 3.14).
+"""Bliman-Sorine friction: a fast Dahl model minus a slow one (Eq. 3.12 to 3.14).
 
 P.-A. Bliman and M. Sorine, *Easy-to-use realistic dry friction models for automatic control*, 3rd
 European Control Conference (1995) 3788. The first order is Dahl's model.
 
-**Read with care.** As printed, the fast model settles at Fc and the slow one at Fs - Fc, so that
-the torque of sliding is 2 Fc - Fs. In the source and here the fast one settles at Fs:
+**Caution.** As printed, the fast model settles at Fc and the slow one at Fs - Fc, so the torque of
+sliding is 2 Fc - Fs. In the source and here the fast one settles at Fs:
 
     T = T1 - T2
     dT1/dq = sigma0 (1 - T1 sgn(v) / Ts)      dT2/dq = sigma0' (1 - T2 sgn(v) / (Ts - Tc))
 
-and sliding has Tc. The torque depends on the path alone: its peak after a reversal, which lies
-below Ts, stands over the angle and is no Stribeck effect over the rate.
+and sliding has Tc. The torque depends only on the path: its peak after a reversal, which is below
+Ts, is a function of the angle, and no Stribeck effect over the rate.
 
-Scheme: both parts closed along each part of a step of one direction; the mean torque is the
-trapezoidal one, of second order in the step.
+Scheme: closed form of both models for each part of a step in one direction; the mean torque is
+trapezoidal, of second order in the step.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ from campaign.units import RotationalDamping, RotationalStiffness, Torque
 
 CURVE = ("coulomb_torque", "static_torque", "viscous_friction")
 LEAST_PEAK = 1.01
-"""Ts over Tc, at least, that is looked for in motions."""
+"""Lower bound of Ts over Tc in the identification."""
 LEAST = 1e-12
-"""Of Ts: the slow part's torque has to be more than nothing to be divided by."""
+"""Relative to Ts: lower bound of the slow part's torque, which is a divisor."""
 
 
 class NegativeDirection(Options):
@@ -91,7 +91,7 @@ class BlimanSorineOptions(FrictionOptions):
     """sigma0' of the slow part. Of the second order."""
 
     def without_effect(self) -> frozenset[str]:
-        """Of the slow part, where there is none."""
+        """Options of the slow part for the first order."""
         return frozenset(("static_torque", "slow_stiffness") if self.order == 1 else ())
 
     @model_validator(mode="after")
@@ -100,8 +100,8 @@ class BlimanSorineOptions(FrictionOptions):
             return self
         if self.static_torque is None or self.slow_stiffness is None:
             raise ValueError("order = 2 needs static_torque and slow_stiffness")
-        for way in (1.0, -1.0):
-            fast, slow = _settling(self, way)
+        for sign in (1.0, -1.0):
+            fast, slow = _settling(self, sign)
             if slow <= LEAST * fast:
                 raise ValueError("static_torque must be more than coulomb_torque")
             if self.slow_stiffness * fast >= self.bristle_stiffness * slow:
@@ -122,12 +122,12 @@ def _settling(options: BlimanSorineOptions, way: float) -> tuple[float, float]:
 
 
 def _parameters(options: BlimanSorineOptions) -> Array:
-    (fast, slow), (fast_back, slow_back) = (_settling(options, way) for way in (1.0, -1.0))
-    viscous = [in_direction(options, "viscous_friction", way) for way in (1.0, -1.0)]
+    (fast, slow), (fast_back, slow_back) = (_settling(options, sign) for sign in (1.0, -1.0))
+    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
     half, stiffness = 0.5 * (viscous[0] - viscous[1]), options.bristle_stiffness
     if options.order == 1:
         return np.array([fast, fast_back, half, stiffness, 1.0, 1.0, 0.0])
-    # Scatter may take the slow torque to nothing or below; then that part is left out.
+    # Scatter can reduce the slow torque to zero or below; the bound then disables that part.
     slow, slow_back = max(slow, LEAST * fast), max(slow_back, LEAST * fast_back)
     return np.array([fast, fast_back, half, stiffness, slow, slow_back, options.slow_stiffness])
 
@@ -153,14 +153,14 @@ def _small_signal(options: BlimanSorineOptions) -> SmallSignal:
 
 
 def _stored_energy(options: BlimanSorineOptions, state: Array) -> float:
-    """Dahl's for the first order; of a difference of two such models none is known."""
+    """Energy of Dahl's model for the first order; a difference of two has no known one."""
     if options.order == 2:
         return math.nan
     return float(0.5 * state[0] ** 2 / options.bristle_stiffness)
 
 
 def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
-    """The slow stiffness as a share of the most with which friction has a peak."""
+    """Unknowns, with the slow stiffness relative to the largest for which friction has a peak."""
     peak = static(BENDING, by_direction=by_direction, ratio=(LEAST_PEAK, STATIC[1]), start=1.3)
     ratios = [each.name for each in peak if isinstance(each, FrictionUnknown)]
 

@@ -1,6 +1,6 @@
 """Coulomb and viscous friction: T = Tc sgn(v) + sigma2 v (Eq. 4.6 with Ts = Tc).
 
-What a data sheet or a no-load test tells of a motor. At rest it is a set, |T| <= Tc
+It is the friction of a motor's data sheet or no-load test. At rest it is a set, |T| <= Tc
 (`DryFriction`), which the engine solves for; as a compensation its torque jumps with the sign.
 """
 
@@ -54,9 +54,9 @@ def steady_state(options: Any, velocity: Array) -> Array:
     """Friction torque (N m) of steady sliding at `velocity` (rad/s), shape (n,)."""
     torque = np.zeros_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity * sign > 0
+        moving = velocity * sign > 0
         coulomb, viscous = (in_direction(options, name, sign) for name in CURVE)
-        torque[here] = sign * coulomb + viscous * velocity[here]
+        torque[moving] = sign * coulomb + viscous * velocity[moving]
     return torque
 
 

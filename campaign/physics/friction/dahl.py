@@ -1,12 +1,12 @@
 """Dahl friction: dT/dq = sigma0 |1 - T/Tc sgn(v)|^i sgn(1 - T/Tc sgn(v)) (Eq. 3.8 to 3.11).
 
 P. R. Dahl, *A solid friction model*, Aerospace Corporation TOR-0158(3107-18)-1 (1968). Equation 3.8
-prints i = 1 without the absolute value, which is the same as long as |T| <= Tc. The torque depends
-on the path and the direction alone, whatever the rate.
+prints i = 1 without the absolute value, which is the same while |T| <= Tc. The torque depends only
+on path and direction, not on the rate.
 
-Scheme: with y = 1 - T/Tc sgn(v) and a = sigma0 |q| / Tc, closed along each part of a step of one
-direction: y = y0 exp(-a) at i = 1, else y^(1-i) = y0^(1-i) - (1-i) a, no less than 0. The path is
-exact; the mean torque is the trapezoidal one, of second order in the step.
+Scheme: with y = 1 - T/Tc sgn(v) and a = sigma0 |q| / Tc, a closed form for each part of a step in
+one direction: y = y0 exp(-a) at i = 1, else y^(1-i) = y0^(1-i) - (1-i) a, no less than 0. The path
+is exact; the mean torque is trapezoidal, of second order in the step.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class DahlOptions(FrictionOptions):
 
 
 def _parameters(options: DahlOptions) -> Array:
-    forwards, backwards = (in_direction(options, "coulomb_torque", way) for way in (1.0, -1.0))
-    viscous = [in_direction(options, "viscous_friction", way) for way in (1.0, -1.0)]
+    forwards, backwards = (in_direction(options, "coulomb_torque", sign) for sign in (1.0, -1.0))
+    viscous = [in_direction(options, "viscous_friction", sign) for sign in (1.0, -1.0)]
     half = 0.5 * (viscous[0] - viscous[1])
     return np.array([forwards, backwards, half, options.bristle_stiffness, options.exponent])
 
@@ -79,8 +79,8 @@ def _exponential_step(parameters: Any, state: Any, motion: Motion) -> tuple[floa
 def relaxed(
     torque: float, moved: float, forwards: float, backwards: float, stiffness: float
 ) -> Any:
-    """Torque (N m) after `moved` (rad), from `torque`, with i = 1; it settles at `forwards` (N m),
-    or at -`backwards` when moving back.
+    """Torque (N m) after `moved` (rad), from `torque`, with i = 1; its limit is `forwards` (N m),
+    or -`backwards` in the negative direction.
     """
     settles = where(moved >= 0.0, forwards, backwards)
     way = stiffness * abs(moved) / settles
@@ -93,7 +93,7 @@ def _general(parameters: Any, torque: float, moved: float, i: float) -> Any:
     way, sign = parameters[3] * abs(moved) / settles, sign_of(moved)
     left = 1.0 - sign * torque / settles
     left = where(left > 0.0, left, 0.0)
-    # Below i = 1 and above; the other one's numbers are not used.
+    # For i below 1 and above; the result of the other case is not used.
     below = where(i < 1.0, 1.0 - i, 1.0)
     above = where(i > 1.0, i - 1.0, 1.0)
     remains = power(left, below) - below * way
@@ -136,7 +136,7 @@ FRICTION = FrictionModel(
     changeable=(*CURVE, "bristle_stiffness"),
     added=("viscous_friction",),
     small_signal=_small_signal,
-    # The power lost is T v (1 - y^i), never negative: y < 1 where T has the sign of v, else > 1.
+    # The power loss is T v (1 - y^i), never negative: y < 1 if T has the sign of v, else > 1.
     stored_energy=lambda options, state: float(0.5 * state[0] ** 2 / options.bristle_stiffness),
     step_for=_step_for,
     unknowns=lambda sizes, by_direction: (

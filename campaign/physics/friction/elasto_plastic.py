@@ -1,15 +1,15 @@
-"""Elasto-plastic friction: LuGre's bristles, which only bend up to a deflection z_ba.
+"""Elasto-plastic friction: LuGre's bristles, purely elastic up to a deflection z_ba.
 
     T = sigma0 z + sigma1 dz/dt + sigma2 v    dz/dt = v (1 - alpha(z, v) sigma0 z / s(v) sgn(v))
 
 P. Dupont, V. Hayward, B. Armstrong and F. Altpeter, *Single state elastoplastic friction models*,
 IEEE Trans. Automatic Control 47 (2002) 787 (there with an exponent i, here 1; the thesis has no
-equation of it). alpha is 0 for |z| <= z_ba and where z and v have different signs, 1 beyond z_max =
-s(v) / sigma0, and in between half a sine. So a load that is held by |z| < z_ba does not drift
-however long it is shaken; beyond z_ba it drifts, as LuGre's does from the beginning.
+equation of it). alpha is 0 for |z| <= z_ba and if z and v have different signs, 1 beyond z_max =
+s(v) / sigma0, and half a sine in between. So a load at |z| < z_ba does not drift under vibration;
+beyond z_ba it drifts, as with LuGre at any z.
 
-Scheme: with alpha held, dz/dq is linear and has a closed form; alpha is taken where half of the
-path leads (exponential midpoint rule, second order, stable at any step). Below z_ba it is exact.
+Scheme: with constant alpha, dz/dq is linear and has a closed form; alpha is that after half of the
+path (exponential midpoint rule, second order, stable at any step). Below z_ba it is exact.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class ElastoPlasticOptions(LuGreOptions):
 def _parameters(options: ElastoPlasticOptions) -> Array:
     stiffness = options.bristle_stiffness
     least = min(
-        in_direction(options, name, way)
+        in_direction(options, name, sign)
         for name in ("coulomb_torque", "static_torque")
-        for way in (1.0, -1.0)
+        for sign in (1.0, -1.0)
     )
     elastic, damping_time = options.elastic_share * least, options.bristle_damping / stiffness
     return np.array([*curve_parameters(options), stiffness, damping_time, elastic])
@@ -75,7 +75,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 @pasted
 def _plastic(w: float, s: float, elastic: float) -> float:
-    """alpha, for bristles of w (N m) in the direction of motion."""
+    """alpha, for a bristle torque w (N m) in the direction of motion."""
     span = where(s > elastic, s - elastic, 1.0)
     bend = 0.5 + 0.5 * sin(PI * ((w - 0.5 * (s + elastic)) / span))
     alpha: float = where(w >= s, 1.0, where(w <= elastic, 0.0, bend))
@@ -84,7 +84,7 @@ def _plastic(w: float, s: float, elastic: float) -> float:
 
 @called
 def _bent(parameters: Any, torque: float, moved: float, time: float) -> tuple[float, float, float]:
-    """sigma0 z after a part of a step; dz/dq when it begins and when it ends."""
+    """sigma0 z after a part of a step; dz/dq at its start and at its end."""
     direction = sign_of(moved)
     s = curve_torque(parameters, direction, abs(moved) / where(time > 0.0, time, 1.0))
     way, elastic, w = parameters[9] * abs(moved), parameters[11], direction * torque

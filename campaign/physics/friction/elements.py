@@ -1,8 +1,8 @@
-"""Parallel Maxwell-slip elements: springs that slip at their own torques.
+"""Parallel Maxwell-slip elements: springs, each with its own slip torque.
 
 They are listed as shares, or follow from a number N and a shape p: torques are equal, and element i
-slips after a way in proportion to i^p. All elements together have the stiffness and the torque that
-the model says, so that scatter and preload change those and the shares stay.
+slips after a displacement in proportion to i^p. Their total stiffness and torque are those of the
+model, so scatter and preload change these, and the shares are constant.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from campaign.physics.friction.interface import Array
 
 Share = Annotated[float, Field(gt=0, le=1)]
 EXACT = 1e-6
-"""By how much the sum of shares may differ from 1; then they are scaled."""
+"""Tolerance of the sum of shares, which is then scaled to 1."""
 
 
 class ElementOptions(Options):
@@ -48,7 +48,7 @@ class ElementOptions(Options):
 
 
 def count_of(options: ElementOptions) -> int:
-    """N."""
+    """Number N of elements."""
     return len(options.torque_shares) or options.elements
 
 
@@ -63,7 +63,7 @@ def shares_of(options: ElementOptions) -> tuple[Array, Array]:
 
 
 def virgin_torque(options: Any, torque: float, stiffness: float, way: Array) -> Array:
-    """Torque (N m) after a first `way` (rad, 0 or more), shape (n,), where all slip at `torque`."""
+    """Torque (N m) after a first displacement `way` (rad, >= 0), (n,); all slip at `torque`."""
     torques, stiffnesses = shares_of(options)
     bent = np.minimum(stiffness * np.outer(way, stiffnesses), torque * torques)
     return np.asarray(np.sum(bent, axis=1))

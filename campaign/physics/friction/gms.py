@@ -7,16 +7,17 @@ Trans. Automatic Control 50 (2005) 1883.
     sticks:  dTi/dt = ki v                        until |Ti| > alpha_i |s(v)| in the direction of v
     slips:   dTi/dt = C (alpha_i sgn(v) - Ti / |s(v)|)       until v goes through zero
 
-**Read with care.** Equation 3.25 prints sgn(v) C (alpha_i - Ti / s(v)), which needs the signed s of
+**Caution.** Equation 3.25 prints sgn(v) C (alpha_i - Ti / s(v)), which needs the signed s of
 Equation 3.4; with the unsigned s of Equation 3.18 it diverges while v < 0. Equation 3.24 prints
-Ti > alpha_i s(v), which needs |Ti|; and the alpha sum up to 1, else sliding misses s(v).
+Ti > alpha_i s(v), which needs |Ti|. The alpha have to sum to 1, else sliding deviates from s(v).
 
 With Ts = Tc an element never leaves its level, and these are Maxwell-slip elements: the torque
-follows Masing's rules, and what springs store is all that is stored. With Ts > Tc no storage
-function is known: an attracted element may stretch its spring faster than the motion does.
+follows Masing's rules, and only the springs store energy. With Ts > Tc no storage function is
+known: an attracted element can stretch its spring faster than the motion does.
 
-Scheme: s is a straight line over each part of a step of one direction; then sticking is one, too,
-slipping an exponential, and a slip begins inside the part. Second order, stable for any C.
+Scheme: s is a straight line over each part of a step in one direction. So is the torque of a
+sticking element; slipping is an exponential; a slip can begin inside the part. Second order, stable
+for any C.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ from campaign.physics.step_function import Motion
 from campaign.units import RotationalStiffness, TorqueRate
 
 OWN = 11
-"""Parameters before those of the elements."""
+"""Number of parameters before those of the elements."""
 
 
 class GmsOptions(CurveOptions, ElementOptions):
@@ -76,8 +77,7 @@ def _parameters(options: GmsOptions) -> Array:
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
     """See `campaign.physics.step_function`.
 
-    The state is the torques of the elements (N m), and then for each the direction in which it
-    slips, 0 while it sticks.
+    The state: torques of the elements (N m), followed by their directions of slip, 0 if stuck.
     """
     parts, v0, v1 = parts_of(motion), abs(motion.rate_start), abs(motion.rate_end)
     rest, before = 1.0 - parts.share, 0.0 * v0
@@ -98,8 +98,8 @@ def _slid(
 ) -> tuple[float, float]:
     """Advance all elements over a part of a step; mean torque and torque at its end.
 
-    v0, v1: speeds when it begins and ends (rad/s).   held: the torque when it begins (N m), which
-    stays where nothing moves.
+    v0, v1: speeds at the start and the end (rad/s).   held: torque at the start (N m), which is
+    unchanged without motion.
     """
     moves, direction, count = moved != 0.0, sign_of(moved), state.shape[0] // 2
     starts, ends = curve_torque(parameters, direction, v0), curve_torque(parameters, direction, v1)
@@ -112,7 +112,7 @@ def _slid(
         level, rise = share * starts, share * (ends - starts)
         slipping, trial = slips * direction > 0.0, w + pulled
         free = slipping | (trial > level + rise)
-        # It sticks for a part of this, up to where it meets its level, and then decays towards it.
+        # It sticks for `part` until it reaches its level, and then decays towards it.
         sticks = where(slipping | (w > level), 0.0, level - w)
         closing = pulled - rise
         part = where(closing > sticks, sticks / where(closing > sticks, closing, 1.0), 0.0)
@@ -134,10 +134,10 @@ def _small_signal(options: GmsOptions) -> SmallSignal:
 
 
 def _stored_energy(options: GmsOptions, state: Array) -> float:
-    """Of the springs, where the curve is flat; NaN where it is not."""
-    ways = (1.0, -1.0)
+    """Energy of the springs for a flat curve; else NaN."""
+    signs = (1.0, -1.0)
     names = ("coulomb_torque", "static_torque")
-    coulomb, static = ([in_direction(options, name, way) for way in ways] for name in names)
+    coulomb, static = ([in_direction(options, name, sign) for sign in signs] for name in names)
     if coulomb != static:
         return math.nan
     stiffnesses = options.bristle_stiffness * shares_of(options)[1]
@@ -145,7 +145,7 @@ def _stored_energy(options: GmsOptions, state: Array) -> float:
 
 
 def _unknowns(sizes: Sizes, by_direction: bool) -> Unknowns:
-    """A lag s(v) / C that is between a millionth and a thousand times that of a whole stroke."""
+    """Unknowns, with a lag s(v) / C from 1e-6 to 1e3 times the time of a whole stroke."""
     usual = sizes.torque * sizes.rate / sizes.travel
     attraction = FrictionUnknown(
         "attraction", "attraction", "N m/s", "How fast slipping elements approach the curve.",

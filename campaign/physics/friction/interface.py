@@ -46,7 +46,7 @@ class FrictionOptions(Options):
     @model_validator(mode="wrap")
     @classmethod
     def _of_its_side(cls, tree: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Between a rotary motor and a linear load, each side has units of its own."""
+        """Units by side: a rotary motor with a linear load has different units."""
         sides = current_sides()
         if sides.load is sides.motor or not isinstance(tree, Mapping):
             return handler(tree)
@@ -61,9 +61,9 @@ class FrictionOptions(Options):
         return options
 
     def at_load(self, ratio: float) -> tuple[float, float]:
-        """What one N m of it counts at the load behind a gear `ratio`, and its rate per load rate.
+        """Torque at the load per N m, for a gear `ratio`, and its rate per load rate.
 
-        The rates are relative to the hull.
+        Rates are relative to the hull.
         """
         return (
             ratio if self.side == "motor" else 1.0,
@@ -86,14 +86,14 @@ class Presliding:
 
 @dataclass(frozen=True)
 class SmallSignal:
-    """How a friction model answers small motions: what the margins of a loop are computed from.
+    """Response of a friction model to small motions, for the margins of a loop.
 
-    The viscous part, `FrictionModel.viscous`, comes on top of everything here.
+    It excludes the viscous part, `FrictionModel.viscous`.
 
     Attributes:
         stuck: as the friction of a bench at rest; None: it holds the load rigidly.
-        stuck_compensation: as a compensation at rest, where the rate does not answer within the
-            step; None: its torque jumps with the sign of the rate, which is nothing linear.
+        stuck_compensation: as a compensation at rest, if the rate does not respond within the step;
+            None: its torque jumps with the sign of the rate, which is not linear.
         sliding_damping: slope of the torque over the rate far above the Stribeck velocity
             (N m s/rad at the interface).
     """
@@ -109,22 +109,22 @@ def _always(options: Any) -> bool:
 
 @dataclass(frozen=True)
 class DryFriction:
-    """Friction that is a set at rest: |T| <= `static_torque` when stuck, and `sliding` in motion.
+    """Set-valued friction at rest: |T| <= `static_torque` if stuck, and `sliding` in motion.
 
-    A step function can not say that: it is told the rate, and at rest the torque follows from all
-    that acts. As a plant's friction such models are solved together, by the engine
+    A step function cannot represent this: its input is the rate, and at rest the torque depends on
+    the applied torques. In the plant, the engine solves all such models together
     (`campaign.physics.dry_step`); their step function is for prescribed motion.
 
     Attributes:
-        sliding: torque against the motion (N m, 0 or more, `FrictionModel.viscous` apart), compiled
-            as a step function is: `sliding(parameters, direction, speed)`, direction 1.0 or -1.0,
-            speed in that direction (rad/s of the interface, 0 or more); see
+        sliding: torque against the motion (N m, 0 or more, without `FrictionModel.viscous`),
+            compiled like a step function: `sliding(parameters, direction, speed)`, direction 1.0 or
+            -1.0, speed in that direction (rad/s of the interface, 0 or more); see
             `campaign.physics.sliding_torque`.
-        static_torque: the most (N m) that it holds before it slides in a direction (1.0 or -1.0),
-            from validated options; no less than `sliding` at speed 0.
+        static_torque: largest torque (N m) before it slides in a direction (1.0 or -1.0), from
+            validated options; no less than `sliding` at speed 0.
         jumps: whether a compensation with these options has the sign of the rate, zero at rest; the
-            engine then meets the jump inside its step. Else its step function says what it does, as
-            it does for a sampled controller.
+            engine then solves the jump within its step. Else it uses the step function, as a
+            sampled controller always does.
     """
 
     sliding: Callable[..., float]
@@ -137,36 +137,36 @@ class FrictionModel:
     """A friction model.
 
     Attributes:
-        name: what a bench's `model` says.
+        name: value of a bench's `model`.
         summary: one line for `campaign kinds`.
         options: its parameters; a subclass of FrictionOptions with `model: Literal[name]`.
-        parameters: the flat parameters its step function reads, from validated options.
-        state_size: how many numbers its step function keeps, from validated options and the step
-            (s) that it is asked over: the engine's, or the sample of a sampled controller.
+        parameters: the flat parameters of its step function, from validated options.
+        state_size: number of states of its step function, from validated options and the step (s)
+            of its calls: the engine's, or the sample of a sampled controller.
         step: its step function, plain Python that is compiled when a trial needs it; see
             `campaign.physics.step_function`.
         viscous: the part linear in velocity (N m s/rad), which the engine integrates exactly.
         steady_state: friction torque (N m) at constant velocity (rad/s), shape (n,), viscous
             part included.
-        changeable: the options of its own that scatter and preload may change; None for every
-            option of its own with a physical unit.
-        stored_energy: what its state stores (J at the interface), from validated options and the
-            state (s,) of its step function; NaN where that is not known for these options; None: no
-            storage function of the model is known.
-        step_for: a step function that does for these options and is faster than `step`, one of the
-            module's own (each function is compiled for itself); None: there is none.
-        small_signal: its answer to small motions, from validated options; None: not declared, and
-            the loop of a bench with it is known only while it slides.
-        dry: what it is at rest, of a model without a state; None: its step function says all.
-        fastest: the shortest time (s) that a step must resolve for its torque, from validated
-            options, besides what `small_signal` says; None: none.
-        no_compensation: why it cannot compensate, for a reader; "" where it can.
-        unknowns: the parameters that motions identify, from the friction's sizes, for each
-            direction (True) or both alike. None: it is not identified.
-        added: names of options that the equations of its source do not have.
-        switches: how many functions of rate, state and torque change its equations where they pass
-            zero, from validated options: the events of an integrator with a variable step. None: it
-            is not stated.
+        changeable: its own options that scatter and preload can change; None for all its own
+            options with a physical unit.
+        stored_energy: energy of its state (J at the interface), from validated options and the
+            state (s,) of its step function; NaN if it is unknown for these options; None: the model
+            has no known storage function.
+        step_for: a step function for these options that is faster than `step`; a different function
+            of the module, because each is compiled separately. None: there is none.
+        small_signal: its response to small motions, from validated options; None: not declared, and
+            the loop of a bench with it is known only in sliding.
+        dry: its behavior at rest, for a model without a state; None: the step function is complete.
+        fastest: shortest time (s) that a step must resolve for its torque, from validated options,
+            besides those of `small_signal`; None: none.
+        no_compensation: why it cannot compensate, for the user; "" if it can.
+        unknowns: parameters that motions identify, from the friction's sizes, by direction (True)
+            or common to both. None: it is not identified.
+        added: names of options that the equations of its source lack.
+        switches: number of functions of rate, state and torque whose zero crossings change its
+            equations, from validated options: the events of an integrator with a variable step.
+            None: not stated.
     """
 
     name: str
@@ -189,7 +189,7 @@ class FrictionModel:
     switches: Callable[[Any], int] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a step function of the form that it had before lanes."""
+        """Refuse a step function of the form before lanes."""
         form = list(inspect.signature(self.step).parameters)
         if len(form) != 3 or not callable(self.state_size):
             raise TypeError(
@@ -204,7 +204,7 @@ class FrictionModel:
             )
 
     def may_change(self) -> tuple[str, ...]:
-        """`changeable`, or what stands for it."""
+        """Names of `changeable`, or its default."""
         if self.changeable is not None:
             return self.changeable
         return tuple(
@@ -214,7 +214,7 @@ class FrictionModel:
         )
 
     def torques(self) -> tuple[str, ...]:
-        """Those of `may_change` that are torques: what a preload can raise."""
+        """Those of `may_change` that are torques, which a preload can change."""
         fields = self.options.model_fields
         return tuple(
             name
@@ -224,7 +224,7 @@ class FrictionModel:
 
 
 def _quantity_of(field: FieldInfo) -> Quantity | None:
-    """The quantity of a field that is one number, optional or not."""
+    """Quantity of a field with one number, optional or not."""
     if isinstance(field.annotation, type) and issubclass(field.annotation, float):
         return next((m for m in field.metadata if isinstance(m, Quantity)), None)
     for member in get_args(field.annotation):  # `Torque | None`

@@ -1,22 +1,22 @@
-"""Leuven friction: LuGre's equation over a hysteresis with memory of all turns (Eq. 3.19 to 3.22).
+"""Leuven friction: LuGre's equation over a hysteresis with memory of reversals (Eq. 3.19 to 3.22).
 
     T = Th(z) + sigma1 dz/dt + sigma2 v    dz/dt = v (1 - sgn(r) |r|^d)    r = Th(z) / s(v)
 
 V. Lampaert, J. Swevers and F. Al-Bender, *Modification of the Leuven integrated friction model
 structure*, IEEE Trans. Automatic Control 47 (2002) 683: Th is N parallel Maxwell-slip elements of
-z, so that no stack of turns is kept. It corrects J. Swevers et al., IEEE TAC 45 (2000) 675.
+z, without a stack of reversals. It corrects J. Swevers et al., IEEE TAC 45 (2000) 675.
 
-**Read with care.** s(v) in Equation 3.19 is the signed one of Equation 3.4; with the unsigned one
-of Equation 3.18, z runs away while v < 0 and the hysteresis saturates at the wrong level. And
-sliding is s(v) only if the elements can hold it: the sum of all W is `hysteresis_reserve` times
-the largest s, and a reserve below 1 is refused.
+**Caution.** s(v) in Equation 3.19 is the signed one of Equation 3.4. With the unsigned one of
+Equation 3.18, z diverges while v < 0 and the hysteresis saturates at the wrong level. Friction of
+sliding is s(v) only if the elements can hold it: the sum of all W is `hysteresis_reserve` times the
+largest s; a reserve below 1 is refused.
 
 No storage function is known.
 
-Scheme: over each part of a step of one direction, with s at its mean rate, dz/dq = (1 - r) Q(r)
-with Q = (1 - sgn(r) |r|^d) / (1 - r). Q and the stiffness are taken where half of the path leads,
-and what is then linear is closed: the exponential midpoint rule, second order in the step. It
-never overshoots r = 1, however long the path. N = 1 with d = 1 is LuGre to rounding.
+Scheme: for each part of a step in one direction, with s at its mean rate, dz/dq = (1 - r) Q(r) with
+Q = (1 - sgn(r) |r|^d) / (1 - r). Q and the stiffness are those after half of the path; the linear
+equation then has a closed form: the exponential midpoint rule, second order in the step. It never
+overshoots r = 1, at any length of the path. N = 1 with d = 1 is LuGre to rounding.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ from campaign.physics.friction.stribeck import (
 from campaign.physics.step_function import Motion
 
 OWN = 11
-"""Parameters before those of the elements."""
+"""Number of parameters before those of the elements."""
 NEAR = 1e-6
-"""Of r = 1, where Q is its limit d."""
+"""Distance from r = 1 within which Q is its limit d."""
 
 
 class LeuvenOptions(LuGreOptions, ElementOptions):
@@ -62,9 +62,9 @@ class LeuvenOptions(LuGreOptions, ElementOptions):
 def _parameters(options: LeuvenOptions) -> Array:
     torques, stiffnesses = shares_of(options)
     most = options.hysteresis_reserve * max(
-        in_direction(options, name, way)
+        in_direction(options, name, sign)
         for name in ("coulomb_torque", "static_torque")
-        for way in (1.0, -1.0)
+        for sign in (1.0, -1.0)
     )
     own = [*curve_parameters(options), options.bristle_damping, options.transition_exponent]
     return np.array([*own, *(most * torques), *(options.bristle_stiffness * stiffnesses)])
@@ -91,16 +91,16 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 def _bent(
     parameters: Any, state: Any, moved: float, time: float, held: float
 ) -> tuple[float, float, float, float]:
-    """Advance all elements over a part of a step: how far z moves (rad), the torque when it ends
-    (N m), and dz/dq when it begins and when it ends.
+    """Advance all elements over a part of a step: displacement of z (rad), torque at the end (N m),
+    and dz/dq at the start and at the end.
 
-    held: the torque when it begins (N m).
+    held: torque at the start (N m).
     """
     moves, direction, way = moved != 0.0, sign_of(moved), abs(moved)
     speed = way / where(time > 0.0, time, 1.0)
     s = curve_torque(parameters, direction, speed)
     ratio = direction * held / s
-    # Where s has fallen below the torque, z moves back.
+    # If s is below the torque, z moves back.
     forth = where(ratio > 1.0, -direction, direction)
     count, stiffness = state.shape[0], 0.0 * way
     for i in range(count):
@@ -139,13 +139,13 @@ def _slope(ratio: float, exponent: float) -> float:
 
 @pasted
 def _moved(ratio: float, slope: float, stiffness: float, way: float, s: float) -> Any:
-    """How far z moves in the direction of motion, Q and stiffness held."""
+    """Displacement of z in the direction of motion, with constant Q and stiffness."""
     return (1.0 - ratio) * slope * way * decayed(stiffness * slope * way / s)
 
 
 @pasted
 def _held(torque: float, most: float) -> float:
-    """What an element holds of a torque."""
+    """Torque of an element, limited to what it can hold."""
     held: float = where(torque > most, most, where(torque < -most, -most, torque))
     return held
 

@@ -1,9 +1,9 @@
 """LuGre friction: T = sigma0 z + sigma1 dz/dt + sigma2 v, dz/dt = v - sigma0 |v| z / s(v).
 
 Equations 4.2 to 4.4; Canudas de Wit, Olsson, Astrom and Lischinsky (1995). The state z is the mean
-deflection of the bristles. Over one step the equation of z is linear for a given velocity, so z is
-advanced with its closed form, which is stable at any velocity and step: an explicit update at 1 kHz
-is not (above 3.4 rad/s with the thesis' parameters).
+deflection of the bristles. For a given velocity, its equation is linear over a step. Its closed
+form is stable at any velocity and step; an explicit update at 1 kHz is not (above 3.4 rad/s with
+the thesis' parameters).
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
 
 
 def _gaussian_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
-    """The same with delta = 2, which takes half the time."""
+    """The same with delta = 2, in half the time."""
     v, speed, direction = _mean_rates(motion)
     ratio = _ratio(parameters, v, speed)
     return _advance(parameters, state, motion, v, speed, direction, ratio * ratio)
@@ -84,9 +84,9 @@ def _gaussian_step(parameters: Any, state: Any, motion: Motion) -> tuple[float, 
 
 @pasted
 def _mean_rates(motion: Motion) -> tuple[float, float, float]:
-    """Means of v and of |v|, and their quotient: the direction, or less of it.
+    """Means of v and |v|, and their quotient: the direction, reduced by a reversal.
 
-    Where the sign of v changes, |v| is taken from a straight line.
+    If the sign of v changes, |v| follows from a straight line.
     """
     v0, v1, v = motion.rate_start, motion.rate_end, motion.rate_mean
     speed = abs(v)
@@ -131,7 +131,7 @@ def _advance(
     after = before + change
     state[0] = after
     mean = before + 0.5 * change + damping_time * motion.per_step * change + viscous * speed
-    # What dz/dt gains over the step: of the damping, too, the line has its change.
+    # Change of dz/dt over the step: the line includes the change of the damping torque.
     v0, v1 = motion.rate_start, motion.rate_end
     gained = v1 - v0 - (abs(v1) * after - abs(v0) * before) * per_s
     slope = stiffness * damping_time * gained + viscous * (abs(v1) - abs(v0))
@@ -144,7 +144,7 @@ def _step_for(options: LuGreOptions) -> Callable[..., Any]:
 
 
 def _small_signal(options: LuGreOptions) -> SmallSignal:
-    """At rest dz/dt = v: a spring and a damper. In fast sliding z = s(v) / sigma0 stays put."""
+    """At rest dz/dt = v: a spring and a damper. In fast sliding z = s(v) / sigma0 is constant."""
     bristles = Presliding(options.bristle_stiffness, options.bristle_damping)
     return SmallSignal(stuck=bristles, stuck_compensation=bristles)
 

@@ -2,12 +2,12 @@
 
 C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, *Dynamic friction models and control
 design*, American Control Conference (1993) 1920; H. Olsson, *Control systems with friction*, Lund
-(1996). Otherwise Equations 3.15 to 3.18. With r = sigma0 z sgn(v) / s, the work on it less what
-bristles store is |v| (s r^2 + |v| sigma1(v) (1 - r) + sigma2 |v|), which no r makes negative if
-|v| sigma1(v) <= 4 s. So it is passive if sigma1 vd <= 4 sqrt(2 e) min(Tc, Ts), about 9.3 of them.
-A constant sigma1 is passive only while sigma1 (Ts - Tc) / Tc <= sigma2.
+(1996). Otherwise Equations 3.15 to 3.18. With r = sigma0 z sgn(v) / s, the power loss is
+|v| (s r^2 + |v| sigma1(v) (1 - r) + sigma2 |v|), not negative for any r if |v| sigma1(v) <= 4 s. So
+the model is passive if sigma1 vd <= 4 sqrt(2 e) min(Tc, Ts), about 9.3 times that minimum. With a
+constant sigma1 it is passive only if sigma1 (Ts - Tc) / Tc <= sigma2.
 
-Scheme: z is closed over each part of a step of one direction, with s at its mean rate; second
+Scheme: closed form of z for each part of a step in one direction, with s at its mean rate; second
 order.
 """
 
@@ -87,8 +87,8 @@ def _damping(parameters: Any, rate: float) -> Any:
 def _bent(
     parameters: Any, torque: float, moved: float, time: float
 ) -> tuple[float, float, float, float]:
-    """sigma0 z after a part of a step; dz/dq when it begins and when it ends; and the damping's
-    torque over time (N m s).
+    """sigma0 z after a part of a step; dz/dq at its start and at its end; and the integral of the
+    damping torque (N m s).
     """
     direction = sign_of(moved)
     speed = abs(moved) / where(time > 0.0, time, 1.0)

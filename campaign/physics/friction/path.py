@@ -10,13 +10,13 @@ from campaign.physics.step_function import Motion
 
 
 class Parts(NamedTuple):
-    """A step before and after a reversal of its rate; without one, all of it is the first part.
+    """Parts of a step before and after a reversal; without one, the first part is the whole step.
 
     Attributes:
-        first, last: displacements (rad) of both parts, of one direction each; together that of the
-            step. The rate is a straight line up to the reversal.
-        share: of the step that the first part lasts, 1 without a reversal.
-        turns: whether there is one.
+        first, last: displacements (rad) of both parts, each in one direction; their sum is that of
+            the step. The rate is a straight line up to the reversal.
+        share: share of the first part in the step, 1 without a reversal.
+        turns: whether there is a reversal.
     """
 
     first: float
@@ -27,7 +27,7 @@ class Parts(NamedTuple):
 
 @pasted
 def parts_of(motion: Motion) -> Parts:
-    """The parts of a step."""
+    """Parts of a step."""
     v0, v1, step = motion.rate_start, motion.rate_end, motion.step
     turns = v0 * v1 < 0.0
     share = where(turns, v0 / where(turns, v0 - v1, 1.0), 1.0)
@@ -45,6 +45,6 @@ def sign_of(x: float) -> float:
 
 @pasted
 def decayed(x: float) -> float:
-    """(1 - exp(-x)) / x for x >= 0: the mean of a decay over what it lasts."""
+    """(1 - exp(-x)) / x for x >= 0: the mean of a decay over its duration."""
     share: float = where(x > 0.0, -expm1(-x) / where(x > 0.0, x, 1.0), 1.0)
     return share

@@ -1,7 +1,7 @@
 """Static Stribeck friction: T = (Tc + (Ts - Tc) exp(-|v/vs|^delta)) sgn(v) + sigma2 v (Eq. 4.6).
 
-At rest the model is a set, |T| <= Ts (`DryFriction`): as a plant's friction, the engine finds
-within each step whether it sticks or slides. As a compensation it is Eq. 4.6 with sgn(0) = 0.
+At rest the model is a set, |T| <= Ts (`DryFriction`): in the plant, the engine determines in each
+step whether it sticks or slides. As a compensation it is Eq. 4.6 with sgn(0) = 0.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CURVE = (
     "stribeck_exponent",
     "viscous_friction",
 )
-"""The parameters of steady sliding; each may differ by direction."""
+"""Parameters of steady sliding; each can differ by direction."""
 
 
 class NegativeDirection(Options):
@@ -90,7 +90,7 @@ class StribeckOptions(FrictionOptions):
 
 
 def in_direction(options: Any, name: str, sign: float) -> float:
-    """A parameter as it is for sliding in the direction of `sign`."""
+    """A parameter for sliding in the direction of `sign`."""
     other = getattr(options.negative, name) if sign < 0 else None
     return float(getattr(options, name) if other is None else other)
 
@@ -98,8 +98,8 @@ def in_direction(options: Any, name: str, sign: float) -> float:
 def curve_parameters(options: Any) -> list[float]:
     """Tc, Ts, vs, delta forwards, the same backwards, and half the difference of sigma2.
 
-    The mean of sigma2 over both directions belongs to the linear part; the half difference times
-    |v| is what a step function adds.
+    The mean of sigma2 over both directions belongs to the linear part; a step function adds the
+    half difference times |v|.
     """
     names = ("coulomb_torque", "static_torque", "stribeck_velocity", "stribeck_exponent")
     return [
@@ -125,12 +125,12 @@ def stribeck_curve(options: Any, velocity: Array) -> Array:
     """s(v) of Eq. 4.4 (N m), shape (n,): friction of steady sliding, unsigned, without sigma2."""
     curve = np.empty_like(velocity, dtype=float)
     for sign in (+1.0, -1.0):
-        here = velocity >= 0 if sign > 0 else velocity < 0
+        mask = velocity >= 0 if sign > 0 else velocity < 0
         coulomb = in_direction(options, "coulomb_torque", sign)
         drop = in_direction(options, "static_torque", sign) - coulomb
-        speed = np.abs(velocity[here]) / in_direction(options, "stribeck_velocity", sign)
+        speed = np.abs(velocity[mask]) / in_direction(options, "stribeck_velocity", sign)
         fall = np.exp(-(speed ** in_direction(options, "stribeck_exponent", sign)))
-        curve[here] = coulomb + drop * fall
+        curve[mask] = coulomb + drop * fall
     return curve
 
 
@@ -149,12 +149,12 @@ def _parameters(options: StribeckOptions) -> Array:
 
 
 def _step(parameters: Any, state: Any, motion: Motion) -> tuple[float, float]:
-    """See `campaign.physics.step_function`: Eq. 4.6 at the mean rate. No state is kept."""
+    """See `campaign.physics.step_function`: Eq. 4.6 at the mean rate, without a state."""
     v0, v1, smoothing = motion.rate_start, motion.rate_end, parameters[9]
     v = 0.5 * (v0 + v1)
     size = curve_torque(parameters, where(v >= 0.0, 1.0, -1.0), abs(v))
     smooth = size * tanh(v / where(smoothing > 0.0, smoothing, 1.0))
-    # The sign may change inside the step: its mean over the step, not a whole step of either.
+    # The sign can change inside the step: use its mean over the step.
     path = abs(v0) + abs(v1)
     sign = where(v > 0.0, 1.0, where(v < 0.0, -1.0, 0.0))
     sign = where(v0 * v1 < 0.0, (v0 + v1) / where(path > 0.0, path, 1.0), sign)
@@ -185,9 +185,9 @@ def curve_torque(parameters: Any, direction: float, speed: float) -> Any:
 
 
 def _small_signal(options: StribeckOptions) -> SmallSignal:
-    """Rigid at rest. A compensation climbs with the slope of tanh, or jumps where that is a sign.
+    """Rigid at rest. A compensation has the slope of tanh, or jumps without smoothing.
 
-    The slope is the mean of both directions, which differ only where their static torques do.
+    The slope is the mean of both directions, which differ only if their static torques do.
     """
     static = 0.5 * sum(in_direction(options, "static_torque", sign) for sign in (+1.0, -1.0))
     smooth = options.sign_smoothing

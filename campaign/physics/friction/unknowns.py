@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 STATIC = (0.05, 3.0)
-"""Static friction over Coulomb friction; real axes have less than 1."""
+"""Bounds of static over Coulomb friction; some real axes have less than 1."""
 MOST_VISCOUS = 5.0
-"""Viscous over Coulomb friction at the fastest rate, at least up to which it is looked for."""
+"""Smallest upper bound of viscous over Coulomb friction at the fastest rate."""
 FAR = 3.0
-"""times the Stribeck velocity, where less than a twentieth of the fall from static friction is left
+"""Times the Stribeck velocity, where less than a twentieth of the fall from static friction remains
 (exponent 1): without such a rate Coulomb friction is extrapolated."""
 SLIDE = "slide at more, and further apart, speeds"
 SLIDE_SLOWER = "slide at more, and slower, speeds"
@@ -22,11 +22,11 @@ PRESLIDE = "stay below breakaway: `presliding_multisine` measures it"
 
 @dataclass(frozen=True)
 class Sizes:
-    """Of a rig's friction, from plain inverse dynamics: what starts and bounds follow from.
+    """Sizes of a rig's friction from inverse dynamics, the source of start values and bounds.
 
     Attributes:
         coulomb, viscous: of both directions (SI).
-        rate: fastest of the motion; travel: its range of angle, or position.
+        rate: largest rate of the motion; travel: its range of angle, or position.
     """
 
     coulomb: tuple[float, float]
@@ -36,18 +36,18 @@ class Sizes:
 
     @property
     def torque(self) -> float:
-        """Coulomb friction, the mean of both directions."""
+        """Coulomb friction, mean of both directions."""
         return 0.5 * sum(self.coulomb)
 
 
 @dataclass(frozen=True)
 class ReversalTime:
-    """How long it takes in a reversal what a parameter says.
+    """Duration of a parameter's effect in a reversal.
 
     Attributes:
-        what: takes that long, for a reader.
+        what: name of the process, for the user.
         time: s, from the model's options (SI) and the acceleration of reversals (rad/s^2).
-        replaced: whether the model without it is a simpler one, once it is too fast to be seen.
+        replaced: whether a simpler model replaces it if the process is too fast to observe.
     """
 
     what: str
@@ -60,12 +60,12 @@ class FrictionUnknown:
     """An unknown of a model.
 
     Attributes:
-        key: of the option that it is; dotted within a table; "" where options are derived from it.
-        low, high, start: between which it is looked for, and where first (SI).
-        advice: what motion tells more of it.
-        rests_on: groups of unknowns: one of each has to be measured for it to mean anything.
-        lasts: how long what it says takes in a reversal; None where it is seen between reversals.
-        below_one, about_one: of a ratio, what it says where its interval lies below one or has it.
+        key: of its option; dotted within a table; "" if options are derived from it.
+        low, high, start: bounds and start value of the search (SI).
+        advice: motion that determines it better.
+        rests_on: groups of unknowns; without a measured one of each group it has no meaning.
+        lasts: duration of its effect in a reversal; None if it acts between reversals.
+        below_one, about_one: statement on a ratio if its interval is below one, or includes one.
     """
 
     name: str
@@ -88,7 +88,7 @@ class DerivedOption:
     """An option of a model that follows from several unknowns.
 
     Attributes:
-        value: SI, from those of the unknowns by name.
+        value: SI, from the values of the unknowns by name.
     """
 
     name: str
@@ -117,30 +117,30 @@ def line(sizes: Sizes, *, by_direction: bool) -> Unknowns:
     """Coulomb and viscous friction."""
     mean = sizes.torque
     largest = max(0.5 * sum(sizes.viscous), 0.02 * mean / sizes.rate)
-    # Where friction falls as sliding sets in, a plain line has hardly any slope.
+    # If friction falls at the onset of sliding, a straight line has almost no slope.
     most = max(6.0 * largest, MOST_VISCOUS * mean / sizes.rate)
-    found = []
-    for number, (prefix, tail, told) in enumerate(_ways(by_direction)):
+    unknowns = []
+    for number, (prefix, tail, words) in enumerate(_ways(by_direction)):
         coulomb = sizes.coulomb[number] if tail else mean
         viscous = sizes.viscous[number] if tail else 0.5 * sum(sizes.viscous)
         start = min(max(coulomb, 0.1 * mean), 10.0 * mean)
-        found += [
+        unknowns += [
             FrictionUnknown(
                 f"coulomb{tail}", f"{prefix}coulomb_torque", "N m",
-                f"Dry friction of fast sliding{told}.",
+                f"Dry friction of fast sliding{words}.",
                 0.02 * mean, 20.0 * mean, start, REVERSE, logarithmic=True,
             ),
             FrictionUnknown(
                 f"viscous{tail}", f"{prefix}viscous_friction", "N m s/rad",
-                f"Viscous friction{told}.",
+                f"Viscous friction{words}.",
                 0.0, most, min(max(viscous, 0.0), largest), SLIDE,
             ),
         ]  # fmt: skip
-    return tuple(found)
+    return tuple(unknowns)
 
 
 def product(*names: str) -> Callable[[Mapping[str, float]], float]:
-    """Of unknowns, for what follows from them."""
+    """Function that multiplies these unknowns, for a derived option."""
     return lambda values: math.prod(values[name] for name in names)
 
 
@@ -154,10 +154,10 @@ def static(
 ) -> Unknowns:
     """Static friction of each direction, as a ratio to Coulomb friction.
 
-    rests_on: as of `FrictionUnknown`, besides Coulomb friction.
+    rests_on: as in `FrictionUnknown`, besides Coulomb friction.
     """
-    found: list[FrictionUnknown | DerivedOption] = []
-    for prefix, tail, told in _ways(by_direction):
+    unknowns: list[FrictionUnknown | DerivedOption] = []
+    for prefix, tail, words in _ways(by_direction):
         name, base = f"static_over_coulomb{tail}", f"coulomb{tail}"
         where = f"In the {tail[1:]} direction static" if tail else "Static"
         rises = f"{where} friction lies below Coulomb friction: it rises as sliding sets in."
@@ -165,19 +165,19 @@ def static(
             f"{where} friction is not distinguishable from Coulomb friction: there is no Stribeck "
             "part that this motion could identify."
         )
-        found += [
+        unknowns += [
             FrictionUnknown(
                 name, "", "",
-                f"Static friction over Coulomb friction{told}; below 1 where none stands out.",
+                f"Static friction over Coulomb friction{words}; below 1 where none stands out.",
                 *ratio, start, SLIDE_SLOWER, rests_on=((base,), *rests_on), lasts=lasts,
                 below_one=rises, about_one=open_,
             ),
             DerivedOption(
                 f"static_torque{tail}", f"{prefix}static_torque", "N m",
-                f"Friction at the onset of sliding{told}.", SLIDE_SLOWER, product(name, base),
+                f"Friction at the onset of sliding{words}.", SLIDE_SLOWER, product(name, base),
             ),
         ]  # fmt: skip
-    return tuple(found)
+    return tuple(unknowns)
 
 
 def curve(sizes: Sizes, *, by_direction: bool) -> Unknowns:
@@ -188,10 +188,10 @@ def curve(sizes: Sizes, *, by_direction: bool) -> Unknowns:
         1e-4 * sizes.rate, sizes.rate / FAR, 0.1 * sizes.rate, SLIDE_SLOWER, logarithmic=True,
         rests_on=(tuple(f"coulomb{tail}" for _, tail, _ in _ways(by_direction)),), lasts=PASSING,
     )  # fmt: skip
-    # One direction may rise to its Coulomb friction, and the other fall to it.
+    # Friction can rise to Coulomb friction in one direction, and fall to it in the other.
     return (
         *line(sizes, by_direction=by_direction),
-        # What lies at rest is extrapolated where the rate over which it falls is not known.
+        # Without the Stribeck velocity, static friction is an extrapolation.
         *static(PASSING, by_direction=by_direction, rests_on=((slow.name,),)),
         slow,
     )
@@ -202,11 +202,11 @@ EXPONENT = FrictionUnknown(
     0.2, 5.0, 2.0, SLIDE_SLOWER, logarithmic=True,
     rests_on=(("stribeck_velocity",),), lasts=PASSING,
 )  # fmt: skip
-"""Of a Stribeck curve; a motion that tells it is rare, so it is held first."""
+"""Exponent of a Stribeck curve; few motions determine it, so the first fit keeps it constant."""
 
 
 def stiffness(sizes: Sizes) -> FrictionUnknown:
-    """Of presliding."""
+    """Stiffness of presliding."""
     soft = sizes.torque / sizes.travel
     return FrictionUnknown(
         "bristle_stiffness", "bristle_stiffness", "N m/rad", "Stiffness of presliding.",
@@ -215,7 +215,7 @@ def stiffness(sizes: Sizes) -> FrictionUnknown:
 
 
 def damping(sizes: Sizes) -> FrictionUnknown:
-    """Of presliding."""
+    """Damping of presliding."""
     thick = sizes.torque / sizes.rate
     return FrictionUnknown(
         "bristle_damping", "bristle_damping", "N m s/rad", "Damping of presliding.",
@@ -230,7 +230,7 @@ def bristles(sizes: Sizes, *, by_direction: bool) -> Unknowns:
 
 
 def _ways(by_direction: bool) -> tuple[tuple[str, str, str], ...]:
-    """Prefix of options, tail of names, words."""
+    """Prefix of options, suffix of names and suffix of texts, by direction."""
     if not by_direction:
         return (("", "", ""),)
     return (

@@ -1,6 +1,6 @@
-"""Friction pictures of single contacts, outside any loop: one file each.
+"""Friction models of single contacts, outside any loop: one file each.
 
-A specimen meets a prescribed motion. A bench cannot name it: the engine knows friction models only.
+A specimen has a prescribed motion. A bench cannot use it: the engine has friction models only.
 """
 
 from __future__ import annotations
@@ -13,5 +13,5 @@ from campaign.plugins import Kinds
 
 @cache
 def specimens() -> Kinds[Specimen]:
-    """Every specimen, by name."""
+    """All specimens, by name."""
     return Kinds("friction specimen", __name__, "SPECIMEN", Specimen, tag="model")

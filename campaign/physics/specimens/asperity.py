@@ -7,27 +7,27 @@ fixed one (Figures 2.4, 2.5). On a spot
     Fn = kn zeta,  Ft = kt xi        normal and tangential force (Eq. 2.5, 2.6)
     |Ft| <= mu(t) Fn                 it sticks below, and slips at it (second Eq. 2.6)
 
-with the time t since the asperity touched the spot. Where the spot ends, it loses what xi stores,
-and is free up to the next one. Torques of all contacts add. The friction of rested contacts is
-mu(inf) times the load (Eq. 2.1, 2.2).
+with the time t since the asperity touched the spot. At the end of the spot it loses the energy of
+xi, and is free up to the next one. Torques of all contacts add up. The friction of rested contacts
+is mu(inf) times the load (Eq. 2.1, 2.2).
 
-**Read with care.** Equation 2.6 stands twice in print, with errors: read Ft = kt xi and
-F_mu = mu Fn. The print has no mu(t); here creep is exponential, the simplest law that ends:
+**Caution.** Equation 2.6 is printed twice, with errors: read Ft = kt xi and F_mu = mu Fn. The print
+has no mu(t); here creep is exponential, the simplest law with a limit:
 
     mu(t) = mu(inf) - (mu(inf) - mu(0)) exp(-t/tau)
 
-Only products of mu and Fn count: Ts is mu(inf) and Tc mu(0) times the mean load. Here the tip has
-no mass, zeta is constant on a spot (exponential over spots: J. A. Greenwood and J. B. P.
-Williamson, Proc. R. Soc. A 295 (1966) 300), spots have one length l and are l apart, and
-tau = l/vs: at vs, a contact lasts as long as the creep. With A(t) = Ts - (Ts - Tc) exp(-t/tau), the
+Only products of mu and Fn matter: Ts is mu(inf) and Tc mu(0) times the mean load. Here the tip has
+no mass, and zeta is constant on a spot (exponential over spots: J. A. Greenwood and J. B. P.
+Williamson, Proc. R. Soc. A 295 (1966) 300). Spots have one length l and are l apart. tau = l/vs:
+at vs, the duration of a contact is that of the creep. With A(t) = Ts - (Ts - Tc) exp(-t/tau), the
 expected torque is
 
     mean of A(t) (1 - exp(-sigma0 u / A(t)))     over u = 0 to l, t = u/v
 
 in sliding at the rate v, and Ts (1 - exp(-sigma0 x / Ts)) from rest: Dahl's curve.
 
-Scheme: exact for an angle that is a straight line in each step. As mu is concave in time, who slips
-in a step of one direction slips to its end.
+Scheme: exact for an angle that is a straight line in each step. As mu is concave in time, an
+asperity that slips in a step of one direction slips to its end.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from campaign.physics.specimens.interface import Array, Specimen
 from campaign.units import AngularRate, RotationalStiffness, Torque
 
 SPOTS = 64
-"""After so many spots the fixed surface repeats."""
+"""Period of the fixed surface, in spots."""
 PITCH = 2.0
-"""From a spot to the next, in lengths of a spot: half of the asperities are in contact."""
+"""Distance of spots in lengths of a spot: half of the asperities are in contact."""
 POINTS = 64
-"""Of the quadrature of the steady state."""
+"""Number of points of the quadrature for the steady state."""
 
 
 class AsperityOptions(Options):
@@ -82,7 +82,7 @@ def length_of(options: AsperityOptions) -> float:
 
 
 def surface(options: AsperityOptions) -> tuple[Array, Array]:
-    """Where each asperity is in its pitch at angle 0 (rad), shape (n,), and its heights zeta.
+    """Position of each asperity in its pitch at angle 0 (rad), shape (n,), and heights zeta.
 
     The heights have the mean 1, shape (SPOTS, n).
     """
@@ -96,7 +96,7 @@ def _torque(options: AsperityOptions, time: Array, angle: Array) -> Array:
     creep = length / options.stribeck_velocity
     places, heights = surface(options)
     each, zero = np.arange(count), np.zeros(count)
-    # xi, and (mu(inf) - mu) / (mu(inf) - mu(0)): rested at first.
+    # xi, and (mu(inf) - mu) / (mu(inf) - mu(0)): initially rested.
     xi, lacking, total = zero, zero, np.zeros(len(angle))
     spot, into = np.divmod(angle[0] + places, PITCH * length)
     touches = into < length
@@ -119,11 +119,11 @@ def _torque(options: AsperityOptions, time: Array, angle: Array) -> Array:
 
 def _steady_state(options: AsperityOptions, rates: Array) -> Array:
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
-    way, weights = 0.5 * (1.0 + nodes), 0.5 * weights
+    path, weights = 0.5 * (1.0 + nodes), 0.5 * weights
     slow = options.stribeck_velocity / np.maximum(np.abs(rates), 1e-300)
     grown = options.static_torque - options.coulomb_torque
-    holds = options.static_torque - grown * np.exp(-np.multiply.outer(slow, way))
-    bent = options.bristle_stiffness * length_of(options) * way / holds
+    holds = options.static_torque - grown * np.exp(-np.multiply.outer(slow, path))
+    bent = options.bristle_stiffness * length_of(options) * path / holds
     return np.sign(rates) * ((-np.expm1(-bent) * holds) @ weights)
 
 

@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Specimen:
-    """Many contacts, each computed by itself, along a prescribed motion.
+    """Many separately computed contacts along a prescribed motion.
 
     Attributes:
-        name: what its `model` option says.
+        name: value of its `model` option.
         summary: one line for `campaign kinds`.
         options: its parameters, with `model: Literal[name]`, in SI.
         torque: friction torque (N m), shape (n,), from validated options, times (s) and angles
-            (rad), shape (n,) each. The angle is a straight line between two times. It begins
+            (rad), shape (n,) each. The angle is a straight line between two times. Contacts begin
             rested and undeflected.
         steady_state: expected torque (N m) at constant rates (rad/s), shape (m,).
     """

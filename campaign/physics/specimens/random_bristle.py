@@ -2,20 +2,20 @@
 
 D. A. Haessig and B. Friedland, *On the modeling and simulation of friction*, J. Dyn. Syst. Meas.
 Control 113 (1991) 354. Each of N bristles is a spring from its bond b_i to the moving surface. At a
-deflection of delta_s the bond snaps, and a new one forms further on, at a random distance from the
-old one:
+deflection of delta_s the bond snaps, and a new one forms in the direction of motion, at a random
+distance from the old one:
 
     b_i + d sgn(x - b_i),    d uniform in (0, Delta),    Delta <= 2 delta_s
 
-so that the new deflection is smaller. In long sliding, the way to the next snap has the density
-2/Delta (1 - u/Delta). Hence the mean torque is N sigma0 (delta_s - Delta/3), and its standard
-deviation Delta sigma0 sqrt(N/18), whatever the rate. As long as no bond snaps, the torque is
-elastic with the stiffness N sigma0: from rest over delta_s, and after a reversal over at least
+so that the new deflection is smaller. In long sliding, the displacement u to the next snap has the
+density 2/Delta (1 - u/Delta). Hence the mean torque is N sigma0 (delta_s - Delta/3), and its
+standard deviation Delta sigma0 sqrt(N/18), at any rate. While no bond snaps, the torque is elastic
+with the stiffness N sigma0: from rest over delta_s, and after a reversal over at least
 2 delta_s - Delta.
 
-The paper gives delta_s. Here the mean torque Tc is given, as for other models, and delta_s follows.
+The paper states delta_s. Here it follows from the mean torque Tc, an option as in other models.
 
-Scheme: exact. A bond depends on the path alone: draw k of bristle i is the same with any samples.
+Scheme: exact. A bond depends only on the path: draw k of bristle i is the same with any samples.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from campaign.physics.specimens.interface import Array, Specimen
 from campaign.units import RotationalStiffness, Torque
 
 DRAWS = 64
-"""Draws of each bristle at first; as many again when they are used up."""
+"""Initial draws of each bristle; their number doubles when they are used up."""
 
 
 class RandomBristleOptions(Options):
@@ -51,7 +51,7 @@ class RandomBristleOptions(Options):
 
 
 def snap_deflection(options: RandomBristleOptions) -> float:
-    """delta_s (rad): the deflection at which a bond snaps."""
+    """delta_s (rad): deflection at which a bond snaps."""
     return options.coulomb_torque / (options.bristle_stiffness * (1.0 - options.spacing / 3.0))
 
 
