@@ -68,9 +68,7 @@ def same_recordings(chosen: ChosenRun, other: ChosenRun) -> list[int]:
     alike = {_length(each) for each in chosen.trials} & {_length(each) for each in other.trials}
     own = [_digests(each) for each in chosen.trials if _length(each) in alike]
     again = {each.trial.number: _digests(each) for each in other.trials if _length(each) in alike}
-    return sorted(
-        number for number, new in again.items() if any(_same(new, old) for old in own)
-    )
+    return sorted(number for number, new in again.items() if any(_same(new, old) for old in own))
 
 
 def _same(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
