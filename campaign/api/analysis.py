@@ -43,7 +43,7 @@ class AnalysedTest:
     Attributes:
         title: heading on the page.
         reproduces: published tables that it reproduces.
-        options: normalised (SI), before the sweep.
+        options: normalized (SI), before the sweep.
         trials: readable executed trials in plan order, failed ones included.
         experiment: None for an unknown kind or an unusable package.
         bench: None without a valid bench of a readable trial.
@@ -123,7 +123,7 @@ class TestAnalysis:
     """Result of the analysis of one test.
 
     Attributes:
-        trials: numbers of the analysed trials: all readable ones.
+        trials: numbers of the analyzed trials: all readable ones.
         problem: why there is no result, in one line; empty when there is one.
         damaged: damage of the other trials.
     """
@@ -141,7 +141,7 @@ def analyse_run(
     measure_anew: bool = False,
     found: Mapping[str, TestAnalysis] | None = None,
 ) -> tuple[AnalysedTest, ...]:
-    """Analyse every test of a run, in the protocol's order; a failed analysis is one problem.
+    """Analyze every test of a run, in the protocol's order; a failed analysis is one problem.
 
     Args:
         measure_anew: measure the recordings again instead of using archived metrics.
@@ -192,7 +192,7 @@ def one_line(error: BaseException) -> str:
 def find(
     run: RunReader, test: Tree, experiments: Mapping[str, Experiment], *, measure_anew: bool
 ) -> TestAnalysis:
-    """Analyse one test; see `analyse_run`."""
+    """Analyze one test; see `analyse_run`."""
     name, kind = name_of(test), str(test.get("kind", ""))
     trials = tuple(run.trials_of(name))
     if measure_anew:

@@ -1,7 +1,7 @@
 """All results of one run: to inspect, and to keep beside the run.
 
 A results file replaces the analysis if it is undamaged, of this run, and from the same code.
-Otherwise the program analyses the run and reports why.
+Otherwise the program analyzes the run and reports why.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Results:
 
     Attributes:
         found: all results, as objects.
-        origin: text on their source: the file, or the version of the program that analysed the run
+        origin: text on their source: the file, or the version of the program that analyzed the run
             and why it did not read a file.
         archive: the run.
     """
@@ -218,7 +218,7 @@ def _is_new(damage: Damage, run: RunReader) -> bool:
 
 
 def code_of(tests: Iterable[AnalysedTest | ResultsOfTest]) -> str:
-    """Hash of the sources of this program and of the installed packages that analyse the tests."""
+    """Hash of the sources of this program and of the installed packages that analyze the tests."""
     known = experiments()
     plug_ins = (known.plug_in(test.kind) for test in tests)
     packages = [name for each in plug_ins if each is not None for name in each.packages]

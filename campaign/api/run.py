@@ -71,8 +71,8 @@ class RunView:
 
         views = self._tests()
         planned = Counter(trial.test for trial in self.archive.plan)
-        told = self.archive.outlines
-        done = Counter(each.test for each in told if each.outcome is Outcome.COMPLETED)
+        outlines = self.archive.outlines
+        done = Counter(each.test for each in outlines if each.outcome is Outcome.COMPLETED)
         rows = [
             (view.kind, view.title, planned[view.name], len(view), done[view.name])
             for view in views

@@ -31,7 +31,7 @@ class TestView:
     """One test of a run; iterating over it gives its executed trials.
 
     Attributes:
-        options: normalised (SI), before the sweep.
+        options: normalized (SI), before the sweep.
         archived: its executed trials, in plan order.
         run: path of the run.
         damaged: damage of this test, or of no trial, that was detected at opening of the run.

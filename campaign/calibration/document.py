@@ -104,8 +104,8 @@ def known_entries(
 ) -> dict[str, Any]:
     """Entries of a bench's table `known`, for TOML.
 
-    Every fitted value has an entry. Without an interval if the cells do not determine it: this
-    replaces the interval of an earlier calibration.
+    Every fitted value has an entry, to replace that of an earlier calibration. The entry has no
+    interval if the cells do not determine the value.
 
     Args:
         fitted: names of the cells in the bench file.

@@ -60,8 +60,8 @@ def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
         known = its.known.values.get(f"compensation.{made.name}.{path}")
         yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
     for each in _loops(its, made.name):
-        told = each.verdict if each.margins is None else margins_in_words(each.margins)
-        yield f"Loop, {each.regime}, {each.mode} command: {told}"
+        margins = each.verdict if each.margins is None else margins_in_words(each.margins)
+        yield f"Loop, {each.regime}, {each.mode} command: {margins}"
     yield "Not in it: delays and resolutions of sensors; the rate loop."
 
 

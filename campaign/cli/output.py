@@ -210,8 +210,8 @@ def _wrapped(line: str, width: int, hang: int) -> str:
 def waiting(first: str) -> Iterator[Callable[[str, str], None]]:
     """Show progress on standard error; yields a function of the phase and the full text.
 
-    On a terminal, one line redrawn in place, first with `first`. Elsewhere, one line for each phase
-    and one every `INTERVAL` seconds.
+    On a terminal, one line redrawn in place, first with `first`. Elsewhere, a line for each phase,
+    at most every `INTERVAL` seconds.
     """
     out = error_console()
     if out.is_terminal and not out.is_dumb_terminal:

@@ -69,12 +69,12 @@ def prepare(request: Request) -> PreparedRun:
     path = find_protocol(request.protocol)
     kind = find_backend(request.backend)
     ours = tuple(text for text in request.changes if _is_backend_setting(text))
-    theirs = tuple(text for text in request.changes if text not in ours)
+    overrides = tuple(text for text in request.changes if text not in ours)
     options = backend_options(kind, ours)
     protocol = load_protocol(
         path,
         experiments(),
-        overrides=theirs,
+        overrides=overrides,
         shipped=protocols_folder(),
         truth=request.truth,
     )
@@ -223,11 +223,11 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         from campaign.importing.description import RecordingDescription
 
         described = RecordingDescription.model_validate(trial.recording, context={"si": True})
-        there = ", ".join(each.name for each in described.channels)
+        recorded = ", ".join(each.name for each in described.channels)
         tables = ", ".join(f"[columns.NAME.{name}]" for name in names)
         return (
             f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}\n"
-            f"its mapping makes {there}: say by {tables} which column it is"
+            f"its mapping makes {recorded}: say by {tables} which column it is"
         )
     return (
         f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}; "

@@ -1,6 +1,6 @@
 """`campaign report`: page, tables and figures from an archive.
 
-The functions import the code for pages, while other processes analyse.
+The functions import the code for pages, while other processes analyze.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def report_run(
     written: list[PreparedResults] = []
     try:
         with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
-            # Import while the workers begin to analyse.
+            # Import while the workers begin to analyze.
             from campaign.cli.keep_results import written_results
             from campaign.experiments import experiments
             from campaign.report.build import build_report

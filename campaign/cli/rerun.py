@@ -137,10 +137,10 @@ def _say_change(
     engine: int, bench: Bench, what: str, before: Recording, again: Recording
 ) -> ExitCode:
     """Compare samples of two engines: changes of the channels against the older engine's error."""
-    older, found = min(engine, ENGINE), changes(before, again)
+    older, changed = min(engine, ENGINE), changes(before, again)
     dry = any(is_dry(each) for each in bench.friction.values())
-    bounds = {name: TIMES * _error(older, name, dry=dry) for name in found}
-    beyond = [name for name, change in found.items() if not change <= bounds[name]]
+    bounds = {name: TIMES * _error(older, name, dry=dry) for name in changed}
+    beyond = [name for name, change in changed.items() if not change <= bounds[name]]
     if before.ending.outcome is not again.ending.outcome:
         verdict = f"different: {before.ending.outcome} → {again.ending.outcome}"
     elif _is_noisy(bench):
@@ -150,7 +150,7 @@ def _say_change(
     else:
         verdict = f"the same within {TIMES} times the error of engine {older}"
     print_line(f"{what}: simulated by engine {engine}, repeated by engine {ENGINE}: {verdict}")
-    for name, change in found.items():
+    for name, change in changed.items():
         print_line(f"  {name}: changed by {change:.2g} of its rms; {bounds[name]:.2g} is allowed")
     return ExitCode.DONE if verdict.startswith("the same") else ExitCode.TRIALS_FAILED
 

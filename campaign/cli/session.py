@@ -69,7 +69,7 @@ class Session:
     """Trials, and the backend that accepts them, not yet connected.
 
     Attributes:
-        trials: the whole plan, with the trials of stages that ran before a resume.
+        trials: the whole plan, with the trials of stages from before a resume.
         finished: trials that are not executed again, by number.
         folder: present or future folder of the run in progress.
         yes: whether prompts are suppressed.
@@ -78,7 +78,7 @@ class Session:
         repeats: run of a repeated trial; for a replay, the backend states the run itself.
         timing: timing sink.
         stages: stages that may follow from the trials.
-        asked: stages that were requested before, from the journal.
+        asked: stages that were evaluated before, from the journal.
         guardian: of a program that moves a bench.
         executor: executor of the trials; None: threads or processes of this machine.
         watch: whether channels of the running trial are drawn; trials are then executed in this

@@ -25,7 +25,7 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 @dataclass(frozen=True)
 class Side:
-    """A run with its analysed tests; A is the reference."""
+    """A run with its analyzed tests; A is the reference."""
 
     letter: str
     run: RunReader
@@ -72,7 +72,7 @@ class Against:
 
     @property
     def equal(self) -> bool:
-        """Whether both runs have the same findings with exactly equal numbers."""
+        """Whether both runs have the same findings with exactly equal numbers and intervals."""
         alone = any(tested.only_reference or tested.only_other for tested in self.pairing.tests)
         alone = alone or bool(self.pairing.only_reference or self.pairing.only_other)
         numbers = ((pair.reference, pair.other) for pair in self.pairs)
@@ -132,7 +132,7 @@ def compare_runs(
     experiments: Mapping[str, Experiment],
     exchanged: Sequence[str] = (),
 ) -> Comparison:
-    """Analyse the runs and compare each with the first.
+    """Analyze the runs and compare each with the first.
 
     exchanged: sources of systematic parts that differ between runs although all benches state the
         same value, e.g. of an exchanged motor.

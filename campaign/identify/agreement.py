@@ -16,7 +16,7 @@ COMPARED = ("coulomb", "viscous", "inertia")
 WORTH_TELLING = 0.1
 """Least difference of two values that is reported, relative to the larger one."""
 OVER_TEMPERATURE = "_over_temperature"
-"""Ending of names of parameters at one temperature; other parameters are means over several."""
+"""Ending of a name that marks a model of friction at one temperature, not a mean over several."""
 
 
 def disagreements(sections: Sequence[Section]) -> Iterator[str]:

@@ -1,8 +1,8 @@
 """Identified twins of a bench's compensations.
 
-A compensation models the sum of all friction, for any number of interfaces. So it can hold the
-identified sliding curve of both directions, which no single interface of the bench can hold. The
-twin stands beside its original, so that one test can compare both. Values that were not identified,
+A compensation models the sum of all friction, for any number of interfaces. So it receives the
+sliding curve of both directions, even if that belongs to no single interface of the bench. The twin
+stands beside its original, so that one test can compare both. Values that were not identified,
 above all gains, are those of the original.
 
 If all interfaces yield together, one bristle has the stiffness at rest. If some interfaces slip
@@ -68,7 +68,7 @@ class Bristles:
 
     @property
     def apart(self) -> tuple[Estimate, Estimate, Estimate] | None:
-        """Stiffness at rest, strongest stiffness, weaker share; None if not known to be apart."""
+        """Stiffness at rest, strongest, weaker share; None unless known and some slip first."""
         if self.at_rest is None or self.strongest is None or self.weaker is None:
             return None
         if not self.strongest.value < self.at_rest.value:

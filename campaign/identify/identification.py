@@ -262,7 +262,7 @@ def _with_whole_tables(found: IdentifiedRig, bench: Bench, notes: list[str]) -> 
 
 
 def _with_own_friction(found: IdentifiedRig, bench: Bench, notes: list[str]) -> IdentifiedRig:
-    """Drop keys of friction from a bench with several interfaces.
+    """Set the `lumped` keys of friction; with several interfaces, drop its keys of the bench.
 
     Estimated friction is the sum of all interfaces. Only compensations have a model of that sum.
     """

@@ -77,7 +77,7 @@ class Member:
 def members_of(
     runs: Sequence[RunReader], experiments: Mapping[str, Experiment]
 ) -> tuple[Member, ...]:
-    """Analyse the runs, in order of their start.
+    """Analyze the runs, in order of their start.
 
     Raises UsageError for fewer than three runs, for a run named twice, and for several rigs.
     """

@@ -371,7 +371,7 @@ def _before(each: TrendSeries, jumps: Sequence[Jump]) -> str:
 
 
 def _runs_around(each: TrendSeries, jump: Jump) -> tuple[int, int]:
-    """Numbers of the runs between which the number jumped, in 95 % of the weight."""
+    """Numbers of the runs around a jump; its place is between them with 95 % of the weight."""
     points = each.series.points
     low, high = jump.between
     return points[low - 1].member.number, points[high].member.number
