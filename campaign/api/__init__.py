@@ -1,7 +1,7 @@
-"""Archives in Python: `campaign.open(...)` gives a run, its tests and its trials, lazily.
+"""Archives in Python: `campaign.open(...)` returns a run with its tests and trials.
 
-What is asked for comes as pandas and xarray objects; samples are read when they are asked for, and
-not before. `docs/reading-archives.md` shows it.
+Tables are pandas objects, samples pandas or xarray objects. Samples are read on request only.
+Examples: `docs/reading-archives.md`.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ def open_view(
     strict: bool = False,
     measure_anew: bool = False,
 ) -> RunView:
-    """Open an archived run; an ArchiveWarning says what of it is damaged.
+    """Open an archived run; an ArchiveWarning reports its damage.
 
     Args:
-        run: a path, a run's name, or a unique beginning of it; absent: the newest.
-        results: the folder in which names are looked up.
+        run: path, name, or unique beginning of a name; absent: the newest run.
+        results: folder of the named runs.
         strict: whether any damage is an error.
-        measure_anew: whether recordings are measured by this program, and not as they were when
-            they were executed.
+        measure_anew: whether the program measures the recordings again and ignores archived
+            metrics.
 
     Raises UsageError when there is no such run, ArchiveError when it cannot be read.
     """

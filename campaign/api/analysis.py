@@ -1,4 +1,4 @@
-"""From an archived run to results: the analysis of each test, and its scoreboard entries."""
+"""Analysis of each test of an archived run, and its entries in the scoreboard."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from campaign.result import Result
 from campaign.trial import Role, Tree
 
 FORMER_SOURCES = {"sim": "simulation", "serial": "hardware", "replay": "recording"}
-"""By backend: where samples came from when archives did not say so themselves."""
+"""Source of samples by backend, for archives that do not state it."""
 MOVES_NOTHING = ("name", "description", "limits")
-"""Tables and fields of a bench that may be changed within a run: they act on no motion."""
+"""Tables and fields of a bench that may change within a run: they do not affect the motion."""
 NOT_EXECUTED = "none of its trials was executed"
 NOT_READABLE = "none of its trials can be read"
 GONE_ON = "the run was gone on with on a changed bench"
@@ -38,21 +38,22 @@ MEASURE_ANEW = "; `campaign report --measure-anew` gives one: it does not use ar
 
 @dataclass(frozen=True)
 class AnalysedTest:
-    """One test of a run with what its analysis found.
+    """One test of a run with its result.
 
     Attributes:
         title: heading on the page.
-        reproduces: published tables it stands for.
-        options: normalised (SI), before the sweep.
-        trials: the executed ones that could be read, in plan order, failed ones included.
-        experiment, bench: None when this program does not know the kind, or nothing was executed.
+        reproduces: published tables that it reproduces.
+        options: normalized (SI), before the sweep.
+        trials: readable executed trials in plan order, failed ones included.
+        experiment: None for an unknown kind or an unusable package.
+        bench: None without a valid bench of a readable trial.
         problem: why there is no result, in one line; empty when there is one.
-        damaged: what is damaged of its trials; those that cannot be read are not among `trials`.
-        source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
-        provenance: whether its trials ran on the bench that was described.
-        calibration: what that of the bench leaves open of its numbers.
-        group: heading under which the contents list it and those behind it.
-        leading_figure: key of its figure that stands on top of the page; "" for a choice.
+        damaged: damage of its trials; `trials` has no unreadable ones.
+        source: source of its samples: `simulation`, `hardware`, `recording`; "" unknown.
+        provenance: whether its trials ran on the described bench.
+        calibration: uncertainty of its numbers from the calibration of the bench.
+        group: heading of the contents for it and the tests after it.
+        leading_figure: key of the figure at the top of the page; "" for an automatic choice.
     """
 
     name: str
@@ -75,7 +76,7 @@ class AnalysedTest:
 
     @property
     def sides(self) -> Sides:
-        """How its bench moves; of no bench as most do."""
+        """Kinds of motion of its bench; both rotary without a bench."""
         return self.bench.sides if self.bench else BOTH_ROTARY
 
     @property
@@ -84,7 +85,7 @@ class AnalysedTest:
 
     @property
     def lacks_result(self) -> bool:
-        """Whether measurements completed, and nothing was found in any of them."""
+        """Whether measurements completed, but the analysis has no result."""
         done = any(
             each.ending.outcome is Outcome.COMPLETED and each.trial.role is Role.MEASUREMENT
             for each in self.trials
@@ -96,16 +97,16 @@ class AnalysedTest:
 
     @property
     def account(self) -> tuple[str, ...]:
-        """What an analysis that did not fail does without: trials, or any result, and why."""
+        """Notes on trials that the analysis leaves out, or on the reason for no result."""
         notes = notes_on(self.result.left_out, len(self.trials))
-        told = tuple(in_axis_terms(note, self.sides) for note in notes)
-        if told or self.problem or not self.lacks_result:
-            return told
+        texts = tuple(in_axis_terms(note, self.sides) for note in notes)
+        if texts or self.problem or not self.lacks_result:
+            return texts
         return (f"no result: {' '.join(self.result.notes) or 'nothing was found'}",)
 
     def evidence(self) -> Evidence:
-        """What it brings to the scoreboard."""
-        found = evidence_of(
+        """Evidence of the test for the scoreboard."""
+        evidence = evidence_of(
             self.name,
             self.reproduces,
             self.result.findings,
@@ -114,17 +115,17 @@ class AnalysedTest:
             provenance=self.provenance,
         )
         failed = bool(self.problem or self.damaged)
-        return replace(found, failed=failed, calibration=self.calibration)
+        return replace(evidence, failed=failed, calibration=self.calibration)
 
 
 @dataclass(frozen=True)
 class TestAnalysis:
-    """What the analysis of one test comes to.
+    """Result of the analysis of one test.
 
     Attributes:
-        trials: numbers of those that it was made of: all that could be read.
+        trials: numbers of the analyzed trials: all readable ones.
         problem: why there is no result, in one line; empty when there is one.
-        damaged: what is damaged of the others.
+        damaged: damage of the other trials.
     """
 
     result: Result
@@ -140,13 +141,13 @@ def analyse_run(
     measure_anew: bool = False,
     found: Mapping[str, TestAnalysis] | None = None,
 ) -> tuple[AnalysedTest, ...]:
-    """Analyse every test of a run, in the protocol's order; a failing analysis is one problem.
+    """Analyze every test of a run, in the protocol's order; a failed analysis is one problem.
 
     Args:
-        measure_anew: measure the recordings by this program, whatever is archived with them.
-        found: what was found already, by test.
+        measure_anew: measure the recordings again instead of using archived metrics.
+        found: available analyses by test.
     """
-    known = {} if found is None else found  # asked test by test: the last may not be found yet
+    known = {} if found is None else found  # looked up test by test: it may still be filled
     return tuple(
         _analysed(
             run,
@@ -159,9 +160,9 @@ def analyse_run(
 
 
 def damage_of(run: RunReader, tests: Iterable[AnalysedTest]) -> tuple[Damage, ...]:
-    """What of a run is damaged, as far as its reader and its analyses looked at it."""
-    found = (damage for test in tests for damage in test.damaged)
-    return tuple(dict.fromkeys((*run.damaged, *found)))
+    """Damage of a run that its reader and its analyses detected."""
+    detected = (damage for test in tests for damage in test.damaged)
+    return tuple(dict.fromkeys((*run.damaged, *detected)))
 
 
 def name_of(test: Tree) -> str:
@@ -180,7 +181,7 @@ def published_of(run: RunReader) -> Published:
 
 
 def one_line(error: BaseException) -> str:
-    """An error without its traceback; of options that are not valid, the first that is wrong."""
+    """Text of an error without traceback; for invalid options, that of the first one."""
     if isinstance(error, ValidationError):
         return str(error.errors(include_url=False)[0]["msg"])[:600]
     lines = str(error).strip().splitlines()
@@ -191,7 +192,7 @@ def one_line(error: BaseException) -> str:
 def find(
     run: RunReader, test: Tree, experiments: Mapping[str, Experiment], *, measure_anew: bool
 ) -> TestAnalysis:
-    """What the analysis of one test finds in its trials; see `analyse_run`."""
+    """Analyze one test; see `analyse_run`."""
     name, kind = name_of(test), str(test.get("kind", ""))
     trials = tuple(run.trials_of(name))
     if measure_anew:
@@ -218,30 +219,30 @@ def find(
 
 
 def _has_unreadable(run: RunReader, test: str) -> bool:
-    """Whether trials of a test cannot be read, also where nobody knows if they were executed."""
+    """Whether trials of a test are unreadable, or it is unknown whether trials were executed."""
     lost = lost_trials(run)
     planned = {each.number for each in run.plan if each.test == test}
     return bool(hidden_trials(run)) or any(not planned or number in planned for number in lost)
 
 
 def source_of(run: RunReader) -> str:
-    """Where a run's samples come from: `simulation`, `hardware`, `recording`; "" unknown."""
+    """Source of a run's samples: `simulation`, `hardware`, `recording`; "" unknown."""
     return run.header.source or FORMER_SOURCES.get(run.header.backend, "")
 
 
 def run_title(run: RunReader) -> str:
-    """What a run is called: by its protocol, or by its name."""
+    """Title of a run: title or name of its protocol, else the run's name."""
     header = run.header
     return title_of(header.title or header.protocol_name or header.name, source_of(run))
 
 
 def title_of(title: str, source: str) -> str:
-    """A title from a protocol; one that speaks of hardware says where it was simulated.
+    """Title of a protocol; adds `(simulated)` to one with "hardware" if a simulation executed it.
 
-    A protocol is written for a bench, whatever executes it.
+    A protocol is for a bench and does not depend on the backend.
     """
-    said = title.lower()
-    claims = "hardware" in said and not any(word in said for word in ("simulat", "virtual"))
+    words = title.lower()
+    claims = "hardware" in words and not any(word in words for word in ("simulat", "virtual"))
     return f"{title} (simulated)" if claims and source == "simulation" else title
 
 
@@ -291,7 +292,7 @@ def _options(test: Tree) -> Tree:
 
 
 def _described(run: RunReader, test: str) -> Tree | None:
-    """The bench of a test as the protocol has it, with `--set` and without the sweep."""
+    """Bench tree of a test from the protocol, with `--set` and without the sweep."""
     tests = run.header.normalised.get("tests")
     for tree in tests if isinstance(tests, list) else []:
         if isinstance(tree, dict) and tree.get("name") == test:
@@ -301,9 +302,9 @@ def _described(run: RunReader, test: str) -> Tree | None:
 
 
 def _gone_on(run: RunReader, test: str) -> str:
-    """Why a test had two benches: trials of it were executed after its bench was changed.
+    """`GONE_ON` if trials of a test were executed after a change of its bench; else "".
 
-    What one resume accepted lasts until the next, which is compared with the beginning again.
+    Changes accepted by one resume last until the next, which compares with the beginning again.
     """
     numbers = {each.number for each in run.outlines if each.test == test}
     changed = False
@@ -316,9 +317,9 @@ def _gone_on(run: RunReader, test: str) -> str:
 
 
 def _is_of_bench(change: str, test: str) -> bool:
-    """Whether an accepted change, as `execution.resume.differences` has it, is of a test's bench.
+    """Whether a change, as from `execution.resume.differences`, affects a test's bench.
 
-    Of a bench that several tests share, the first test is named; any test may be another of them.
+    For a bench of several tests, a change names only the first; any test may be one of the others.
     """
     path, others, _ = change.partition(": ")[0].partition(" (and in ")
     name, *keys = path.split(".")
@@ -329,7 +330,7 @@ def _is_of_bench(change: str, test: str) -> bool:
 
 
 def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Experiment | None, str]:
-    """The experiment, or why a package that should provide it cannot."""
+    """The experiment, or the reason why its package is unusable; None and "" if unknown."""
     try:
         return experiments.get(kind), ""
     except UsageError as error:
@@ -339,7 +340,7 @@ def _experiment(kind: str, experiments: Mapping[str, Experiment]) -> tuple[Exper
 def _result(
     data: TestData, experiment: Experiment | None, anew: TestData | None
 ) -> tuple[Result, str]:
-    """The result, or why there is none; `anew`: without archived metrics, where there are any."""
+    """The result, or why there is none; `anew`: the data without archived metrics, if any."""
     if experiment is None:
         return Result(), f"no experiment is called {data.kind!r} here; install what provides it"
     if not data.trials:
@@ -355,7 +356,7 @@ def _result(
 
 
 def _is_analysed(data: TestData | None, experiment: Experiment) -> bool:
-    """Whether the analysis of other data finds anything: it is tried."""
+    """Whether an analysis of the data, executed here, has a result."""
     if data is None:
         return False
     try:
@@ -365,7 +366,7 @@ def _is_analysed(data: TestData | None, experiment: Experiment) -> bool:
 
 
 def _bench(trials: tuple[ArchivedTrial, ...]) -> Bench | None:
-    """Of the first measurement: what a warm-up ran on is behind no finding."""
+    """Bench of the first measurement, else of the first trial: no finding is from a warm-up."""
     measured = (each for each in trials if each.trial.role is Role.MEASUREMENT)
     first = next(measured, trials[0] if trials else None)
     try:

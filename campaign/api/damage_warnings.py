@@ -17,7 +17,7 @@ _PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 
 def tell(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
-    """Warn of what is damaged of the run at `path`. Raises ArchiveError instead when `strict`."""
+    """Warn of damage of the run at `path`; if `strict`, raise ArchiveError instead."""
     if not damaged:
         return
     text = in_one_line(path, damaged)
@@ -27,12 +27,12 @@ def tell(path: Path, damaged: Sequence[Damage], *, strict: bool) -> None:
 
 
 def warn(text: str) -> None:
-    """An ArchiveWarning at the line that called the program."""
+    """Issue an ArchiveWarning at the caller's line outside the program."""
     warnings.warn(text, ArchiveWarning, stacklevel=_of_the_caller())
 
 
 def _of_the_caller() -> int:
-    """The `stacklevel`, seen from `warn`, of the first line that is not the program's own."""
+    """`stacklevel` for `warn` of the first frame outside the program."""
     frame, level = inspect.currentframe(), 0
     while frame is not None and _is_ours(frame.f_code.co_filename):
         frame, level = frame.f_back, level + 1

@@ -1,4 +1,4 @@
-"""Estimates as text: number with interval and unit, and what an interval leaves out."""
+"""Text of estimates: number with interval and unit, and sentences on missing intervals."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from campaign.text import NARROW, SHORT, interval, number, pretty_unit
 from campaign.units import convert
 
 FLAGGED = (Origin.ASSUMED, Origin.AT_BOUND, Origin.CONTRADICTED)
-"""Origins that stand behind a number, as a reader would take it for measured."""
+"""Origins that follow a number in parentheses, so that it is not read as measured."""
 
 
 def estimate_text(estimate: Estimate, display: str = "") -> str:
-    """`25.3 ± 0.1 N·m`, `at least 3 Hz`, `not determined (too few samples)`, in the unit shown."""
+    """`25.3 ± 0.1 N·m`, `at least 3 Hz` or `not determined (too few samples)`; unit `display`."""
     if not estimate.is_determined:
         return "not determined" + (f" ({estimate.reason})" if estimate.reason else "")
     unit = display or estimate.unit
@@ -29,20 +29,20 @@ def estimate_text(estimate: Estimate, display: str = "") -> str:
 
 
 def remarks(estimates: Iterable[Estimate]) -> Iterator[str]:
-    """Sentences on what the texts do not say: no interval, or not all of it. Each reason once."""
-    found = [each for each in estimates if _is_measured(each)]
-    without = dict.fromkeys(str(e.reason) for e in found if not _is_bounded(e) and e.reason)
+    """Sentences on estimates without an interval or with an incomplete one; each reason once."""
+    measured = [each for each in estimates if _is_measured(each)]
+    without = dict.fromkeys(str(e.reason) for e in measured if not _is_bounded(e) and e.reason)
     if without:
         yield f"Without an interval: {'; '.join(without)}."
-    for reason in dict.fromkeys(str(e.reason) for e in found if e.has_interval and e.reason):
+    for reason in dict.fromkeys(str(e.reason) for e in measured if e.has_interval and e.reason):
         yield f"{reason[:1].upper()}{reason[1:]}."
-    if any(_is_narrow(each) for each in found):
+    if any(_is_narrow(each) for each in measured):
         yield "Numbers without an interval: it is narrower than the last digit."
-    yield from of_unknown_size(found)
+    yield from of_unknown_size(measured)
 
 
 def of_unknown_size(estimates: Iterable[Estimate]) -> Iterator[str]:
-    """The sentence on what no interval of theirs has in it; none where there is nothing."""
+    """Sentence on systematic parts of unknown size, which no interval includes, if any."""
     unknown = dict.fromkeys(
         each.source
         for estimate in estimates
@@ -56,7 +56,7 @@ def of_unknown_size(estimates: Iterable[Estimate]) -> Iterator[str]:
 
 
 def shows_interval(estimate: Estimate) -> bool:
-    """Whether it is measured, and its text has an interval or a bound."""
+    """Whether the estimate is measured, and its text has an interval or a bound."""
     return _is_measured(estimate) and _is_bounded(estimate) and not _is_narrow(estimate)
 
 
@@ -71,5 +71,5 @@ def _is_bounded(estimate: Estimate) -> bool:
 
 
 def _is_narrow(estimate: Estimate) -> bool:
-    """Whether an interval is so narrow that the number does without it."""
+    """Whether the interval is narrower than the digits of the number, so that it is not shown."""
     return estimate.has_interval and estimate.half_width < NARROW * abs(estimate.value)

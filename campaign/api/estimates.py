@@ -32,12 +32,12 @@ COLUMNS = (
     "reason_code",
     "reason_values",
 )
-"""What is said of every estimate.
+"""Columns of an estimate.
 
-`low` and `high` are the interval as tables and CSV have it, systematic parts included;
-`scatter_low` and `scatter_high` are what scatter alone leaves; `systematic` is a dict of the parts,
-source to standard uncertainty (None: not known). `reason` is for people; `reason_code` says which
-one it is, and `reason_values`, a dict, what the text has in it, by name.
+`low` and `high`: interval of tables and CSV, systematic parts included. `scatter_low` and
+`scatter_high`: interval from scatter alone. `systematic`: dict of source to standard uncertainty
+(None: unknown). `reason`: text; `reason_code`: its identifier; `reason_values`: dict of the values
+in the text, by name.
 """
 NUMBERS = ("value", "low", "high", "standard_error", "freedom", "scatter_low", "scatter_high")
 
@@ -45,8 +45,8 @@ NUMBERS = ("value", "low", "high", "standard_error", "freedom", "scatter_low", "
 def findings_table(findings: Sequence[Finding], damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """One row per finding (SI): `COLUMNS`, then a column per condition, by its name.
 
-    A condition that would take the place of another column is called `condition.` and its name.
-    `attrs["damaged"]` names, in words, what is damaged of the trials that they are made of.
+    A condition with the name of another column has the prefix `condition.`. `attrs["damaged"]`
+    describes the damage of the underlying trials.
     """
     rows = [
         row_of(finding.known)
@@ -59,18 +59,18 @@ def findings_table(findings: Sequence[Finding], damaged: Iterable[Damage] = ()) 
 def metrics_table(trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """One row per archived metric (SI): `trial`, `COLUMNS`, and `measured_by`."""
     rows = [
-        {"trial": item.trial.number, **row_of(found), "measured_by": item.measured_by}
+        {"trial": item.trial.number, **row_of(estimate), "measured_by": item.measured_by}
         for item in trials
-        for found in item.estimates
+        for estimate in item.estimates
     ]
     return _frame(rows, ("trial", *COLUMNS, "measured_by"), damaged)
 
 
 def row_of(estimate: Estimate) -> dict[str, object]:
-    """An estimate by the names of `COLUMNS`."""
+    """Values of an estimate by column of `COLUMNS`."""
     low, high = estimate.combined
-    said = {name: getattr(estimate, name, None) for name in COLUMNS}
-    return said | {
+    values = {name: getattr(estimate, name, None) for name in COLUMNS}
+    return values | {
         "quantity": estimate.name,
         "origin": estimate.origin.value,
         "low": low,

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def json_text(tree: Any) -> str:
-    """A tree as text; what is no finite number is null, and NumPy's scalars are plain ones."""
+    """JSON text of a tree: non-finite numbers are null, NumPy scalars plain numbers."""
     return json.dumps(_finite(tree), indent=1, ensure_ascii=False) + "\n"
 
 

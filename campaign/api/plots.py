@@ -1,4 +1,4 @@
-"""Figures of a run as matplotlib draws them; the report's drawing code is imported late."""
+"""Figures of a run by matplotlib; imports the report's drawing code on first use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def plot(run: RunReader, found: RunResults, wanted: str) -> Figure:
-    """A figure of the report, of what was found in a run; see `Results.plot`."""
+    """Draw a figure of the report from a run's results; see `Results.plot`."""
     from campaign.report.one_figure import sheet_of
 
     known = {

@@ -1,4 +1,4 @@
-"""Names, conditions and units of findings for a reader."""
+"""Names, conditions and units of findings, for display."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from campaign.text import number, pretty_unit, quantity_words
 from campaign.units import DISPLAY, Quantity, convert
 
 BENCH = "bench."
-"""Before a swept value of the bench."""
+"""Prefix of a swept value of the bench."""
 
 
 def display_unit(test: AnalysedTest, finding: Finding) -> str:
-    """The unit in which the test's own tables show this number, or else its quantity."""
+    """Unit in which the test's tables show this number, else its quantity."""
     return unit_in_tables(test.result.tables, finding.quantity, finding.value, finding.unit)
 
 
 def unit_in_tables(tables: Sequence[Table], quantity: str, value: float, unit: str) -> str:
-    """The unit in which tables show a number (SI) in `unit`, or else its quantity, or else any."""
+    """Unit in which tables show a number (SI, `unit`), else its quantity, else the default unit."""
     columns = [
         (table, column)
         for table in tables
@@ -42,23 +42,23 @@ def unit_in_tables(tables: Sequence[Table], quantity: str, value: float, unit: s
 
 
 def condition_words(test: AnalysedTest, conditions: Mapping[str, Value]) -> str:
-    """`direction positive, frequency 0.24 Hz`; a number of unknown unit is SI."""
-    told = (
+    """`direction positive, frequency 0.24 Hz`; a number of unknown unit is in SI."""
+    words = (
         f"{name.removeprefix(BENCH).replace('_', ' ')} {_value(test, name, value)}"
         for name, value in conditions.items()
         if value is not None
     )
-    return ", ".join(told)
+    return ", ".join(words)
 
 
 def axis_quantity_name(test: AnalysedTest, quantity: str) -> str:
-    """What a quantity is called of the axis of the test's bench: `breakaway force`."""
+    """Name of a quantity in terms of the test's axis: `breakaway force`."""
     with axis_terms(test.sides):
         return quantity_words(quantity)
 
 
 def option_quantity(test: AnalysedTest, name: str) -> Quantity | None:
-    """What an option of the test's experiment measures; `speed` is one of the option `speeds`."""
+    """Quantity of an option of the test's experiment; that of `speeds` for `speed`."""
     fields = test.experiment.options.model_fields if test.experiment else {}
     for path in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
         if path in fields:
@@ -68,12 +68,12 @@ def option_quantity(test: AnalysedTest, name: str) -> Quantity | None:
 
 
 def field_quantity(field: FieldInfo) -> Quantity | None:
-    """What an option measures; of a list, what each of its values does."""
+    """Quantity of an option; for a list, that of its values."""
     return next(_quantities((*field.metadata, field.annotation)), None)
 
 
 def plain(value: Any, quantity: Quantity | None = None) -> str:
-    """A value (SI) of an option or of a bench as text, with the unit that readers are shown."""
+    """Text of an option's or bench's value (SI), in the display unit."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -95,14 +95,14 @@ def _value(test: AnalysedTest, name: str, value: Value) -> str:
         if quantity is None and name in OF_NO_OPTION:
             quantity = OF_NO_OPTION[name].of(test.sides)
         if quantity is None and name.startswith(BENCH) and test.bench is not None:
-            found = number_at(test.bench, name.removeprefix(BENCH))
-            quantity = None if found is None else found[1]
+            field = number_at(test.bench, name.removeprefix(BENCH))
+            quantity = None if field is None else field[1]
         return plain(value, quantity) if quantity else f"{plain(value)} (SI)"
     return str(value)
 
 
 def _quantities(hints: Any) -> Iterator[Quantity]:
-    """Physical quantities in a field's metadata, or inside a list or an optional type of it."""
+    """Quantities in a field's metadata, or in a list or optional type of it."""
     for hint in hints:
         if isinstance(hint, Quantity):
             yield hint

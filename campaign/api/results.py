@@ -1,7 +1,7 @@
 """All results of one run: to inspect, and to keep beside the run.
 
-A file of results is used in place of analysing where it is whole, of this very run, and made by
-this very program; else the run is analysed, and it is said why.
+A results file replaces the analysis if it is undamaged, of this run, and from the same code.
+Otherwise the program analyzes the run and reports why.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ NOT_IN_A_NOTEBOOK = (
     "standard_error", "freedom", "origin", "kind", "method", "scatter_low", "scatter_high",
     "systematic", "reason_code", "reason_values",
 )  # fmt: skip
-"""Columns of numbers that a table to look at leaves out."""
+"""Columns of numbers that a notebook's table leaves out."""
 NO_FILE = "there is no file of results"
 
 
 @dataclass(frozen=True)
 class Results:
-    """What analysis found in a run.
+    """Results of the analysis of a run.
 
     Attributes:
-        found: all of it, as objects.
-        origin: where it is from, in words: the file that was read, or the program that analysed
-            the run just now and why no file was read.
+        found: all results, as objects.
+        origin: text on their source: the file, or the version of the program that analyzed the run
+            and why it did not read a file.
         archive: the run.
     """
 
@@ -64,7 +64,7 @@ class Results:
 
     @property
     def key_numbers(self) -> pd.DataFrame:
-        """What each test was asked for, the most important first; columns as of `findings`."""
+        """Key numbers of each test, the most important first; columns as of `findings`."""
         return self._numbers([(t.name, t.result.key_numbers) for t in self.found.tests])
 
     @property
@@ -101,23 +101,23 @@ class Results:
     def plot(self, figure: str = "") -> Drawing:
         """A figure of the report as a matplotlib figure; a notebook shows it.
 
-        figure: `test/key` as in `figures`; a test's name for its most telling one; a key that one
-            figure alone has; absent: the one on top of the report.
+        figure: `test/key` as in `figures`; a test's name for its most informative figure; a key
+            that only one figure has; absent: the figure at the top of the report.
 
-        Raises UsageError when no figure, or more than one, is meant.
+        Raises UsageError when no figure, or more than one, matches.
         """
         return plot(self.archive, self.found, figure)
 
     @property
     def published(self) -> pd.DataFrame:
-        """The published values beside what was found, in the printed units; empty without any."""
+        """Published values and reproduced values, in the printed units; empty without any."""
         table = self.found.published
         frame = result_table(scoreboard_table(Scoreboard()) if table is None else table)
         return frame.astype(dict.fromkeys(NUMBERS, "float64"))
 
     @property
     def problems(self) -> dict[str, str]:
-        """By test, why it has no result; empty when all have."""
+        """Reason by test for no result; empty when all tests have one."""
         return {test.name: test.problem for test in self.found.tests if test.problem}
 
     def __repr__(self) -> str:
@@ -125,7 +125,7 @@ class Results:
         return f"<results of {self.found.run}: {tests}; {self.origin}>"
 
     def _repr_html_(self) -> str:
-        """In a notebook: the key numbers, and which tests have no result."""
+        """HTML for a notebook: the key numbers, and the tests without a result."""
         parts = [f"<p><code>{escape(repr(self))}</code></p>"]
         numbers = self.key_numbers
         if len(numbers):
@@ -143,9 +143,9 @@ def results_of(
     telling: tuple[str, str] | None = None,
     measured_anew: bool = False,
 ) -> RunResults:
-    """What the analysis of a run found, with what it is of and whose code found it.
+    """Results of a run's analysis, with the identity of the run and of the code.
 
-    `telling`: test and key of the figure that tells most.
+    `telling`: test and key of the leading figure.
     """
     header = run.header
     return RunResults(
@@ -165,10 +165,11 @@ def results_of(
 
 
 def results_view(run: RunReader, *, strict: bool = False, measure_anew: bool = False) -> Results:
-    """The results of a run: from the file beside it where that may be used, else by analysing.
+    """Results of a run: from a usable file beside it, else from an analysis.
 
-    An ArchiveWarning says why a file that is there is not used, and which trials an analysis has to
-    leave out. Raises ArchiveError for both, but for a file of another version, when `strict`.
+    An ArchiveWarning reports why an existing file is not used, and the trials left out. If
+    `strict`, raises ArchiveError for trials left out, and for a file that is damaged or of
+    another run.
     """
     path = results_path(run.path)
     why = NO_FILE
@@ -177,30 +178,30 @@ def results_view(run: RunReader, *, strict: bool = False, measure_anew: bool = F
         if kept is not None:
             return Results(kept, f"read from {path}", run)
         warn(f"{why}; the run is analysed")
-    found = _analysed(run, strict=strict, measure_anew=measure_anew)
-    return Results(found, f"analysed by campaign {__version__}: {why}", run)
+    results = _analysed(run, strict=strict, measure_anew=measure_anew)
+    return Results(results, f"analysed by campaign {__version__}: {why}", run)
 
 
 def _kept(run: RunReader, *, strict: bool, measure_anew: bool) -> tuple[RunResults | None, str]:
-    """What is kept beside a run, or why that is of no use."""
+    """Results from the file beside a run, or the reason not to use it."""
     from campaign.archive.reading.results_file import OtherLayoutError, read_results
 
     path = results_path(run.path)
     try:
-        found = read_results(path, run.identity)
+        results = read_results(path, run.identity)
     except ArchiveError as error:
         if strict and not isinstance(error, OtherLayoutError):
             raise
         return None, str(error)
     why = ""
-    if (found.version, found.sources) != (__version__, code_of(found.tests)):
-        why = f"was made by other code: campaign {found.version}, sources {found.sources[:12]}…"
-    elif found.measured_anew != measure_anew:
-        measured = "anew" if found.measured_anew else "when they were executed"
+    if (results.version, results.sources) != (__version__, code_of(results.tests)):
+        why = f"was made by other code: campaign {results.version}, sources {results.sources[:12]}…"
+    elif results.measured_anew != measure_anew:
+        measured = "anew" if results.measured_anew else "when they were executed"
         why = f"is of recordings that were measured {measured}"
-    elif found.damaged and not run.damaged:
-        why = f"was made when the run was damaged: {found.damaged[0]}"
-    return (None, f"{path}: {why}") if why else (found, "")
+    elif results.damaged and not run.damaged:
+        why = f"was made when the run was damaged: {results.damaged[0]}"
+    return (None, f"{path}: {why}") if why else (results, "")
 
 
 def _analysed(run: RunReader, *, strict: bool, measure_anew: bool) -> RunResults:
@@ -212,12 +213,12 @@ def _analysed(run: RunReader, *, strict: bool, measure_anew: bool) -> RunResults
 
 
 def _is_new(damage: Damage, run: RunReader) -> bool:
-    """Whether it costs a trial and was not told of when the run was opened."""
+    """Whether damage affects a trial and was not reported at opening of the run."""
     return bool(damage.trial) and damage not in run.damaged
 
 
 def code_of(tests: Iterable[AnalysedTest | ResultsOfTest]) -> str:
-    """Hash of the sources of this program and of the installed packages that analyse the tests."""
+    """Hash of the sources of this program and of the installed packages that analyze the tests."""
     known = experiments()
     plug_ins = (known.plug_in(test.kind) for test in tests)
     packages = [name for each in plug_ins if each is not None for name in each.packages]
@@ -245,7 +246,7 @@ _FROM_PRINTED = Cause("from printed", "from what is printed")
 
 
 def scoreboard_table(scoreboard: Scoreboard) -> Table:
-    """The scoreboard as a table: a row per published number, in the unit it is printed in."""
+    """The scoreboard as a table: one row per published number, in its printed unit."""
     columns = (
         Column("table", "Table"),
         Column("row", "Row"),
@@ -269,7 +270,7 @@ def scoreboard_table(scoreboard: Scoreboard) -> Table:
 
 
 def _line(line: Line) -> dict[str, Cell]:
-    """Its cells under the names of this table's columns."""
+    """Cells of a line by column of `scoreboard_table`."""
     own: dict[str, Cell] = {
         "deviation": line.deviation,
         "reason": line.why or line.cell.reason,
@@ -279,10 +280,10 @@ def _line(line: Line) -> dict[str, Cell]:
 
 
 def _beside_test(findings: Sequence[Finding]) -> Sequence[Finding]:
-    """With a condition that is called `test` renamed: the column of that name says whose it is."""
+    """Rename the condition `test` of findings: the column `test` holds the name of the test."""
 
     def renamed(finding: Finding) -> Finding:
-        told = {("condition.test" if n == "test" else n): v for n, v in finding.conditions.items()}
-        return replace(finding, conditions=told)
+        new = {("condition.test" if n == "test" else n): v for n, v in finding.conditions.items()}
+        return replace(finding, conditions=new)
 
     return [renamed(each) if "test" in each.conditions else each for each in findings]

@@ -1,4 +1,4 @@
-"""An archived run: its tests and trials as tables, and each of them by name or number."""
+"""An archived run: tables of its tests and trials; access to each by name or number."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class RunView:
     """A run; iterating over it gives its executed trials, failed ones included, in plan order.
 
     Attributes:
-        strict: whether an analysis refuses to leave a damaged trial out.
-        measure_anew: whether an analysis leaves aside what was measured when it was executed.
+        strict: whether a damaged trial that an analysis leaves out is an error.
+        measure_anew: whether an analysis ignores the archived metrics.
     """
 
     archive: RunReader
@@ -51,17 +51,17 @@ class RunView:
 
     @property
     def status(self) -> RunStatus:
-        """How the run stands."""
+        """Status of the run."""
         return self.archive.status
 
     @property
     def header(self) -> RunHeader:
-        """What was known before the first trial: protocol, versions, host, operator, tags ..."""
+        """Facts from before the first trial: protocol, versions, host, operator, tags ..."""
         return self.archive.header
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
-        """What was found, in opening it, damaged, missing or not as it was archived."""
+        """Damaged, missing or changed contents that were detected at opening."""
         return self.archive.damaged
 
     @property
@@ -71,8 +71,8 @@ class RunView:
 
         views = self._tests()
         planned = Counter(trial.test for trial in self.archive.plan)
-        told = self.archive.outlines
-        done = Counter(each.test for each in told if each.outcome is Outcome.COMPLETED)
+        outlines = self.archive.outlines
+        done = Counter(each.test for each in outlines if each.outcome is Outcome.COMPLETED)
         rows = [
             (view.kind, view.title, planned[view.name], len(view), done[view.name])
             for view in views
@@ -89,25 +89,25 @@ class RunView:
     def trials(self) -> pd.DataFrame:
         """One row per executed trial, its number as index.
 
-        A trial that cannot be read has no row; `attrs["damaged"]` names it.
+        An unreadable trial has no row; `attrs["damaged"]` names it.
         """
         return trials_table(self.archive.trials, self.damaged)
 
     def metrics(self) -> pd.DataFrame:
-        """One row per executed trial: as `trials`, then what was measured in its recording (SI).
+        """One row per executed trial: columns of `trials`, then the metrics of its recording (SI).
 
-        `attrs["units"]` has the units. A test's `metrics` tell more: reasons, methods, origins.
+        `attrs["units"]` has the units. A test's `metrics` add reasons, methods and origins.
         """
         return metrics_by_trial(self.archive.trials, self.damaged)
 
     @cached_property
     def results(self) -> Results:
-        """What analysis finds in all tests: read from `RUN-results.nxs`, or analysed by now.
+        """Results of all tests: from `RUN-results.nxs`, or from an analysis now.
 
-        A file of another run or of another version of the program, or one that is damaged, is not
-        used, and an ArchiveWarning says why; `origin` says which it was. Raises ArchiveError when
-        the run was opened with `strict` and the file is damaged or of another run, or a trial would
-        be left out of the analysis.
+        The file is not used if it is damaged or of another run or version of the program; an
+        ArchiveWarning reports why. `origin` states the source. If the run was opened with `strict`,
+        raises ArchiveError for a file that is damaged or of another run, and for trials that the
+        analysis leaves out.
         """
         return results_view(self.archive, strict=self.strict, measure_anew=self.measure_anew)
 
@@ -118,7 +118,7 @@ class RunView:
     def test(self, name: str) -> TestView:
         """The test of that name.
 
-        Raises UsageError naming those there are; ArchiveError when what names them is damaged.
+        Raises UsageError without such a test, ArchiveError if the list of tests is damaged.
         """
         views = {view.name: view for view in self._tests()}
         if name in views:
@@ -130,13 +130,13 @@ class RunView:
         raise UsageError(f"{self.name}: there is no test {name!r}; {hint}")
 
     def __getitem__(self, name: str) -> TestView:
-        """The same as `test`: `run["map"].findings`."""
+        """Same as `test`: `run["map"].findings`."""
         return self.test(name)
 
     def trial(self, number: int | str) -> TrialView:
-        """The trial of that number, or of that name: `trial-00017`.
+        """The trial of that number or name (`trial-00017`).
 
-        Raises UsageError when it was not executed, ArchiveError when it was and cannot be read.
+        Raises UsageError if it was not executed, ArchiveError if it is unreadable.
         """
         number = trial_number(number) if isinstance(number, str) else number
         if archived := self.archive.executed(number):
@@ -163,17 +163,17 @@ class RunView:
         return "\n".join([*lines, *(f"  {view.name} ({view.kind}): {len(view)}" for view in tests)])
 
     def _repr_html_(self) -> str:
-        """In a notebook: the first line of `repr`, and its tests as a table."""
+        """HTML for a notebook: the first line of `repr`, and the table of tests."""
         first = escape(repr(self).splitlines()[0])
         return f"<p><code>{first}</code></p>{self.tests.to_html()}"
 
     def _tests(self) -> list[TestView]:
-        """The protocol's tests, and any other that a trial belongs to."""
-        told = {str(test.get("name", "")): test for test in self.archive.tests}
+        """Tests of the protocol, then other tests that have trials."""
+        entries = {str(test.get("name", "")): test for test in self.archive.tests}
         kinds = {each.test: each.kind for each in self.archive.outlines}
         views = []
-        for name in dict.fromkeys((*told, *kinds)):
-            test = told.get(name, {})
+        for name in dict.fromkeys((*entries, *kinds)):
+            test = entries.get(name, {})
             options = test.get("options")
             views.append(
                 TestView(

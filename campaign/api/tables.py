@@ -26,15 +26,14 @@ COLUMNS = (
     "duration",
     "seed",
 )
-"""What the table of trials says of every trial, before the swept values."""
+"""Columns of the table of trials, before the swept values."""
 
 
 def trials_table(trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """One row per executed trial, its number as index; swept values (SI) by their dotted path.
 
-    `duration` is the planned one (s). A swept value that would take the place of another column is
-    called `point.` and its path. A trial that cannot be read has no row: `attrs["damaged"]` names
-    it, in words.
+    `duration` is the planned one (s). A swept value with the name of another column has the prefix
+    `point.`. An unreadable trial has no row; `attrs["damaged"]` names it in words.
     """
     return _table([(each.trial.number, _row(each)) for each in trials], damaged)
 
@@ -59,25 +58,25 @@ def _table(
 def metrics_by_trial(
     trials: Iterable[ArchivedTrial], damaged: Iterable[Damage] = ()
 ) -> pd.DataFrame:
-    """The table of trials with a column for each metric (SI), and its interval as `_low`, `_high`.
+    """Table of trials with a column for each metric (SI), and its interval as `_low`, `_high`.
 
-    NaN where a trial has no such metric, or no interval of it. `attrs["units"]` has the units.
+    NaN if a trial lacks the metric or its interval. `attrs["units"]` has the units.
     """
     import pandas as pd
 
     rows: list[tuple[int, dict[str, object]]] = []
     units: dict[str, str] = {}
-    found: dict[str, dict[int, float | None]] = {}
+    values: dict[str, dict[int, float | None]] = {}
     for archived in trials:
         rows.append((archived.trial.number, _row(archived)))
         for each in archived.estimates:
             units[each.name] = each.unit
             low, high = each.combined
-            told = {each.name: each.value, f"{each.name}_low": low, f"{each.name}_high": high}
-            for name, value in told.items():
-                found.setdefault(name, {})[archived.trial.number] = value
+            numbers = {each.name: each.value, f"{each.name}_low": low, f"{each.name}_high": high}
+            for name, value in numbers.items():
+                values.setdefault(name, {})[archived.trial.number] = value
     table = _table(rows, damaged)
-    columns = pd.DataFrame({n: pd.Series(v, dtype=float) for n, v in found.items()}, table.index)
+    columns = pd.DataFrame({n: pd.Series(v, dtype=float) for n, v in values.items()}, table.index)
     wide = pd.concat([table, columns], axis=1)
     wide.attrs = {**table.attrs, "units": units}
     return wide
@@ -85,7 +84,7 @@ def metrics_by_trial(
 
 def _row(archived: ArchivedTrial) -> dict[str, object]:
     trial, ending = archived.trial, archived.ending
-    said = (
+    cells = (
         trial.test,
         trial.kind,
         trial.role.value,
@@ -97,7 +96,7 @@ def _row(archived: ArchivedTrial) -> dict[str, object]:
         trial.task.duration,
         trial.seed,
     )
-    row: dict[str, object] = dict(zip(COLUMNS, said, strict=True))
+    row: dict[str, object] = dict(zip(COLUMNS, cells, strict=True))
     for path, value in trial.point.items():
         row[f"point.{path}" if path in COLUMNS else path] = value
     return row
@@ -106,10 +105,9 @@ def _row(archived: ArchivedTrial) -> dict[str, object]:
 def result_table(table: Table, damaged: Iterable[Damage] = ()) -> pd.DataFrame:
     """A table of an analysis, unrounded, SI; `attrs` has its title, units and labels.
 
-    After the table's own columns, `<name>_low` and `<name>_high` of each that has estimates: their
-    95 % intervals, systematic parts included. `attrs["estimates"]` has the estimates themselves, by
-    column and row; `attrs["damaged"]` names, in words, what is damaged of the trials that the table
-    should be made of.
+    After the table's own columns, `<name>_low` and `<name>_high` for each column with estimates:
+    their 95 % intervals, systematic parts included. `attrs["estimates"]` has the estimates by
+    column and row; `attrs["damaged"]` describes the damage of the table's trials.
     """
     import pandas as pd
 
@@ -118,9 +116,9 @@ def result_table(table: Table, damaged: Iterable[Damage] = ()) -> pd.DataFrame:
         [{name: bare(cell) for name, cell in row.items()} for row in table.rows], columns=names
     )
     estimates = {name: _estimates(table, name) for name in names}
-    for name, found in estimates.items():
-        if found:
-            ends = [found[k].combined if k in found else (None, None) for k in range(len(frame))]
+    for name, own in estimates.items():
+        if own:
+            ends = [own[k].combined if k in own else (None, None) for k in range(len(frame))]
             frame[f"{name}_low"] = pd.array([low for low, _ in ends], dtype="Float64").astype(float)
             frame[f"{name}_high"] = pd.array([high for _, high in ends], dtype="Float64").astype(
                 float
@@ -129,13 +127,13 @@ def result_table(table: Table, damaged: Iterable[Damage] = ()) -> pd.DataFrame:
         "title": table.title,
         "units": {column.name: column.unit for column in table.columns},
         "labels": {column.name: column.label for column in table.columns},
-        "estimates": {name: found for name, found in estimates.items() if found},
+        "estimates": {name: own for name, own in estimates.items() if own},
         "damaged": [in_words(damage) for damage in damaged],
     }
     return frame
 
 
 def _estimates(table: Table, name: str) -> dict[int, Estimate]:
-    """The estimates of a column by the number of their row, from 0."""
+    """Estimates of a column by row index, from 0."""
     cells = ((number, row.get(name)) for number, row in enumerate(table.rows))
     return {number: cell for number, cell in cells if isinstance(cell, Estimate)}

@@ -1,4 +1,4 @@
-"""One test of an archived run: its trials, and what its analysis finds."""
+"""One test of an archived run: its trials and its analysis."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class TestView:
     """One test of a run; iterating over it gives its executed trials.
 
     Attributes:
-        options: normalised (SI), before the sweep.
+        options: normalized (SI), before the sweep.
         archived: its executed trials, in plan order.
-        run: where the run lies.
-        damaged: what was found damaged, in opening the run, of this test, or of no trial.
-        strict: whether an analysis that has to leave a trial out is an error.
-        measure_anew: whether recordings are measured by this program, whatever is archived of them.
+        run: path of the run.
+        damaged: damage of this test, or of no trial, that was detected at opening of the run.
+        strict: whether a damaged trial that an analysis leaves out is an error.
+        measure_anew: whether the analysis measures the recordings and ignores archived metrics.
     """
 
-    __test__ = False  # it is not one of pytest's
+    __test__ = False  # no class of pytest's
 
     name: str
     kind: str
@@ -58,18 +58,18 @@ class TestView:
 
     @property
     def result(self) -> Result:
-        """What the experiment's analysis finds in these trials, by this program; computed once.
+        """Result of the experiment's analysis of these trials; computed once.
 
-        Trials that are damaged are left out, and an ArchiveWarning names them.
+        The analysis leaves damaged trials out; an ArchiveWarning names them.
 
-        Raises UsageError when no experiment of that kind is installed, ArchiveError when a trial
-        would be left out and the run was opened with `strict`.
+        Raises UsageError if no experiment of that kind is installed; ArchiveError for trials left
+        out if the run was opened with `strict`.
         """
         return self._analysed[0]
 
     @cached_property
     def _analysed(self) -> tuple[Result, tuple[Damage, ...]]:
-        """The result, and what is damaged of that which it should be made of."""
+        """The result, and the damage of the underlying trials."""
         experiment = experiments().get(self.kind)
         if experiment is None:
             raise UsageError(f"no experiment is called {self.kind!r}; install what provides it")
@@ -80,8 +80,8 @@ class TestView:
         trials = tuple(self.archived)
         if self.measure_anew:
             trials = tuple(trial.unmeasured() for trial in trials)
-        result, _, found = without_damaged(self.run, trials, analyse)
-        damaged = tuple(dict.fromkeys((*self.damaged, *found)))
+        result, _, detected = without_damaged(self.run, trials, analyse)
+        damaged = tuple(dict.fromkeys((*self.damaged, *detected)))
         left_out = [damage for damage in damaged if damage.trial]
         tell(self.run, left_out, strict=self.strict)
         return result, damaged
@@ -90,7 +90,7 @@ class TestView:
     def tables(self) -> dict[str, pd.DataFrame]:
         """The tables of the analysis by their key, unrounded, SI; units in `attrs`.
 
-        `attrs["damaged"]` says what is damaged of the trials that they should be made of.
+        `attrs["damaged"]` describes the damage of the underlying trials.
         """
         result, damaged = self._analysed
         return {table.key: result_table(table, damaged) for table in result.tables}
@@ -103,10 +103,9 @@ class TestView:
 
     @property
     def metrics(self) -> pd.DataFrame:
-        """What was measured in each recording when it was executed (SI), one row per number.
+        """Metrics of each recording from execution (SI), one row per number; may be empty.
 
-        After the number of the trial, the columns are those of `findings`; the last one says which
-        code measured it. Empty where nothing was.
+        Columns: number of the trial, columns of `findings`, and last the code that measured it.
         """
         return metrics_table(self.archived, self.damaged)
 

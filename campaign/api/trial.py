@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TrialView:
-    """One trial of a run. Samples are read anew by every method that returns some.
+    """One trial of a run. Every method that returns samples reads them again.
 
     Attributes:
-        cut: the part of the time that is looked at (start, stop) (s); None for all of it.
-        damaged: what is known to be damaged of its run. No method returns damaged samples.
+        cut: selected time (start, stop) (s); None for all.
+        damaged: known damage of its run. No method returns damaged samples.
     """
 
     archived: ArchivedTrial = field(repr=False)
@@ -41,16 +41,16 @@ class TrialView:
 
     @property
     def trial(self) -> Trial:
-        """What was executed: test, point, options, bench, task, seed."""
+        """Definition of the trial: test, point, options, bench, task, seed."""
         return self.archived.trial
 
     @property
     def ending(self) -> Ending:
-        """How it ended and why."""
+        """Outcome and reason."""
         return self.archived.ending
 
     def window(self, start: float | None = None, stop: float | None = None) -> TrialView:
-        """The same trial, cut to start <= time < stop (s); absent: the analysis' own window."""
+        """The same trial, cut to start <= time < stop (s); absent: the window of the analysis."""
         first, last = self.trial.task.window
         cut = (first if start is None else start, last if stop is None else stop)
         return replace(self, cut=cut)
@@ -107,9 +107,9 @@ class TrialView:
         return f"<{self.name}: {self.trial.label}{cut}; {ended}>"
 
     def _repr_html_(self) -> str:
-        """In a notebook: `repr`, and its metrics as a table."""
-        told = metrics_table([self.archived]).to_html()
-        return f"<p><code>{escape(repr(self))}</code></p>{told}"
+        """HTML for a notebook: `repr`, and the table of metrics."""
+        metrics = metrics_table([self.archived]).to_html()
+        return f"<p><code>{escape(repr(self))}</code></p>{metrics}"
 
 
 def _described(unit: str, label: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""A calibration result as TOML, and the bench file with fitted values and how they are known."""
+"""TOML file of a calibration's result, and the bench file with fitted values and intervals."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ HEADER = """\
 
 
 LEAST_CORRELATION = 0.1
-"""below which two values count as told apart."""
+"""Correlations below this magnitude are not written."""
 ASSUMPTION = (
     "cells deviate independently, each by its standard deviation times the scatter; linear at the "
     "optimum; the structure of the bench counts as right"
 )
-"""What the covariance takes as true."""
+"""Assumptions of the covariance."""
 
 
 def result_text(outcome: CalibrationOutcome, bench_name: str, bench: str = "") -> str:
-    """The result.
+    """TOML text of the result.
 
     Args:
-        bench_name: the file that the calibrated bench goes to.
-        bench: its text, which states the fingerprint.
+        bench_name: file of the calibrated bench.
+        bench: its text, with the fingerprint.
     """
     import tomlkit
 
@@ -71,7 +71,7 @@ def result_text(outcome: CalibrationOutcome, bench_name: str, bench: str = "") -
 
 
 def interruption(outcome: CalibrationOutcome) -> str:
-    """What an interrupted calibration lacks."""
+    """Sentence on the missing parts of an interrupted calibration."""
     if outcome.uncertainty is None:
         return "interrupted: the best values so far are kept, without intervals"
     return "interrupted: the fit is whole, the leave-one-out error is not"
@@ -80,10 +80,10 @@ def interruption(outcome: CalibrationOutcome) -> str:
 def bench_text(
     source: Source, space: Space, values: Sequence[float], known: Mapping[str, Any]
 ) -> str:
-    """The bench's own text with the values in their places; comments stay.
+    """Bench file with the values; comments and units of the file stay.
 
-    A value keeps the unit that the file writes it in. `known`: entries of the bench's table of that
-    name; its fingerprint is stated anew.
+    `known`: entries for the bench's table `known`; its fingerprint is updated. Raises CampaignError
+    if the file has no value at a path.
     """
     content = source.text.encode()
     edits: list[tuple[int, int, str]] = []
@@ -102,14 +102,14 @@ def bench_text(
 def known_entries(
     outcome: CalibrationOutcome, fitted: Iterable[str], document: str
 ) -> dict[str, Any]:
-    """Entries of a bench's table `known`, as TOML has them.
+    """Entries of a bench's table `known`, for TOML.
 
-    Every fitted value has an entry: one that the cells do not determine has no interval, and takes
-    away the one that an earlier calibration left there.
+    Every fitted value has an entry, to replace that of an earlier calibration. The entry has no
+    interval if the cells do not determine the value.
 
     Args:
-        fitted: the cells, as a bench names them.
-        document: whose cells they are, as the bench names it.
+        fitted: names of the cells in the bench file.
+        document: name of their document in the bench file.
     """
     entries: dict[str, Any] = {"document": document, "fitted": list(fitted)}
     entries["values"] = dict(_values(outcome))
@@ -129,9 +129,9 @@ def _values(outcome: CalibrationOutcome) -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def _ends(outcome: CalibrationOutcome, index: int) -> tuple[float, ...]:
-    """Of the 95 % interval, in shares of the range; empty where the cells determine nothing.
+    """Ends of the 95 % interval, in shares of the range; empty if not determined.
 
-    It holds wherever parameters are that ended at a bound.
+    The interval is valid for any true value of the parameters at a bound.
     """
     certainty = outcome.uncertainty
     if certainty is None or certainty.bound[index] or certainty.open[index]:
@@ -141,7 +141,7 @@ def _ends(outcome: CalibrationOutcome, index: int) -> tuple[float, ...]:
 
 
 def _correlations(outcome: CalibrationOutcome) -> Iterator[list[Any]]:
-    """Pairs of paths whose errors go together; fields of one parameter do so wholly."""
+    """Pairs of paths with correlated errors; fields of one parameter correlate fully."""
     certainty = outcome.uncertainty
     if certainty is None:
         return
@@ -173,12 +173,12 @@ def _as_written(tree: Any, keys: Sequence[str], parameter: Parameter, value: flo
 
 def _fit(outcome: CalibrationOutcome) -> Iterator[tuple[str, Any]]:
     problem = outcome.problem
-    found = [outcome.fitted.found.get(t.cell.path) for t in problem.targets]
+    reproduced = [outcome.fitted.found.get(t.cell.path) for t in problem.targets]
     yield "cost", _short(outcome.cost)
     yield "cost_before", _short(outcome.cost_before)
     yield "cells", len(problem.targets)
     yield "parameters", len(problem.space.parameters)
-    yield from _summary(deviations(problem.targets, found))
+    yield from _summary(deviations(problem.targets, reproduced))
     yield "starts_finished", len(outcome.starts)
     yield "starts_that_agree", agreeing(outcome.starts)
     if outcome.uncertainty is not None:
@@ -207,7 +207,7 @@ def _parameter(outcome: CalibrationOutcome, index: int) -> Iterator[tuple[str, A
     yield "value", parameter.text(unknown.value(share))
     certainty = outcome.uncertainty
     half = float(certainty.half_width[index]) if certainty is not None else math.nan
-    if math.isfinite(half) and half < 10.0:  # ten times the range says nothing
+    if math.isfinite(half) and half < 10.0:  # ten times the range is no information
         ends = (unknown.value(share - half), unknown.value(share + half))
         yield "interval_95", [parameter.text(end) for end in ends]
         if certainty is not None and any(certainty.bound):
@@ -243,8 +243,8 @@ def _correlation(outcome: CalibrationOutcome) -> dict[str, Any]:
         [round(float(r), 3) + 0.0 if math.isfinite(r) else "" for r in row]
         for row in certainty.correlation
     ]
-    told = [[a, b, round(r, 3)] for a, b, r in pairs]
-    return {"parameters": names, "strong": _rows(told), "matrix": _rows(matrix)}
+    entries = [[a, b, round(r, 3)] for a, b, r in pairs]
+    return {"parameters": names, "strong": _rows(entries), "matrix": _rows(matrix)}
 
 
 def _covariance(outcome: CalibrationOutcome) -> dict[str, Any]:
@@ -254,38 +254,38 @@ def _covariance(outcome: CalibrationOutcome) -> dict[str, Any]:
         return {}
     names = [parameter.name for parameter in outcome.problem.space.parameters]
     rows = _rows([[_short(float(c)) for c in row] for row in matrix])
-    told = {"assumption": ASSUMPTION, "freedom": certainty.freedom, "parameters": names}
-    return {**told, "matrix": rows}
+    head = {"assumption": ASSUMPTION, "freedom": certainty.freedom, "parameters": names}
+    return {**head, "matrix": rows}
 
 
 def _propagation(outcome: CalibrationOutcome, bench: str) -> dict[str, Any]:
-    """What `published.calibrated` reads: written last, as most of it is for a program."""
-    found = outcome.propagation
-    if found is None:
+    """Table that `published.calibration_covariance` reads; last, as it is mainly for programs."""
+    propagation = outcome.propagation
+    if propagation is None:
         return {}
     stated = tomllib.loads(bench).get("known", {}).get("fingerprint", {})
     return {
-        "protocol": found.protocol,
+        "protocol": propagation.protocol,
         "fingerprint": stated.get("bench", ""),
-        "freedom": found.freedom,
-        "lost": found.lost,
-        "standard_uncertainty": {k: _short(v) for k, v in found.uncertainty.items()},
+        "freedom": propagation.freedom,
+        "lost": propagation.lost,
+        "standard_uncertainty": {k: _short(v) for k, v in propagation.uncertainty.items()},
     }
 
 
 def _cell(outcome: CalibrationOutcome, target: Target) -> Iterator[tuple[str, Any]]:
-    found = outcome.fitted.found.get(target.cell.path)
+    fitted = outcome.fitted.found.get(target.cell.path)
     before = outcome.before.found.get(target.cell.path)
     yield "cell", target.cell.path
     yield "unit", target.cell.unit
     yield "published", target.cell.value
-    for name, value in (("fitted", found), ("before", before)):
+    for name, value in (("fitted", fitted), ("before", before)):
         if value is not None:
             yield name, _short(value)
-    if math.isfinite(percent := target.percent(found)):
+    if math.isfinite(percent := target.percent(fitted)):
         yield "deviation_percent", _short(percent)
     yield "standard_deviation", target.weight
-    yield "residual", _short(target.residual(found))
+    yield "residual", _short(target.residual(fitted))
 
 
 def _left_out(outcome: CalibrationOutcome) -> dict[str, Any]:
@@ -314,7 +314,7 @@ def _without(left: LeftOut) -> dict[str, Any]:
 
 
 def _rows(rows: Sequence[Sequence[Any]]) -> Any:
-    """A TOML array with a row on each line."""
+    """TOML array with one row per line."""
     import tomlkit
 
     array = tomlkit.array()
@@ -323,5 +323,5 @@ def _rows(rows: Sequence[Sequence[Any]]) -> Any:
 
 
 def _short(value: float) -> float:
-    """To six digits, which no last bit of a sum reaches; -0 is 0."""
+    """Round to six digits, which rounding errors do not affect; -0 becomes 0."""
     return float(f"{value:.6g}") + 0.0

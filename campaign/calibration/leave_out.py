@@ -21,8 +21,7 @@ class LeftOut:
 
     Attributes:
         value: of the condition, SI.
-        found: what the refitted bench reproduces of these cells, printed unit; None for a cell
-            that it does not find.
+        found: values of these cells from the refitted bench, printed unit; None if missing.
     """
 
     value: float | int | str
@@ -56,20 +55,20 @@ def leave_one_out(
             continue
         phase = f"without {condition} {number} of {len(groups)}"
         end = fit_from(objective, optimum, settings, phase, display, used=mask).end
-        found = simulation.evaluate(problem.space.values(end)).found
+        predicted = simulation.evaluate(problem.space.values(end)).found
         objective.evaluations += 1
         results.append(
             LeftOut(
                 value,
                 tuple(targets[i] for i in left),
-                tuple(found.get(targets[i].cell.path) for i in left),
+                tuple(predicted.get(targets[i].cell.path) for i in left),
             )
         )
     return results
 
 
 def deviations(targets: Sequence[Target], found: Sequence[float | None]) -> Array:
-    """Deviations in percent; NaN where that means nothing (`Target.percent`)."""
+    """Deviations in percent; NaN as in `Target.percent`."""
     return np.array([t.percent(value) for t, value in zip(targets, found, strict=True)])
 
 

@@ -34,7 +34,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True)
 class FinishedTrial:
-    """A trial with its recording in memory, as an analysis takes it."""
+    """A trial with its recording in memory, for an analysis."""
 
     trial: Trial
     record: Recording
@@ -54,12 +54,11 @@ class FinishedTrial:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What one set of values reproduces.
+    """Reproduced cells for one set of values.
 
     Attributes:
-        found: cell path to reproduced value in the printed unit; cells that no trial found are
-            absent.
-        problems: sentences on what went wrong.
+        found: reproduced value by cell path, in the printed unit; without missing cells.
+        problems: sentences on failures.
     """
 
     found: Mapping[str, float]
@@ -81,7 +80,7 @@ class Simulation:
         self._backend = SimBackend(SimOptions.model_validate(step, context={"si": True}))
 
     def check(self) -> Evaluation:
-        """What the bench reproduces as it is. Raises UsageError when a cell cannot be found."""
+        """Evaluate the unchanged bench. Raises UsageError for a cell that no test reproduces."""
         present = self._problem.space.present
         try:
             groups = [trials for _, trials in self._planned(present)]
@@ -103,7 +102,7 @@ class Simulation:
         return evaluation
 
     def trials(self) -> int:
-        """How many trials one evaluation takes."""
+        """Count of trials of one evaluation."""
         present = self._problem.space.present
         return sum(len(trials) for _, trials in self._planned(present))
 
@@ -112,22 +111,22 @@ class Simulation:
         return residuals(self._problem.targets, self.evaluate(values).found)
 
     def residuals_of_all(self, sets: Sequence[Sequence[float]]) -> list[Array]:
-        """Residuals of several sets of values, as many at once as there are workers."""
+        """Residuals of several sets of values, one set per worker at a time."""
         if self._workers == 1 or len(sets) == 1:
             return [self.residuals(values) for values in sets]
 
         def one(values: Sequence[float]) -> Array:
-            found = self.evaluate(values, alone=False).found
-            return residuals(self._problem.targets, found)
+            reproduced = self.evaluate(values, alone=False).found
+            return residuals(self._problem.targets, reproduced)
 
         return self._at_once(one, sets)
 
     def evaluate(self, values: Sequence[float], *, alone: bool = True) -> Evaluation:
-        """Simulate every test with `values` (SI) and hold its findings against the targets.
+        """Simulate every test with `values` (SI) and compare its findings with the targets.
 
         Args:
             values: in the order of the parameters.
-            alone: whether the workers are free for the trials of this evaluation.
+            alone: whether this evaluation may use all workers for its trials.
         """
         try:
             planned = list(self._planned(values))
@@ -148,10 +147,10 @@ class Simulation:
             )
             evidence.append(self._analyse(test, finished, problems))
         board = score(self._published, evidence)
-        found = {
+        reproduced = {
             line.cell.path: line.reproduced for line in board.lines if line.reproduced is not None
         }
-        return Evaluation(found, (*problems, *board.problems))
+        return Evaluation(reproduced, (*problems, *board.problems))
 
     def _planned(self, values: Sequence[float]) -> Iterator[tuple[Test, tuple[Trial, ...]]]:
         calibration = self._problem.calibration
@@ -168,7 +167,7 @@ class Simulation:
             yield test, expanded.trials
 
     def _batches(self, trials: Iterable[Trial]) -> Iterator[tuple[Trial, ...]]:
-        """Trials that are simulated together, as far as there are enough of a kind."""
+        """Batches of trials for joint simulation; single trials of groups that are too small."""
         groups: dict[Hashable, list[Trial]] = {}
         for trial in trials:
             groups.setdefault(self._group(trial), []).append(trial)
@@ -181,10 +180,10 @@ class Simulation:
         try:
             return self._backend.group(trial)
         except (ArithmeticError, ValueError, CampaignError):
-            return trial.number  # it goes alone, and fails
+            return trial.number  # executed alone; it fails
 
     def _execute(self, batch: Sequence[Trial]) -> list[FinishedTrial]:
-        """Trials that fail are recordings like any other."""
+        """Simulate a batch; a failed trial has a recording like any other."""
         recorders = [MemoryRecorder() for _ in batch]
         stops = [self._stopped.is_set] * len(batch)
         endings: dict[int, Ending] = {}
@@ -211,7 +210,7 @@ class Simulation:
         try:
             with axis_terms(sides_in(data.trials[0].trial.bench)):
                 findings = in_axis_units(analysed(experiment, with_named_tables(data))).findings
-        except Exception as error:  # noqa: BLE001 (a fit wanders where no analysis was tried)
+        except Exception as error:  # noqa: BLE001 (a fit tries values that are new to the analysis)
             problems.append(f"{name}: the analysis failed: {type(error).__name__}: {error}")
             findings = ()
         return evidence_of(name, reproduces, findings, bench_of(first))

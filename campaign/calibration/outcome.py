@@ -20,19 +20,19 @@ from campaign.protocol.calibration import CalibrationOptions
 
 @dataclass(frozen=True)
 class CalibrationOutcome:
-    """What a calibration found.
+    """Result of a calibration.
 
     Attributes:
-        shares: the best point, in shares of the parameters' ranges, shape (n,).
-        cost: there, and `cost_before` with the bench as it was.
-        fitted, before: what the bench reproduces at both.
-        starts: those that came to their end, in order.
+        shares: best point, in shares of the parameters' ranges, shape (n,).
+        cost, cost_before: at the best point, and with the original bench.
+        fitted, before: values that the bench reproduces at both.
+        starts: completed starts, in order.
         uncertainty: None when the calibration was interrupted.
-        left_out: empty when it was not asked for or cannot be had.
+        left_out: empty if not requested or not possible.
         propagation: None when it was interrupted, or an unknown is not determined.
-        was_fitted: false where the bench was taken as it is.
+        was_fitted: false if the bench was used unchanged.
         evaluations: of the bench, derivatives included.
-        interrupted: whether somebody stopped it; the best point so far is kept.
+        interrupted: whether the user stopped it; the best point so far is kept.
     """
 
     problem: CalibrationProblem
@@ -51,7 +51,7 @@ class CalibrationOutcome:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The parameters, SI."""
+        """Fitted parameters, SI."""
         return self.problem.space.values(self.shares)
 
 
@@ -68,10 +68,10 @@ def calibrate(
     """Fit the problem's parameters. A KeyboardInterrupt ends it with the best point so far.
 
     Args:
-        fit: else the bench stays as it is, and only what is known of it is worked out.
-        propagated: whose tests the uncertainty is carried to; the problem's own ones when None.
+        fit: false: keep the bench and only estimate its uncertainty.
+        propagated: protocol with the tests for the propagation; None: the problem's own tests.
 
-    Raises UsageError, or ProtocolError, when the tests do not find what the cells are.
+    Raises UsageError, or ProtocolError, if the tests do not reproduce the cells.
     """
     simulation = Simulation(problem, experiments, workers)
     before = simulation.check()
@@ -84,24 +84,24 @@ def calibrate(
     settings = _settings(problem.options)
     if not fit:
         settings = replace(settings, starts=0)
-    found = search(objective, settings, display)
+    optimum = search(objective, settings, display)
     left: list[LeftOut] = []
-    carried: Propagation | None = None
-    interrupted = found.interrupted
+    propagation: Propagation | None = None
+    interrupted = optimum.interrupted
     try:
         if fit and leave_out and problem.options.leave_out and not interrupted:
-            left = leave_one_out(problem, simulation, objective, settings, display, found.shares)
-        if found.uncertainty is not None:
+            left = leave_one_out(problem, simulation, objective, settings, display, optimum.shares)
+        if optimum.uncertainty is not None:
             source = propagated or problem.protocol
             tests = tests_of(problem, source.tests) if propagated else problem.tests
-            carried = propagate(
+            propagation = propagate(
                 problem,
                 tests,
                 source.path.name,
-                found.shares,
-                found.uncertainty,
+                optimum.shares,
+                optimum.uncertainty,
                 experiments,
-                cost=found.cost,
+                cost=optimum.cost,
                 workers=workers,
                 display=display,
             )
@@ -109,17 +109,17 @@ def calibrate(
         interrupted = True
     return CalibrationOutcome(
         problem=problem,
-        shares=found.shares,
-        cost=found.cost,
-        cost_before=found.cost_before,
-        fitted=simulation.evaluate(problem.space.values(found.shares)),
+        shares=optimum.shares,
+        cost=optimum.cost,
+        cost_before=optimum.cost_before,
+        fitted=simulation.evaluate(problem.space.values(optimum.shares)),
         before=before,
-        starts=found.starts,
-        uncertainty=found.uncertainty,
+        starts=optimum.starts,
+        uncertainty=optimum.uncertainty,
         left_out=tuple(left),
         evaluations=objective.evaluations,
         interrupted=interrupted,
-        propagation=carried,
+        propagation=propagation,
         was_fitted=fit,
     )
 

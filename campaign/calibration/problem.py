@@ -1,4 +1,4 @@
-"""From a protocol's `[calibration]` to a problem; every mistake has its place."""
+"""Calibration problem from a protocol's `[calibration]`; every mistake has its place."""
 
 from __future__ import annotations
 
@@ -28,18 +28,17 @@ from campaign.text import nearest
 from campaign.units import Quantity, split_quantity
 
 MANY_PARAMETERS = 12
-"""more than these and a table of some thirty cells hardly tells them apart."""
+"""A table of about 30 cells can hardly distinguish more parameters."""
 
 
 @dataclass(frozen=True)
 class CalibrationProblem:
-    """What is fitted to what, with which tests.
+    """Parameters, target cells and tests of a calibration.
 
     Attributes:
-        options: how.
-        tests: those that stand for a table with a cell among the targets.
+        tests: those that reproduce a table with a target.
         published: all published values, for naming.
-        warnings: sentences on what is allowed but unwise.
+        warnings: sentences on questionable settings.
     """
 
     protocol: Protocol
@@ -56,7 +55,7 @@ class CalibrationProblem:
 
 
 def make_problem(protocol: Protocol, published: Published) -> CalibrationProblem:
-    """The problem that `protocol` states. Raises ProtocolError with every mistake, placed."""
+    """Problem that `protocol` states. Raises ProtocolError with all mistakes and their places."""
     calibration = protocol.calibration
     if calibration is None:
         raise UsageError(
@@ -125,7 +124,7 @@ class _Reader:
             try:
                 targets.append(make_target(cell, weight))
             except ValueError as error:
-                if key not in refused:  # once for all cells that it is meant for
+                if key not in refused:  # once for all cells with this weight
                     self._report(("weights",) if key is None else ("weights", key), str(error))
                 refused.add(key)
         return tuple(targets)
@@ -151,7 +150,7 @@ class _Reader:
         return tuple(parameters)
 
     def check_bounds(self, parameters: tuple[Parameter, ...]) -> None:
-        """A bound must be a value that the bench accepts, all else being as it is."""
+        """Report bounds that the bench does not accept, with all other values unchanged."""
         for index, parameter in enumerate(parameters):
             for side, value in (
                 ("lower", parameter.unknown.lower),
@@ -164,7 +163,7 @@ class _Reader:
                     self._report(("parameter", index, side), f"with this value, {place}: {message}")
 
     def _chosen(self, key: str, patterns: tuple[str, ...]) -> dict[str, Cell]:
-        found: dict[str, Cell] = {}
+        matches: dict[str, Cell] = {}
         for index, pattern in enumerate(patterns):
             cells = [
                 cell
@@ -181,9 +180,9 @@ class _Reader:
                     names = [cell.path for cell in table.cells]
                     message = f"{shown(pattern)} is no cell of {table.heading}; {allowed(names)}"
                 self._report((key, index), message + nearest(pattern, names))
-            found |= {cell.path: cell for cell in cells}
+            matches |= {cell.path: cell for cell in cells}
         printed = [cell.path for table in self._published.values() for cell in table.cells]
-        return {path: found[path] for path in printed if path in found}
+        return {path: matches[path] for path in printed if path in matches}
 
     def _parameter(self, index: int, entry: CalibrationParameter) -> Parameter | None:
         factors = entry.factors or (1.0,) * len(entry.fields)
@@ -224,7 +223,7 @@ class _Reader:
         return Parameter(unknown, tuple(zip(entry.fields, factors, strict=True)), quantity, unit)
 
     def _may_be_fitted(self, place: Keys, path: str) -> bool:
-        """Whether the bench writes a number there, and no test sweeps it; said when not."""
+        """Whether the bench file has a number there that no test sweeps; reports why not."""
         keys = tuple(path.split("."))
         numbers = dict(_numbers(self._written, self._bench))
         if path not in numbers:
@@ -241,8 +240,8 @@ class _Reader:
         return True
 
     def _quantity(self, path: str) -> Quantity | None:
-        found = number_at(Bench.model_validate(self._bench, context={"si": True}), path)
-        return None if found is None else found[1]
+        field = number_at(Bench.model_validate(self._bench, context={"si": True}), path)
+        return None if field is None else field[1]
 
     def _bound(
         self, index: int, side: str, written: str | float, quantity: Quantity | None
@@ -268,7 +267,7 @@ class _Reader:
 
 
 def _places(entry: CalibrationParameter) -> Iterator[tuple[Keys, str]]:
-    """Each path with where it stands in its table."""
+    """Paths of a parameter, each with its keys in the table."""
     if entry.path:
         yield ("path",), entry.path
     for index, path in enumerate(entry.paths):
@@ -280,7 +279,7 @@ def _kind(quantity: Quantity | None) -> str:
 
 
 def _numbers(written: Any, valid: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of every number that stands in a bench file; text with a unit too."""
+    """Dotted path and value of every number in a bench file, as number or text with a unit."""
     if isinstance(written, Mapping):
         for key, value in written.items():
             below = valid.get(key) if isinstance(valid, Mapping) else None

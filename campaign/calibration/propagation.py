@@ -1,13 +1,13 @@
 """Uncertainty of reproduced numbers that results from the calibration.
 
-The covariance of the unknowns is carried to each published cell by simulation: the bench is moved
-by one standard deviation both ways along each principal axis of the covariance, and everything is
-analysed anew. Half the difference is one of k independent parts of the cell's uncertainty. So a
-ratio, a growth or a threshold needs no derivative by hand, and correlations need no bookkeeping.
+Simulation propagates the covariance of the unknowns to each published cell. The bench moves by one
+standard deviation in both directions along each principal axis of the covariance. Half the
+difference of the two analyses is one of k independent parts of the cell's uncertainty. This needs
+no derivatives, e.g. of ratios or thresholds, and includes correlations.
 
-Steps of one sigma bridge what a sampled loop rounds, and see as much of a curve as matters. On
-another bench the noise of a simulation falls differently: that is in the halves, too, and makes the
-part of a number that hardly depends on the unknowns somewhat too large.
+Steps of one sigma are larger than the rounding of a sampled loop and include the relevant
+nonlinearity. Simulation noise differs between the moved benches and adds to the halves. It makes
+the uncertainty of a number that hardly depends on the unknowns somewhat too large.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from campaign.protocol.schema import Test
 from campaign.published.values import NO_SIZE
 
 NEGLIGIBLE = 1e-12
-"""Variance along a principal axis, as a share of the largest, below which nothing is moved."""
+"""Least variance along a principal axis for a step, relative to the largest."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Propagation:
         protocol: file name of the protocol whose tests were simulated.
         freedom: degrees of freedom of the standard uncertainties.
         uncertainty: cell path to standard uncertainty (1 sigma), in the printed unit.
-        lost: cells that the bench reproduces, but not any more somewhere within one sigma.
+        lost: cells that the bench reproduces, but not at all steps of one sigma.
     """
 
     protocol: str
@@ -59,7 +59,7 @@ def principal_steps(covariance: Array) -> Array:
 
 
 def tests_of(problem: CalibrationProblem, tests: Iterable[Test]) -> tuple[Test, ...]:
-    """Those of another protocol that stand for published tables on the bench that was fitted."""
+    """Tests of another protocol that reproduce published tables on the fitted bench."""
     bench = problem.calibration.bench.tree
     return tuple(test for test in tests if test.entry.reproduces and test.bench == bench)
 
@@ -76,13 +76,13 @@ def propagate(
     workers: int,
     display: Display,
 ) -> Propagation | None:
-    """The uncertainty of each cell that `tests` find; None where an unknown is not determined.
+    """Uncertainty of each cell that `tests` reproduce; None if an unknown is not determined.
 
-    Of several tests that find a cell the first counts, as on a scoreboard.
+    If several tests reproduce a cell, the first counts, as on a scoreboard.
 
     Args:
-        shares: the optimum, in shares of the ranges, shape (k,).
-        certainty, cost: there.
+        shares: optimum, in shares of the ranges, shape (k,).
+        certainty, cost: at the optimum.
     """
     covariance = certainty.covariance
     if covariance is None:
@@ -94,13 +94,13 @@ def propagate(
     done = 0
     for test in tests:
         simulation = Simulation(_of(problem, test), experiments, workers)
-        found = []
+        reproduced = []
         for point in points:
             display(Progress(f"propagation: {test.entry.name}", done, cost, cost))
-            found.append(simulation.evaluate(problem.space.values(point)).found)
+            reproduced.append(simulation.evaluate(problem.space.values(point)).found)
             done += 1
-        here, moved = found[0], found[1:]
-        for path in here.keys() - uncertainty.keys():
+        central, moved = reproduced[0], reproduced[1:]
+        for path in central.keys() - uncertainty.keys():
             values = np.array([each.get(path, np.nan) for each in moved])
             if np.all(np.isfinite(values)):
                 halves = 0.5 * (values[::2] - values[1::2])
@@ -112,7 +112,7 @@ def propagate(
 
 
 def _of(problem: CalibrationProblem, test: Test) -> CalibrationProblem:
-    """The same unknowns, with one test and every number of the tables that it stands for."""
+    """Problem with the same unknowns, one test, and all numbers of its tables as targets."""
     cells = (
         cell
         for name, table in problem.published.items()

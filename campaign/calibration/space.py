@@ -17,10 +17,10 @@ class Parameter:
     """One unknown of a bench.
 
     Attributes:
-        unknown: its name, bounds and scale; it starts at what the bench says now.
-        fields: dotted path of each field of the bench it drives, with its factor.
+        unknown: name, bounds and scale; its start is the present value of the bench.
+        fields: dotted paths of its fields of the bench, each with a factor.
         quantity: None for a number without a unit.
-        unit: in which people are told it; "" without one.
+        unit: unit for display; "" without one.
     """
 
     unknown: Unknown
@@ -30,11 +30,11 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """What the result calls it."""
+        """Name in the result."""
         return self.unknown.name
 
     def text(self, value: float) -> str | float:
-        """An SI value as a TOML file has it: text with its unit, to six digits."""
+        """SI value for a TOML file: text with unit, or a number; six digits."""
         if self.quantity is None:
             return float(f"{value:.6g}")
         return f"{convert(value, self.quantity.si, self.unit):.6g} {self.unit}"
@@ -42,26 +42,26 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Space:
-    """All unknowns; a vector is the shares of their ranges, shape (n,)."""
+    """All unknowns; a vector holds shares of their ranges, shape (n,)."""
 
     parameters: tuple[Parameter, ...]
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What an optimiser needs to know of them."""
+        """Unknowns for the optimizer."""
         return tuple(parameter.unknown for parameter in self.parameters)
 
     def values(self, shares: Array) -> tuple[float, ...]:
-        """SI values."""
+        """SI values at shares of the ranges."""
         return values_at(self.unknowns, shares)
 
     @property
     def present(self) -> tuple[float, ...]:
-        """SI values that the bench has now."""
+        """Present SI values of the bench."""
         return tuple(unknown.start for unknown in self.unknowns)
 
     def bench(self, tree: Mapping[str, Any], values: Sequence[float]) -> dict[str, Any]:
-        """A bench as written with `values` put in as exact text."""
+        """Bench tree as written, with `values` (SI) as exact text."""
         changed = dict(tree)
         for parameter, value in zip(self.parameters, values, strict=True):
             for path, factor in parameter.fields:

@@ -16,9 +16,9 @@ from campaign.published.verdicts import CLAIMS
 from campaign.units import convert, split_quantity
 
 WORST = 100.0
-"""How far off a cell counts that could not be found, and the farthest that any counts: by this
-factor, or, where the weight is absolute, by this many times the cell or its standard deviation.
-Nothing that was found may look worse than nothing, and a fit needs a slope wherever it starts."""
+"""Largest deviation of a cell, and that of a missing value. It is this factor; for an absolute
+weight, this many times the larger of the cell and its standard deviation. No value may be worse
+than a missing one. The deviation is large so that a fit has a slope from any start."""
 DEFAULT_WEIGHT = "10 %"
 
 
@@ -27,7 +27,7 @@ class Target:
     """One cell with its standard deviation.
 
     Attributes:
-        relative: whether `sigma` is a share of the cell, or a difference in its printed unit.
+        relative: whether `sigma` is relative to the cell; else it is in the printed unit.
     """
 
     cell: Cell
@@ -35,10 +35,10 @@ class Target:
     relative: bool
 
     def residual(self, found: float | None) -> float:
-        """Deviation of `found` (printed unit) in standard deviations, at most `worst` either way.
+        """Deviation of `found` (printed unit) in standard deviations, from -`worst` to `worst`.
 
-        Relative ones are logarithms of the ratio, so that twice and half count the same. A cell
-        that says `at most` or `at least` asks for no more than that.
+        A relative one is the logarithm of the ratio: 2 and 1/2 count the same. A cell with
+        `at most` or `at least` has residual 0 on the claimed side.
         """
         if found is None or not math.isfinite(found):
             return self.worst
@@ -55,9 +55,9 @@ class Target:
         return min(max(deviation, -self.worst), self.worst)
 
     def percent(self, found: float | None) -> float:
-        """Deviation in percent of the cell; NaN where that means nothing, as on the scoreboard.
+        """Deviation in percent of the cell, as on the scoreboard.
 
-        That is so of what was not found, a printed zero, a place in an order, a claim that is met.
+        NaN for a missing value, a printed zero, a rank or mark, and a claim that is met.
         """
         claim = self.cell.relation in CLAIMS and self.residual(found) == 0.0
         if found is None or not self.cell.value or claim or self.cell.relation in NO_SIZE:
@@ -66,14 +66,14 @@ class Target:
 
     @property
     def worst(self) -> float:
-        """The residual of a cell that could not be found."""
+        """Residual of a cell with a missing value."""
         if self.relative:
             return math.log(WORST) / self.sigma
         return WORST * max(1.0, abs(self.cell.value) / self.sigma)
 
     @property
     def weight(self) -> str:
-        """Its standard deviation, for people."""
+        """Text of the standard deviation."""
         if self.relative:
             return f"{100 * self.sigma:.6g} %"
         return f"{self.sigma:.6g} {self.cell.unit}".strip()
@@ -85,12 +85,12 @@ def residuals(targets: Sequence[Target], found: Mapping[str, float]) -> Array:
 
 
 def covers(pattern: str, cell: Cell) -> bool:
-    """Whether `table`, `table/row` or `table/row/column` means the cell; * stands for any name."""
+    """Whether `table`, `table/row` or `table/row/column` matches the cell; * is any name."""
     return patterns.covers(pattern, cell.path)
 
 
 def restricted(published: Published, targets: Sequence[Target]) -> Published:
-    """The published tables with no cells but the targets: a fit sees no others."""
+    """Published tables with the targets as the only cells, for the fit."""
     wanted = {target.cell.path for target in targets}
     tables = {}
     for name, table in published.items():
@@ -101,13 +101,13 @@ def restricted(published: Published, targets: Sequence[Target]) -> Published:
 
 
 def weight_of(cell: Cell, weights: Mapping[str, str | float]) -> str | None:
-    """The name among `weights` that means the cell most closely; None when none does."""
+    """Most specific name in `weights` that matches the cell; None without a match."""
     matching = [name for name in weights if covers(name, cell)]
     return max(matching, key=_closeness, default=None)
 
 
 def make_target(cell: Cell, weight: str | float) -> Target:
-    """A cell with a weight as written. Raises ValueError with a message for the user."""
+    """Target from a cell and a weight as written. Raises ValueError with a message for the user."""
     number, unit = split_quantity(weight) if isinstance(weight, str) else (float(weight), "")
     if not (math.isfinite(number) and number > 0):
         raise ValueError(f"{weight!r} is no standard deviation; it must be positive")
@@ -126,7 +126,7 @@ def make_target(cell: Cell, weight: str | float) -> Target:
 
 
 def shortest(targets: Sequence[Target], published: Published) -> tuple[str, ...]:
-    """The cells as a bench's `fitted` names them: whole tables and rows where all is used."""
+    """Names of the cells for a bench's `fitted`: a complete table or row has one name."""
     wanted = {target.cell.path for target in targets}
     names: list[str] = []
     for table in published.values():

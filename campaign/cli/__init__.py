@@ -1,4 +1,4 @@
-"""The commands: they parse, call and print. Everything heavy is imported inside them."""
+"""The commands: they parse, call and print. They import heavy modules themselves."""
 
 from campaign.cli.bench_commands import app
 from campaign.cli.main import main

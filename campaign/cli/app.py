@@ -1,8 +1,8 @@
 """Options of the program, and the commands that plan and execute.
 
-What is asked of runs is in `archive_commands`, what is done at a bench or once per installation in
-`bench_commands`: each adds its commands to those of the one before. `GROUPS` says under which
-heading `--help` lists each. Everything heavy is imported inside the commands.
+`archive_commands` adds commands on archived runs; `bench_commands` adds commands on benches and on
+the installation. `GROUPS` sets the heading of each command in `--help`. Commands import heavy
+modules themselves.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ GROUPS = {
     "Hardware": ("device", "stop", "status"),
     "Installation": ("doctor", "warmup", "new"),
 }
-"""Commands as the help lists them, by heading."""
+"""Commands in the help, by heading."""
 PAGED = frozenset({"check", "compare", "identify", "kinds", "list", "plan", "show", "trend"})
 
 Ended = ExitCode | Path | tuple[Path | Sequence[Path], ExitCode] | None
-"""What a command returns: its exit code, what it wrote, or both."""
+"""Return value of a command: exit code, written paths, or both."""
 Command = TypeVar("Command", bound=Callable[..., Ended])
 
 
@@ -51,9 +51,9 @@ class GroupedCommands(TyperGroup):
 
 
 class QuietCommand(TyperCommand):
-    """A command whose standard output is for what it prints itself, and for no plug-in.
+    """A command with a standard output of its own: prints of plug-ins do not reach it.
 
-    Its last lines are the paths that it returns.
+    The last lines are the returned paths.
     """
 
     def invoke(self, ctx: Any) -> None:
@@ -67,7 +67,7 @@ class QuietCommand(TyperCommand):
             ctx.exit(code)
 
     def _paging(self, ctx: Any) -> AbstractContextManager[None]:
-        """A pager for commands that only tell something."""
+        """Pager for commands that only print."""
         as_it_comes = ctx.parent.params.get("no_pager") or ctx.params.get("as_json")
         return paged() if self.name in PAGED and not as_it_comes else nullcontext()
 
@@ -82,17 +82,17 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # its consoles would be none of ours: `cli.output`
+    rich_markup_mode=None,  # it would bypass the consoles of `cli.output`
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
 def command(name: str | None = None) -> Callable[[Command], Command]:
-    """Adds a function to the program; the list of commands has all of its docstring's sentence."""
+    """Add a function to the program; the list of commands shows its docstring's first paragraph."""
 
     def add(function: Command) -> Command:
-        told = (function.__doc__ or "").split("\n\n")[0]
-        return app.command(name, cls=QuietCommand, short_help=told)(function)
+        summary = (function.__doc__ or "").split("\n\n")[0]
+        return app.command(name, cls=QuietCommand, short_help=summary)(function)
 
     return add
 

@@ -19,16 +19,16 @@ _HEADINGS = (
 )  # fmt: skip
 
 _SPARE = ("size", "tags", "backend", "protocol", "date", "duration")
-"""What a narrow terminal does without first; the name of a run begins with its date."""
+"""Columns that a narrow terminal omits, in this order; the name of a run begins with its date."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What a run must be. Of several values of one kind any will do, but every tag must be there.
+    """Filter of runs. One of several values of a field must match, but all tags.
 
     Attributes:
         protocols, benches: names, or patterns such as `veloc*`.
-        since, until: ISO 8601, a day or a time; in UTC where there is no zone. A day is whole.
+        since, until: ISO 8601, a day or a time; UTC without a zone. A day counts as a whole.
     """
 
     protocols: Sequence[str] = ()
@@ -40,7 +40,7 @@ class Selection:
     tags: Sequence[str] = ()
 
     def of(self, runs: Sequence[RunSummary]) -> list[RunSummary]:
-        """The runs that are so; one that cannot be read is so only when nothing is asked for."""
+        """Runs that match; unreadable ones match only an empty selection."""
         first = _time("--since", self.since, at_end=False)
         last = _time("--until", self.until, at_end=True)
         if self == Selection():
@@ -65,7 +65,7 @@ def _any(wanted: Sequence[str], there: Sequence[str]) -> bool:
 
 
 def _time(option: str, text: str, *, at_end: bool) -> datetime | None:
-    """The moment that `text` means; of a day its beginning, or that of the next one."""
+    """Time of `text`; for a day its start, or with `at_end` the start of the next day."""
     if not text:
         return None
     try:
@@ -80,7 +80,7 @@ def _time(option: str, text: str, *, at_end: bool) -> datetime | None:
 
 
 def statuses(words: Sequence[str]) -> tuple[RunStatus, ...]:
-    """Statuses by name, a hyphen for a space; UsageError naming them all."""
+    """Statuses by name, with a hyphen or a space. Raises UsageError for an unknown one."""
     known = {status.value.replace(" ", "-"): status for status in RunStatus}
     for word in words:
         if word.replace(" ", "-") not in known:
@@ -89,7 +89,7 @@ def statuses(words: Sequence[str]) -> tuple[RunStatus, ...]:
 
 
 def list_archives(results: Path, selection: Selection, *, as_json: bool) -> None:
-    """The runs in `results`, the newest first; one that cannot be read says why."""
+    """Print the selected runs in `results`, the newest first, and why a run is unreadable."""
     runs = list_runs(results)
     shown = selection.of(runs)[::-1]
     if as_json:
@@ -126,7 +126,7 @@ def _row(run: RunSummary) -> tuple[str, ...]:
 
 
 def _seconds(run: RunSummary) -> float | None:
-    """From the run's start to its end (s); None while it has none."""
+    """Duration of the run (s); None without an end."""
     try:
         passed = datetime.fromisoformat(run.ended) - datetime.fromisoformat(run.created)
     except (ValueError, TypeError):

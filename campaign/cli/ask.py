@@ -1,4 +1,4 @@
-"""Questions to a person: before the first motion of a real bench, and at operator steps."""
+"""Prompts for the operator: before the first motion of a real bench, and at operator steps."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from campaign.protocol.stages import most_of
 from campaign.trial import Trial
 
 GLANCE = 0.2
-"""s between two looks at the stop switch while nobody types."""
+"""Seconds between two checks of the stop switch during a prompt."""
 
 ASSUMED = "assumed done (--yes)"
 ON_ITS_PAGE = "described on the page of the trial"
 
 
 class NotStartedError(CampaignError):
-    """Somebody was asked and said no: nothing has moved."""
+    """The operator declined; nothing has moved."""
 
     exit_code = ExitCode.INTERRUPTED
 
@@ -39,13 +39,13 @@ class NotStartedError(CampaignError):
 def allow_motion(
     kind: BackendKind, trials: Sequence[Trial], tests: Sequence[PlannedTest], *, yes: bool
 ) -> None:
-    """Show in short what `trials` will do to a live bench, and ask whether they may.
+    """Print a summary of `trials` on a live bench, and prompt for permission.
 
     Args:
-        tests: with the limits they come close to; may be empty. Whether a loop may be made
-            unstable is a question of its own, and the first.
+        tests: with their closest limits; may be empty. A test that may make a loop unstable has a
+            prompt of its own, which comes first.
 
-    Raises UsageError when there is nobody to ask, and NotStartedError when they may not.
+    Raises UsageError without a terminal, and NotStartedError without permission.
     """
     if not kind.live or not trials:
         return
@@ -67,7 +67,7 @@ def allow_motion(
 
 
 def say_by_hand(options: Options) -> None:
-    """Where the person at the rig reads what to do, of a backend whose trials are handed out."""
+    """Print the page with instructions for the operator, if the backend hands trials out."""
     folder = getattr(options, "folder", "")
     if folder:
         print_note(f"for the person at the rig: {Path(folder) / 'index.html'}")
@@ -82,7 +82,7 @@ def _must_agree(question: str) -> None:
 def motion_summary(
     backend: str, trials: Sequence[Trial], tests: Sequence[PlannedTest]
 ) -> list[str]:
-    """What is about to move, how long, how close to which limits, and what people have to do."""
+    """Lines on the planned motion: trials, bench time, closest limits, stages, operator steps."""
     duration = clock(sum(trial.task.duration for trial in trials))
     lines = [f"{backend}: {len(trials)} trials, {duration} of bench time"]
     limits = {test.name: test.closest for test in tests}
@@ -100,7 +100,7 @@ def motion_summary(
 
 
 def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance:
-    """Who is asked during a run on this backend, and whether its pauses are waited for."""
+    """Prompts and pauses for a run on this backend."""
     if not (kind.live or kind.by_hand):
         return UNATTENDED
     if yes:
@@ -112,7 +112,7 @@ def attendance_of(kind: BackendKind, display: Shown, *, yes: bool) -> Attendance
 
 @dataclass(frozen=True)
 class AbsentOperator:
-    """Nobody is asked: a script said `--yes`, or the person reads the steps elsewhere.
+    """No prompts: a script passed `--yes`, or the operator reads the steps on a page.
 
     Attributes:
         answer: for the record.
@@ -123,20 +123,20 @@ class AbsentOperator:
     shows: bool = True
 
     def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
-        """Takes the step for done; the record has the answer."""
+        """Assume the step is done; return the answer for the record."""
         if self.shows:
             print_note(f"before {trial.name}: {step}: {self.answer}")
         return self.answer
 
 
 class ConsoleOperator:
-    """A person at the terminal."""
+    """An operator at the terminal."""
 
     def __init__(self, hidden: Callable[[], AbstractContextManager[None]]) -> None:
         self._hidden = hidden
 
     def confirm(self, trial: Trial, step: str, stop: Callable[[], bool]) -> str | None:
-        """Ask until there is an answer, the run is stopped, or nobody is there any more."""
+        """Prompt until there is an answer; None if the run is stopped or the input ends."""
         with self._hidden():
             print_note(f"before {trial.name} ({trial.label}):\n  {step}", "bold")
             while True:
@@ -150,8 +150,8 @@ class ConsoleOperator:
 
 
 def read_line(stop: Callable[[], bool]) -> str | None:
-    """A line from standard input; None when `stop()` or when there will be none."""
-    if os.name != "posix":  # where a terminal cannot be waited for with a time limit
+    """A line from standard input; None after `stop()` or at the end of the input."""
+    if os.name != "posix":  # no wait with a time limit on a terminal
         line = sys.stdin.readline()
         return None if stop() or not line else line
     while not stop():
@@ -162,5 +162,5 @@ def read_line(stop: Callable[[], bool]) -> str | None:
 
 
 def has_terminal() -> bool:
-    """Whether there is a terminal to ask."""
+    """Whether standard input is a terminal."""
     return sys.stdin is not None and sys.stdin.isatty()

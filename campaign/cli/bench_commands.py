@@ -1,4 +1,4 @@
-"""Commands at a bench, about kinds and files, and those that are given once per installation."""
+"""Commands on benches, kinds and files, and commands for the installation."""
 
 from __future__ import annotations
 

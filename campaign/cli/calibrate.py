@@ -23,7 +23,7 @@ from campaign.protocol.missing_values import check_benches
 from campaign.published.values import Published, published_values
 from campaign.resources import protocols_folder
 
-SHOWN_PROBLEMS = 5  # of the simulation; the result has them all
+SHOWN_PROBLEMS = 5  # of the simulation; the result has all
 
 
 @unwinding()
@@ -37,13 +37,13 @@ def calibrate_protocol(
     fit: bool = True,
     propagated: str = "",
 ) -> ExitCode:
-    """Fit, and write the result and the bench; the result's path is the last line of output."""
+    """Fit; write result and bench; the result's path is the last line of output."""
     path = find_protocol(name)
     protocol = load_protocol(path, experiments(), shipped=protocols_folder())
     other = None
     if propagated:
-        found = find_protocol(propagated)
-        other = load_protocol(found, experiments(), shipped=protocols_folder())
+        other_path = find_protocol(propagated)
+        other = load_protocol(other_path, experiments(), shipped=protocols_folder())
     check_benches(protocol, tuple(PURPOSES), "a calibration, which simulates,")
     problem = make_problem(protocol, _published(protocol))
     for warning in problem.warnings:
@@ -51,7 +51,7 @@ def calibrate_protocol(
     result, bench = _files(path, results, output)
     fitted, document = shortest(problem.targets, problem.published), _document(protocol, bench)
     source, space = problem.calibration.bench, problem.space
-    # Hours later is too late to learn that the bench's file cannot be edited.
+    # Check before hours of work that the bench file can be edited.
     unknown = {path: {"origin": "fitted"} for p in space.parameters for path, _ in p.fields}
     bench_text(source, space, space.present, {"fitted": fitted, "values": unknown})
     with waiting("evaluating the bench as it is") as show:
@@ -76,7 +76,7 @@ def calibrate_protocol(
 
 
 def _document(protocol: Protocol, bench: Path) -> str:
-    """The published values as the bench names them: a path relative to its own file."""
+    """Name of the published values for the bench file: `thesis`, or a path relative to the file."""
     if protocol.published == "thesis":
         return protocol.published
     file = protocol.path.parent / protocol.published
@@ -92,7 +92,7 @@ def _published(protocol: Protocol) -> Published:
 
 
 def _files(path: Path, results: Path, output: Path | None) -> tuple[Path, Path]:
-    """Where result and bench go; earlier ones are only overwritten where --output says so."""
+    """Paths of result and bench; without --output, new ones that overwrite nothing."""
     if output is not None:
         pair = output, output.with_name(f"{output.stem}-bench.toml")
     else:

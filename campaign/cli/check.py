@@ -41,7 +41,7 @@ HEADINGS = (
 
 @dataclass(frozen=True)
 class CheckedLoop:
-    """One loop of a bench; without margins `why` says that there is no linear one."""
+    """One loop of a bench; without margins, `why` states why there is no linear loop."""
 
     compensation: str
     mode: Mode
@@ -59,9 +59,9 @@ class CheckedLoop:
 
 
 def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode:
-    """Print loops and facts of a bench and draw its Bode picture; of what is known of it.
+    """Print loops and facts of a bench and draw its Bode plot, as far as its data permit.
 
-    Raises UsageError when the picture cannot be written, and what `load_bench` raises.
+    Raises UsageError if the picture cannot be written, and the errors of `load_bench`.
     """
     bench = load_bench(written)
     picture = output or Path(f"{Path(written).stem}-check.svg")
@@ -87,24 +87,24 @@ def check_bench(written: str, output: Path | None, *, as_json: bool) -> ExitCode
 
 
 def _no_loops(unknown: Sequence[str]) -> str:
-    """Why the loops of a bench are not told, and what would have to be known of it."""
+    """Text on missing loops, with the missing fields of the bench."""
     what = "; ".join(f"{path} ({PURPOSES[path]})" for path in unknown)
     return f"no loops and no Bode picture: the bench does not say {what}"
 
 
 def loops_checked(bench: Bench) -> Iterator[CheckedLoop]:
-    """Every loop there can be: each compensation, stuck and sliding, under either command."""
+    """All loops of a bench: each compensation, stuck and sliding, for both kinds of command."""
     commands: tuple[tuple[Mode, Iterable[str]], ...] = (
         ("rate", ("none", *bench.compensation)),
         ("torque", bench.compensation),
     )
     for mode, names in commands:
         for name in names:
-            for regime, found in loops_of(bench, name, mode):
-                if isinstance(found, LoopMargins):
-                    yield CheckedLoop(name, mode, regime, found)
+            for regime, margins in loops_of(bench, name, mode):
+                if isinstance(margins, LoopMargins):
+                    yield CheckedLoop(name, mode, regime, margins)
                 else:
-                    yield CheckedLoop(name, mode, regime, None, str(found))
+                    yield CheckedLoop(name, mode, regime, None, str(margins))
 
 
 def _write_picture(bench: CompleteBench, path: Path) -> None:
@@ -141,7 +141,7 @@ def _print(bench: Bench, loops: list[CheckedLoop], facts: tuple[Fact, ...]) -> N
 
 
 def _counted(checked: Sequence[CheckedLoop | Fact]) -> Iterator[str]:
-    """How many have which verdict: `9 fine`, `3 low margin`."""
+    """Counts of verdicts: `9 fine`, `3 low margin`."""
     for verdict, count in Counter(each.verdict for each in checked).items():
         yield f"{count} {verdict}"
 
@@ -171,14 +171,14 @@ def _shown(value: float | None, factor: float, unit: str) -> str:
 
 
 def _gain(margin: float | None) -> str:
-    """A margin below 0 dB is one to what the gain may fall to: a conditionally stable loop."""
+    """Text of a gain margin; below 0 dB it limits a gain decrease (conditionally stable loop)."""
     if margin is not None and margin < 0:
         return f"may fall {_shown(-margin, 1.0, 'dB')}"
     return _shown(margin, 1.0, "dB")
 
 
 def _damping(pole: complex | None) -> str:
-    """E.g. `ζ 0.029 at 10.9 Hz`."""
+    """Text of a pole: `ζ 0.029 at 10.9 Hz`."""
     if pole is None:
         return "–"
     return f"ζ {-pole.real / abs(pole):.2g} at {abs(pole) / TWO_PI:.3g} Hz"

@@ -17,7 +17,7 @@ from campaign.trial import Trial
 
 @dataclass(frozen=True)
 class ExecutorChoice:
-    """Where trials are executed, as typed.
+    """Executor of trials, as typed.
 
     Attributes:
         executor: empty for this machine's own threads and processes.
@@ -28,9 +28,9 @@ class ExecutorChoice:
     tls: Path | None = None
 
     def check(self, kind: BackendKind, trials: Sequence[Trial], workers: int | None) -> int | None:
-        """How many trials at once; of a cluster, its processes, if that was said.
+        """Count of parallel trials; for a cluster, the requested count of processes or None.
 
-        Raises UsageError.
+        Raises UsageError for options that do not suit the backend.
         """
         if not self.executor:
             if self.tls is not None:
@@ -47,17 +47,17 @@ class ExecutorChoice:
     def opened(
         self, backend: Backend, trials: Sequence[Trial], workers: int | None
     ) -> Iterator[tuple[int, OpenExecutor | None]]:
-        """How many trials at once, and what executes them; None for this machine itself."""
+        """Count of parallel trials, and their executor; None for this machine."""
         if not self.executor:
             yield workers or 1, None
             return
         from campaign.execution.dask_executor import cluster
 
-        with cluster(self.executor, workers, backend, trials, self.tls) as found:
-            for why in found.refused.values():
+        with cluster(self.executor, workers, backend, trials, self.tls) as dask:
+            for why in dask.refused.values():
                 print_note(why, style="yellow")
-            print_note(f"{self.executor}: {found.threads} trials, or blocks of them, at once")
-            yield found.threads, found.executor
+            print_note(f"{self.executor}: {dask.threads} trials, or blocks of them, at once")
+            yield dask.threads, dask.executor
 
 
 HERE = ExecutorChoice()

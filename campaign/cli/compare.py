@@ -30,13 +30,13 @@ from campaign.resources import templates_folder
 from campaign.text import pretty_unit
 
 STEM = 90
-"""Letters of a run's name that a folder is called by."""
+"""Most characters of a run's name in the name of a folder."""
 BENCH_LINES = 8
-"""Most values of benches that differ which the terminal lists."""
+"""Most differing values of benches that the terminal lists."""
 REASONS = 6
 """Most reasons for not judging that the terminal lists."""
 SHOWN = 16
-"""Most pairs of one run that the terminal lists; the page has them all."""
+"""Most pairs of one run that the terminal lists; the page has all."""
 
 
 @unwinding()
@@ -50,7 +50,7 @@ def compare_archives(
     *,
     open_it: bool,
 ) -> tuple[Path, ExitCode]:
-    """Compare the runs that `names` mean with the first; the page, and whether all was read."""
+    """Compare the runs that `names` match with the first; return page and exit code for damage."""
     also = chosen_formats(formats)
     paths = [find_run(results, name) for name in names]
     runs = [open_run(path) for path in paths]
@@ -69,21 +69,21 @@ def compare_archives(
 
 
 def _beside(paths: Sequence[Path]) -> Path:
-    """`A-against-B-comparison` beside the reference: the first of the others names it."""
+    """Folder `A-against-B-comparison` beside the reference; B is the first of the other runs."""
     first, other, *more = paths
     rest = f"-and-{len(more)}-more" if more else ""
     return first.with_name(f"{first.stem[:STEM]}-against-{other.stem[:STEM]}{rest}-comparison")
 
 
 def _tell(against: Against, comparison: Comparison) -> None:
-    """A few lines and a table, the declared differences first."""
+    """Print summary lines and a table, the declared differences first."""
     reference, other = against.reference, against.other
     print_line(f"{reference.letter}  {reference.run.name}  {reference.title}")
     print_line(f"{other.letter}  {other.run.name}  {other.title}")
     print_line(" ".join(sentences(against, comparison.tested)))
     benches = list(bench_lines(against))
-    for told in benches[:BENCH_LINES]:
-        print_line(told, 2)
+    for line in benches[:BENCH_LINES]:
+        print_line(line, 2)
     if len(benches) > BENCH_LINES:
         print_line(f"and {len(benches) - BENCH_LINES} more of the bench, on the page")
     if against.equal:

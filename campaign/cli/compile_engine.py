@@ -1,4 +1,4 @@
-"""Compiling the engine: while a command prepares, or ahead (`campaign warmup`)."""
+"""Compilation of the engine: while a command prepares, or ahead (`campaign warmup`)."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 COMPILING = "compiling the engine (once per installation)"
 WORTH_A_BLOCK = 2e7
-"""Steps of trials in company from which on blocks are compiled: five runs save what that costs."""
+"""Least steps of jointly simulated trials for compiling blocks: five runs save its cost."""
 
 
 @contextmanager
 def compiling_meanwhile(backend: str) -> Iterator[FirstStart | None]:
-    """Inside the block the engine is compiled, if that backend runs it and it never was.
+    """Inside the block, compile the engine if the backend needs it and it is not compiled yet.
 
-    Hand what is yielded to `wait_until_compiled` before the first trial.
+    Pass the yielded object to `wait_until_compiled` before the first trial.
     """
     kind = backends().get(backend)
     if kind is None or not kind.simulates:
@@ -46,9 +46,9 @@ def compiling_meanwhile(backend: str) -> Iterator[FirstStart | None]:
 def wait_until_compiled(
     first: FirstStart | None, backend: Backend, trials: Sequence[Trial]
 ) -> None:
-    """Make what these trials need, and say what is waited for.
+    """Compile the parts that these trials need, and print the reason for the wait.
 
-    Where there is no engine for trials side by side, so few are executed without it.
+    Without a compiled engine for blocks, few trials are executed one by one.
     """
     if first is None or not isinstance(backend, SimBackend):
         return
@@ -68,12 +68,12 @@ def wait_until_compiled(
         print_note(COMPILING)
         first.wait(make_ready)
         return
-    with unwinding(), console.status(COMPILING):  # which hides the cursor, and shows it again
+    with unwinding(), console.status(COMPILING):  # its end restores the hidden cursor
         first.wait(make_ready)
 
 
 def warm_up() -> ExitCode:
-    """Make all machine code that the shipped benches need; say what, how long, and where it is."""
+    """Compile all machine code of the shipped benches; print the parts, their time and folder."""
     from campaign.execution.first_start import Helpers, make_all
     from campaign.physics.compilation import distrusted
     from campaign.physics.machine_code import WIDTHS, CompiledPart, folder, is_made

@@ -9,13 +9,13 @@ from pathlib import Path
 import typer
 
 RESULTS = "-results"
-"""How what analysis found is called beside its run."""
+"""Ending of the name of a results file beside its run."""
 RUNS = (".nxs", ".partial")
-"""How runs end; who lists them for good opens them, which takes longer than a Tab may."""
+"""Suffixes of runs; completion does not open the files, as that takes too long."""
 
 
 def complete_run(context: typer.Context, incomplete: str) -> list[str]:
-    """Names of runs in the folder that the command line says, the newest first."""
+    """Names of runs in the folder of `--results`, the newest first."""
     results = context.params.get("results")
     with suppress(OSError):
         paths = (results if isinstance(results, Path) else Path("results")).iterdir()
@@ -26,7 +26,7 @@ def complete_run(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_protocol(context: typer.Context, incomplete: str) -> list[str]:
-    """Protocols by name, shipped or in `protocols/`, and files and folders that lie there."""
+    """Names of protocols, shipped or in `protocols/`, and matching files and folders."""
     from campaign.resources import shipped_protocols
 
     own = (path.stem for path in Path("protocols").glob("*.toml"))
@@ -38,14 +38,14 @@ def complete_protocol(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_kind(context: typer.Context, incomplete: str) -> list[str]:
-    """What `campaign kinds` explains."""
+    """Names that `campaign kinds` explains."""
     from campaign.cli.kinds import kind_names
 
     return [name for name in kind_names() if name.startswith(incomplete)]
 
 
 def _files(incomplete: str) -> Iterator[str]:
-    """Protocols below the path that was begun, and folders on the way to some."""
+    """TOML files and folders that begin with the incomplete path."""
     folder, begun = incomplete.rpartition("/")[::2]
     prefix = f"{folder}/" if "/" in incomplete else ""
     for path in sorted(Path(prefix or ".").iterdir()):

@@ -14,11 +14,11 @@ from campaign.cli.output import print_note
 from campaign.errors import ExitCode
 
 SHOWN = 20
-"""Most damage that is told line by line; `campaign verify` tells of all."""
+"""Most damage that is listed; `campaign verify` lists all."""
 
 
 def say_damaged(path: Path, damaged: Sequence[Damage]) -> ExitCode:
-    """Tell on standard error what is damaged of the run at `path`; ARCHIVE when anything is."""
+    """Print damage of the run at `path` on standard error; return ARCHIVE for any damage."""
     if not damaged:
         return ExitCode.DONE
     print_note(f"{heading(path, damaged)}:", style="yellow")
@@ -28,12 +28,12 @@ def say_damaged(path: Path, damaged: Sequence[Damage]) -> ExitCode:
 
 
 def archive_of(backend: Backend) -> RunReader | None:
-    """The run that a backend serves, where it serves one."""
+    """Archived run that a backend replays, if any."""
     return backend.archive if isinstance(backend, ServesArchive) else None
 
 
 def note_damaged(writer: RunWriter, source: RunReader) -> None:
-    """Write into a new run's journal what is damaged of the one that it comes from."""
+    """Write the damage of a source run into the journal of a new run."""
     for damage in source.damaged[:SHOWN]:
         writer.decision("source damaged", f"{source.name}: {in_words(damage)}")
     if len(source.damaged) > SHOWN:

@@ -40,7 +40,7 @@ def run_device(
     new_latch: bool = False,
     log: Path | None = None,
 ) -> ExitCode:
-    """Serve until somebody ends the program; the first line of output is the port to use."""
+    """Serve until the user ends the program; the first line of output is the port."""
     if tcp is not None and pty:
         raise UsageError("a controller has one line: --pty or --tcp, not both")
     pace = _speed(speed)
@@ -61,7 +61,7 @@ def _serve(
     if heartbeat_timeout is None:
         heartbeat_timeout = PATIENCE if math.isinf(setup.speed) else HEARTBEAT_TIMEOUT
     line = PtyStream() if pty else TcpLine(tcp or ANY_PORT)
-    # Compiling takes long, and a controller that is silent for long looks dead.
+    # Compile first: a controller must not be silent for long.
     warm_up(setup.bench)
     server = Server(line, setup, timeout=heartbeat_timeout, faults=faults, fault_seed=fault_seed)
     try:
@@ -73,15 +73,15 @@ def _serve(
         print_note(f"panic stops are kept in {setup.latch_file or 'no file'}")
         server.serve()
     except KeyboardInterrupt:
-        pass  # how a rehearsal ends
+        pass  # the normal end
     return ExitCode.DONE
 
 
 @contextmanager
 def _latch_file(named: str | None, *, new: bool) -> Iterator[Path | None]:
-    """Where the latch is kept: as named, or in a file that is as old as this controller.
+    """File of the latch: the named one, None for `none`, or a temporary one.
 
-    new: whether this is the first start of a controller whose file is named.
+    new: whether this is the first start of a controller with a named file.
     """
     if named in (None, "none") and new:
         raise UsageError("--new-latch needs --latch FILE: the file that it makes")

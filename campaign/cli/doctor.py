@@ -1,4 +1,4 @@
-"""`campaign doctor`: the installation, its problems, and what to do."""
+"""`campaign doctor`: the installation, its problems, and advice."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from campaign.cli.output import bytes_text, print_json, print_table
 from campaign.errors import ExitCode
 
 LITTLE = 2_000_000_000
-"""Bytes of a disk below which a run of hours may not find room."""
+"""Free bytes of a disk that may be too few for a run of hours."""
 Verdict = Literal["fine", "absent", "look", "wrong"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One line. `verdict`: `absent` is an extra that nobody needs; `wrong` stops something."""
+    """One line. `verdict`: `absent` is an optional extra; `wrong` prevents some function."""
 
     what: str
     is_: str
@@ -32,55 +32,56 @@ class Finding:
 
 
 def examine(results: Path, *, as_json: bool) -> ExitCode:
-    """Print all findings; USAGE where one of them is wrong."""
-    found = [*_program(), *_libraries(), *_plug_ins(), *_cache(), *_disk(results), *_ports()]
+    """Print all findings; return USAGE if one of them is wrong."""
+    findings = [*_program(), *_libraries(), *_plug_ins(), *_cache(), *_disk(results), *_ports()]
     if as_json:
         rows = [
-            {"what": f.what, "is": f.is_, "verdict": f.verdict, "advice": f.advice} for f in found
+            {"what": f.what, "is": f.is_, "verdict": f.verdict, "advice": f.advice}
+            for f in findings
         ]
         print_json(rows)
     else:
-        lines = [(f.what, f.is_, f.verdict, f.advice) for f in found]
+        lines = [(f.what, f.is_, f.verdict, f.advice) for f in findings]
         print_table(("what", "is", "verdict", "what to do"), lines)
-    return ExitCode.USAGE if any(f.verdict == "wrong" for f in found) else ExitCode.DONE
+    return ExitCode.USAGE if any(f.verdict == "wrong" for f in findings) else ExitCode.DONE
 
 
 def _program() -> Iterator[Finding]:
     from campaign.execution.provenance import versions
 
-    told = versions()
-    yield Finding("campaign", f"{told.pop('campaign')} at {Path(__file__).parents[1]}")
-    own = (f"{name} {told[name]}" for name in ("engine", "format", "wire"))
+    numbers = versions()
+    yield Finding("campaign", f"{numbers.pop('campaign')} at {Path(__file__).parents[1]}")
+    own = (f"{name} {numbers[name]}" for name in ("engine", "format", "wire"))
     yield Finding("formats", ", ".join(own))
     where = f"{platform.python_version()} at {sys.executable}"
     yield Finding("Python", f"{where}, {platform.system()} {platform.machine()}")
 
 
 def _libraries() -> Iterator[Finding]:
-    """Each that is asked for, by the ranges of the installed package."""
+    """Libraries that the installed package requires, compared with its version ranges."""
     for text in importlib.metadata.requires("campaign") or ():
         asked = Requirement(text)
         extra = str(asked.marker or "").partition("extra == ")[2].strip("'\"")
         if extra in ("all", "test", "mutants") or asked.name == "campaign":
             continue
-        told = f"extra {extra}: {asked.name}" if extra else asked.name
+        label = f"extra {extra}: {asked.name}" if extra else asked.name
         try:
             version = importlib.metadata.version(asked.name)
         except importlib.metadata.PackageNotFoundError:
             if extra:
-                yield Finding(told, "absent", "absent", f"pip install 'campaign[{extra}]'")
+                yield Finding(label, "absent", "absent", f"pip install 'campaign[{extra}]'")
             else:
-                yield Finding(told, "absent", "wrong", "pip install campaign, anew")
+                yield Finding(label, "absent", "wrong", "pip install campaign, anew")
             continue
         if asked.specifier.contains(version, prereleases=True):
-            yield Finding(told, version)
+            yield Finding(label, version)
         else:
             advice = f"asked for is {asked.specifier}: pip install '{asked.name}{asked.specifier}'"
-            yield Finding(told, version, "wrong", advice)
+            yield Finding(label, version, "wrong", advice)
 
 
 def _plug_ins() -> Iterator[Finding]:
-    """Kinds of other packages; of one that cannot be imported, why."""
+    """Kinds of other packages; for a broken one, the reason."""
     from campaign.cli.kinds import rooms
 
     for room in rooms():
@@ -102,20 +103,20 @@ def _cache() -> Iterator[Finding]:
         return
     size = bytes_text(sum(each.stat().st_size for each in where.rglob("*") if each.is_file()))
     made = all(map(is_made, WIDTHS))
-    told = f"{'made' if made else 'not made'}, {size} in {where}"
+    state = f"{'made' if made else 'not made'}, {size} in {where}"
     yield Finding(
-        "compiled engine", told, "fine" if made else "look", "" if made else "campaign warmup"
+        "compiled engine", state, "fine" if made else "look", "" if made else "campaign warmup"
     )
 
 
 def _disk(results: Path) -> Iterator[Finding]:
-    there = next(
+    existing = next(
         each for each in (results.absolute(), *results.absolute().parents) if each.exists()
     )
-    free = shutil.disk_usage(there).free
+    free = shutil.disk_usage(existing).free
     advice = "runs of hours need more" if free < LITTLE else ""
     yield Finding(
-        "disk", f"{bytes_text(free)} free at {there}", "look" if advice else "fine", advice
+        "disk", f"{bytes_text(free)} free at {existing}", "look" if advice else "fine", advice
     )
 
 
@@ -123,6 +124,6 @@ def _ports() -> Iterator[Finding]:
     try:
         from serial.tools import list_ports
     except ImportError:
-        return  # the extra is absent, and said so
+        return  # `_libraries` reports the absent extra
     ports = [f"{each.device} ({each.description})" for each in list_ports.comports()]
     yield Finding("serial ports", ", ".join(ports) or "none")

@@ -24,7 +24,7 @@ def export_archive(
     tests: Sequence[str],
     trials: Sequence[int],
 ) -> tuple[Path, ExitCode]:
-    """Export the run that `name` means; the folder, and whether all of it could be read."""
+    """Export the run that `name` matches; return the folder and the exit code for damage."""
     kinds = exports()
     if to not in kinds:
         raise UsageError(f"there is no format {to!r}; there are {', '.join(kinds)}")

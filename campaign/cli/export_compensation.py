@@ -22,24 +22,24 @@ from campaign.text import number
 
 
 def export_compensation(bench: str, name: str, target: str, output: Path) -> list[Path]:
-    """Write code, and a test of it with inputs and torques of this program, into `output`.
+    """Write code and its test, with inputs and torques of this program, into `output`.
 
-    Raises UsageError: no such bench, compensation or target; a bench that is not sampled; a model
-    whose step function has no counterpart in the target's language.
+    Raises UsageError for an unknown bench, compensation or target, for a bench that is not sampled,
+    and for a model without a step function in the target's language.
     """
     known = targets()
     if target not in known:
         raise UsageError(f"--to {target}: there are {', '.join(known)}")
-    made = SampledCompensation.of(simulable(bench), name)
-    head = list(_head(bench, made))
-    texts = known[target].write(made, head, trial_inputs(made))
+    compensation = SampledCompensation.of(simulable(bench), name)
+    head = list(_head(bench, compensation))
+    texts = known[target].write(compensation, head, trial_inputs(compensation))
     with writing(f"--output {output}"):
         output.mkdir(parents=True, exist_ok=True)
         for file, text in texts.items():
             (output / file).write_text(text, encoding="utf-8", newline="\n")
     for line in head:
         print_line(line)
-    low = [each.verdict for each in _loops(made.bench, name) if each.verdict != "fine"]
+    low = [each.verdict for each in _loops(compensation.bench, name) if each.verdict != "fine"]
     if low:
         print_note(
             f"of its loops {len(low)} are not fine: {'; '.join(dict.fromkeys(low))}", "yellow"
@@ -48,7 +48,7 @@ def export_compensation(bench: str, name: str, target: str, output: Path) -> lis
 
 
 def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
-    """Where each number comes from, and what the loop is worth with it."""
+    """Header lines: source of each number, and the margins of the loops."""
     source = bench_source(bench)
     its = made.bench
     yield f"The compensation '{made.name}' of the bench '{its.name}', by campaign {__version__}."
@@ -60,13 +60,13 @@ def _head(bench: str, made: SampledCompensation) -> Iterator[str]:
         known = its.known.values.get(f"compensation.{made.name}.{path}")
         yield f"{path} = {value}" + ("" if known is None else f" ({_uncertainty(known)})")
     for each in _loops(its, made.name):
-        told = each.verdict if each.margins is None else margins_in_words(each.margins)
-        yield f"Loop, {each.regime}, {each.mode} command: {told}"
+        margins = each.verdict if each.margins is None else margins_in_words(each.margins)
+        yield f"Loop, {each.regime}, {each.mode} command: {margins}"
     yield "Not in it: delays and resolutions of sensors; the rate loop."
 
 
 def _uncertainty(known: KnownValue) -> str:
-    """Interval or standard deviation (SI), and the origin."""
+    """Text of an interval or standard deviation (SI), and the origin."""
     if known.interval is not None:
         low, high = (number(float(end), 6) for end in known.interval)
         return f"95 %: {low} to {high}; {known.origin}"

@@ -14,8 +14,8 @@ from campaign.protocol.further_files import names_file
 def fingerprint_bench(written: str, *, check: bool) -> ExitCode:
     """Write the bench's fingerprint into its file, or with `check` only compare.
 
-    With `check` TRIALS_FAILED (1) when the bench, or one of its compensations, is not the one whose
-    fingerprint the file states. Raises UsageError and ProtocolError.
+    With `check`, returns TRIALS_FAILED (1) if the bench or one of its compensations differs from
+    the stated fingerprint. Raises UsageError and ProtocolError.
     """
     source = bench_source(written)
     bench = checked(source)

@@ -41,9 +41,9 @@ def identify_run(
     formats: Sequence[str] = (),
     open_it: bool = False,
 ) -> tuple[Path, ExitCode]:
-    """Identify, and write the page and, where it is asked for, the bench; the page's path.
+    """Identify; write the page and, on request, the bench file; return the page's path.
 
-    Raises NoResultError where no method identified anything, before anything is written.
+    Raises NoResultError, before any file is written, if no method has a result.
     """
     also = chosen_formats(formats)
     run = run or find_run(results).stem
@@ -56,7 +56,7 @@ def identify_run(
     if bench is not None:
         _refuse_foreign_bench(bench)
     with waiting("reading") as show:
-        found = identify(
+        identification = identify(
             chosen,
             experiments_by_model(),
             models=models,
@@ -65,36 +65,36 @@ def identify_run(
             settings=settings,
             say=lambda text: show(text.split(": ")[0], text),
         )
-    if all(each.result is None for each in found.sections):
-        told = (f"  {each.model.name}: {each.problem}" for each in found.sections)
+    if all(each.result is None for each in identification.sections):
+        reasons = (f"  {each.model.name}: {each.problem}" for each in identification.sections)
         refused = NoResultError(
-            "\n".join([f"{chosen.name}: nothing can be identified from it", *told])
+            "\n".join([f"{chosen.name}: nothing can be identified from it", *reasons])
         )
         refused.exit_code = worst_exit_code([refused.exit_code, *map(_say_damaged, sides)])
         raise refused
     command = _command(run, models, validate, compare, settings)
     text = None
-    if bench is not None and not nothing_to_write(found):
-        text = bench_text(found, command)
+    if bench is not None and not nothing_to_write(identification):
+        text = bench_text(identification, command)
     written = bench.name if bench is not None and text is not None else ""
-    made = write_identification(
-        found, output, templates_folder(), command, written, templates, also
+    article = write_identification(
+        identification, output, templates_folder(), command, written, templates, also
     )
     if bench is not None and text is not None:
-        with writing(bench):  # first: whoever reads what is printed may end early
+        with writing(bench):  # before printing: the reader of a pipe may end early
             bench.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(bench, text)
-    _say(found)
+    _say(identification)
     if bench is not None:
         if text is None:
-            print_note(f"page: {made}")
+            print_note(f"page: {article}")
             raise UsageError("--output: nothing that was found has a place in a bench file")
         print_note(f"bench: {bench}")
-        for method, keys in keys_by_method(found).items():
+        for method, keys in keys_by_method(identification).items():
             print_note(f"  {method}: {', '.join(keys)}")
     if open_it:
-        open_page(made)
-    return made, worst_exit_code([*map(_say_damaged, sides)])
+        open_page(article)
+    return article, worst_exit_code([*map(_say_damaged, sides)])
 
 
 def _say_damaged(chosen: ChosenRun) -> ExitCode:
@@ -108,7 +108,7 @@ def _command(
     compare: str | None,
     settings: Sequence[str],
 ) -> str:
-    """What makes the same again; names of runs as they were given, and no folders of anybody."""
+    """Command that repeats the identification; with names of runs, without private folders."""
     parts = ["campaign identify", Path(run).name]
     parts += [f"--model {name}" for name in models]
     parts += [f"--validate {Path(validate).name}"] if validate else []
@@ -123,7 +123,7 @@ def _beside(chosen: ChosenRun) -> Path:
 
 
 def _refuse_foreign_bench(path: Path) -> None:
-    """Raises UsageError for what is there and no bench, such as a run or a protocol."""
+    """Raise UsageError for an existing file that is no bench, e.g. a run or a protocol."""
     if path.is_dir():
         raise UsageError(f"{path} is a folder; name a file for the bench")
     if not path.exists():
@@ -158,7 +158,7 @@ def _say(found: Identification) -> None:
 
 
 def _verdict(found: Identification) -> str:
-    """`11 parameters identified (presliding 9, ramps 2), 4 not determined`."""
+    """Summary: `11 parameters identified (presliding 9, ramps 2), 4 not determined`."""
     parameters = {each.model.name: each.identified.parameters for each in found.sections}
     open_ones = {
         name: sum(each.estimate.origin is Origin.NOT_DETERMINED for each in own)

@@ -1,4 +1,4 @@
-"""`campaign import`: recordings from elsewhere as a run."""
+"""`campaign import`: recordings of other programs as a run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def import_recordings(
     report: bool = False,
     sign: Path | None = None,
 ) -> ExitCode:
-    """Archive what a mapping describes. Raises what a run raises."""
+    """Archive the recordings of a mapping. Raises UsageError, and the errors of a run."""
     if len(files) != 1:
         raise UsageError(
             f"one mapping at a time, not {len(files)} files; `campaign import --guess FILE...` "
@@ -38,7 +38,7 @@ def import_recordings(
 
 
 def guess_mapping(files: Sequence[Path]) -> ExitCode:
-    """Print a first mapping of files; what is doubtful is marked in it."""
+    """Print a first mapping of files, with marked doubtful entries."""
     from campaign.importing.guess import guess, mapping_text
 
     print_text(mapping_text(guess(files)))

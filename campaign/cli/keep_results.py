@@ -1,4 +1,4 @@
-"""Keeping results of a report as data beside the run: `RUN-results.nxs`."""
+"""Results of a report as data beside the run: `RUN-results.nxs`."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from campaign.report.content.document import Document
 def written_results(
     run: RunReader, document: Document, *, measured_anew: bool
 ) -> PreparedResults | None:
-    """Write them, to be published when the report is there; None where there is a warning instead.
+    """Prepare the results file, to be published with the report; None after a warning.
 
-    A folder that nobody may write in, or something else in their place, costs the file and not the
-    report; a report that fails leaves older results as they were.
+    A read-only folder or another file at this path prevents the results file, not the report. If
+    the report fails, older results stay.
 
-    Of a damaged run, results that were found when it was whole are kept: they can be had no more.
+    Results from before a run was damaged are kept, as they cannot be repeated.
     """
     if document.damaged and _found_when_whole(run):
         print_note(
@@ -28,7 +28,7 @@ def written_results(
             style="yellow",
         )
         return None
-    found = results_of(
+    results = results_of(
         run,
         document.tests,
         document.scoreboard,
@@ -36,16 +36,16 @@ def written_results(
         measured_anew=measured_anew,
     )
     try:
-        return prepare_results(run.path, found)
+        return prepare_results(run.path, results)
     except (ArchiveError, UsageError) as error:
         print_note(f"no file of results: {error}", style="yellow")
         return None
 
 
 def _found_when_whole(run: RunReader) -> bool:
-    """Whether sound results of this run, from before it was damaged, are beside it.
+    """Whether there are sound results of this run from before it was damaged.
 
-    A damaged run may not say its root any more; then its name has to do.
+    If a damaged run has lost its root, its name identifies it.
     """
     try:
         kept = read_any_results(results_path(run.path))

@@ -33,14 +33,14 @@ CHANNELS = ("recording", "channels", "the channels that analyses know, with unit
 MODEL = "model of identify"
 UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
 MANY = 20
-"""Options of a table from which it is listed once."""
+"""Least options of a table that is listed once only."""
 MOST = 60
-"""Options of a kind that a terminal is shown at once."""
+"""Most options of a kind that a terminal shows at once."""
 BENCH = ("bench", "bench", "what a bench file may contain", Bench)
 
 
 def list_kinds() -> None:
-    """One line per kind, and what is wrong with installed packages that have some."""
+    """Print one line per kind, and the problems of installed packages with kinds."""
     rows: list[tuple[str, str, str]] = []
     problems: list[str] = []
     for room in rooms():
@@ -56,9 +56,9 @@ def list_kinds() -> None:
 
 
 def show_kind(name: str) -> None:
-    """Every kind of that name with its options.
+    """Print all kinds of that name with their options.
 
-    Raises UsageError when there is none, or when its package is broken.
+    Raises UsageError for an unknown name or a broken package.
     """
     if name == CHANNELS[1]:
         _show_channels()
@@ -99,7 +99,7 @@ def show_kind(name: str) -> None:
 
 
 def kind_names() -> list[str]:
-    """All that `show_kind` knows, sorted."""
+    """Names for `show_kind`, sorted."""
     own = (CHANNELS[1], UNITS_KIND[1], BENCH[1])
     return sorted({*own, *experiments_by_model(), *(name for room in rooms() for name in room)})
 
@@ -123,7 +123,7 @@ def _show(
 
 
 def _each_once(infos: Sequence[OptionInfo]) -> Iterator[OptionInfo]:
-    """What several words have alike, and a table that several options take, each once."""
+    """Options without repeats: equal ones of several alternatives, and equal tables, once each."""
     tables: dict[str, str] = {}
     alike: dict[str, list[OptionInfo]] = {}
     within = "."
@@ -150,7 +150,7 @@ def _each_once(infos: Sequence[OptionInfo]) -> Iterator[OptionInfo]:
 
 
 def _show_needs(experiment: Experiment) -> None:
-    """The channels that its analysis reads, and the stages that it may have."""
+    """Print the channels that an experiment's analysis reads, and its possible stages."""
     required, optional = experiment.requires.items(), experiment.can_use.items()
     rows = [(name, "required", f"for {what}") for name, what in required]
     rows += [(name, "optional", f"without it: no {what}") for name, what in optional]
@@ -164,7 +164,7 @@ def _show_needs(experiment: Experiment) -> None:
 
 
 def _show_channels() -> None:
-    """The vocabulary."""
+    """Print the vocabulary of channels."""
     print_line(f"{CHANNELS[1]} ({CHANNELS[0]}): {CHANNELS[2]}")
     print_line()
     rows = []
@@ -175,19 +175,19 @@ def _show_channels() -> None:
 
 
 def rooms() -> Iterator[Kinds[Any]]:
-    """Everything that packages may bring kinds of."""
+    """Rooms of all kinds that packages may provide."""
     yield from (experiments(), friction_models(), specimens(), compensation_methods(), backends())
     yield from (exports(), formats())
 
 
 def _whose(room: Kinds[Any], name: str) -> str:
-    """The installed package that a kind is of; nothing for the program's own."""
+    """Text on the installed package of a kind; "" for the program's own."""
     plug_in = room.plug_in(name)
     return f" (of {plug_in.distribution} {plug_in.version})" if plug_in is not None else ""
 
 
 def _show_units() -> None:
-    """The table of units; docs/protocols.md has the grammar of what is made of them."""
+    """Print the table of units; docs/protocols.md has the grammar of compound units."""
     print_line(f"{UNITS_KIND[1]} ({UNITS_KIND[0]}): {UNITS_KIND[2]}")
     print_line()
     rows = [(name, " ".join(prefixes), "  ".join(others)) for name, prefixes, others in listed()]
@@ -217,7 +217,7 @@ def _default(info: OptionInfo) -> str:
 
 
 def _quantities(value: Any, si: str, display: str) -> str:
-    """`value` or a list of values as a reader writes it: `20 s`, `0.05 deg/s, 65 deg/s`."""
+    """Text of a value (SI) or a list of values: `20 s`, `0.05 deg/s, 65 deg/s`."""
     if isinstance(value, tuple | list):
         return ", ".join(_quantities(item, si, display) for item in value)
     return f"{convert(value, si, display):.6g} {display}"

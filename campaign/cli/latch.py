@@ -1,4 +1,4 @@
-"""A latched bench: who stopped it, and its release by a person."""
+"""A latched bench: its stop, and the release by an operator."""
 
 from __future__ import annotations
 
@@ -15,51 +15,51 @@ from campaign.recording import PanicStop
 
 
 class StillStoppedError(CampaignError):
-    """The bench was stopped and nobody has cleared that: nothing has moved."""
+    """The bench is stopped and the stop is not cleared; nothing has moved."""
 
     exit_code = ExitCode.LIMIT_OR_FAULT
 
 
 def clear_stop(backend: Backend, seen: int | None, stop: Callable[[], bool]) -> str:
-    """See that `backend` may move: where it was stopped, a person has to have seen that.
+    """Clear a panic stop of `backend` after confirmation by an operator.
 
-    Returns what was cleared and how, for the record; empty when there was nothing to clear.
+    Returns text on the cleared stop, for the record; empty without a stop.
 
     Args:
         backend: connected.
-        seen: the count of the stop that a person has seen (`--clear-stop`), or None: then whoever
-            sits at the terminal is asked. `--yes` is no answer to that.
+        seen: count of the stop that the operator has seen (`--clear-stop`); None: prompt at the
+            terminal, also with `--yes`.
         stop: whether the program is to end.
 
-    Raises StillStoppedError when it stays off, with what to do.
+    Raises StillStoppedError, with advice, if the stop is not cleared.
     """
     if not isinstance(backend, SupportsExternalStop):
         return ""
-    found = calls.panic_stop(backend)
-    if found is None:
+    latch = calls.panic_stop(backend)
+    if latch is None:
         if seen is not None:
             print_note(f"--clear-stop {seen}: the bench is not stopped")
         return ""
-    print_note(f"PANIC STOP: {latch_text(found)}", "bold red")
+    print_note(f"PANIC STOP: {latch_text(latch)}", "bold red")
     how = "at the terminal" if seen is None else f"by --clear-stop {seen}"
     if seen is None:
-        _ask(found, stop)
-        seen = found.count
-    if seen != found.count:
+        _ask(latch, stop)
+        seen = latch.count
+    if seen != latch.count:
         raise StillStoppedError(
-            f"--clear-stop {seen}: that is not the latest stop; the bench was {latch_text(found)}; "
+            f"--clear-stop {seen}: that is not the latest stop; the bench was {latch_text(latch)}; "
             "nothing was moved"
         )
     try:
         calls.called(backend, "clear_stop", seen)
-    except BackendError as error:  # another stop has come meanwhile, say
+    except BackendError as error:  # e.g. after another stop
         raise StillStoppedError(f"{error}; nothing was moved") from None
     print_note(f"stop {seen} is cleared; the bench may move")
-    return f"{latch_text(found)}, was cleared {how}"
+    return f"{latch_text(latch)}, was cleared {how}"
 
 
 def latch_text(stop: PanicStop) -> str:
-    """When, by whom, and the count that clears it."""
+    """Text on a stop: who, when, and the count that clears it."""
     when = "at a time that is not known" if stop.age is None else f"{clock(stop.age)} ago"
     return f"stopped by {stop.by}, {when} (stop {stop.count})"
 

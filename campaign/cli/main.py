@@ -1,4 +1,4 @@
-"""Running a command, and turning errors into messages and exit codes."""
+"""Execution of a command; conversion of errors into messages and exit codes."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from campaign.errors import (
 from campaign.plain_text import printable
 
 PLUG_IN_FAULT = ExitCode.LIMIT_OR_FAULT
-INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, none of the documented codes
+INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug, not a documented code
 
 
 def main() -> None:
     """Run the command line and exit with its documented code."""
-    # Our matrices are tiny, and trials already take a thread each: threads inside BLAS would only
-    # wait for one another (8 ms for an exponential that takes 15 us). Read when numpy is imported.
+    # Matrices are small, and each trial has its own thread: threads of BLAS would only block each
+    # other (8 ms for an exponential that takes 15 us). numpy reads the variable at import.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with plain_streams():
         _run()
@@ -43,7 +43,7 @@ def _run() -> None:
         if plug_in := blamed(leaving):
             _leave(f"campaign: {plug_in.package} failed: {one_line(leaving)}", PLUG_IN_FAULT)
         raise
-    except ProtocolError as error:  # as it is: editors jump to file:line:column
+    except ProtocolError as error:  # unchanged text: editors jump to file:line:column
         explain_in_debug()
         _leave(str(error), error.exit_code)
     except CampaignError as error:
@@ -51,7 +51,7 @@ def _run() -> None:
         _leave(f"campaign: {error}", error.exit_code)
     except KeyboardInterrupt:
         _leave("campaign: interrupted", ExitCode.INTERRUPTED)
-    except Exception as error:  # noqa: BLE001 - a bug: no traceback unless asked for
+    except Exception as error:  # noqa: BLE001 - a bug: traceback on request only
         explain_in_debug()
         again = f"Set {DEBUG}=1 and run the command again for its traceback."
         if plug_in := blamed(error):
@@ -61,7 +61,7 @@ def _run() -> None:
 
 
 def _check_texts() -> None:
-    """Raise UsageError where a name cannot be kept: archives and pages are UTF-8."""
+    """Raise UsageError for a name that is not valid UTF-8, the encoding of archives and pages."""
     try:
         here = str(Path.cwd())
     except FileNotFoundError:
@@ -76,7 +76,7 @@ def _check_texts() -> None:
 
 
 def _by_interrupt(leaving: SystemExit) -> bool:
-    """Whether typer has made this of a KeyboardInterrupt, without a word."""
+    """Whether typer has converted a KeyboardInterrupt into this SystemExit."""
     return isinstance(getattr(leaving.__context__, "__cause__", None), KeyboardInterrupt)
 
 

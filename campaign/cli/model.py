@@ -34,12 +34,12 @@ Array = NDArray[np.float64]
 AnyModel = FrictionModel | Specimen
 
 CYCLES = 4
-"""The last one is shown: a state has settled by then."""
+"""Simulated cycles; the last one is shown, with settled states."""
 PER_CYCLE = 2_000
-"""Samples of a cycle at first, and of what is shown."""
+"""Samples of a cycle at the first step, and in the figure."""
 FINEST = 256 * PER_CYCLE
 ACCURACY = 1e-3
-"""Share of the largest friction by which half the step may change it."""
+"""Largest change of the friction by half the step, relative to the largest friction."""
 
 
 class MotionOptions(Options):
@@ -53,10 +53,10 @@ class MotionOptions(Options):
 
 @dataclass(frozen=True)
 class ModelCycle:
-    """What a model makes of the last cycle; SI, shape (PER_CYCLE,) each.
+    """Response of a model in the last cycle; SI, shape (PER_CYCLE,).
 
     Attributes:
-        change: by which half the step changed the friction, as a share of the largest.
+        change: of the friction by half the step, relative to the largest friction.
     """
 
     model: AnyModel
@@ -72,16 +72,16 @@ def show_models(
     bench: str,
     output: Path | None,
 ) -> Path:
-    """Draw friction over rate, angle and time; the picture's path, its numbers are beside it.
+    """Draw friction over rate, angle and time; return the path of the picture (with a CSV file).
 
     Args:
         names: of friction models and specimens.
         motion: `MotionOptions` as written.
         changes: `PARAMETER=VALUE`, for every model that has the parameter.
-        bench: whose first friction interface gives the other parameters.
-        output: of the picture, `.svg`.
+        bench: its first friction interface provides the other parameters.
+        output: path of the picture, `.svg`.
 
-    Raises UsageError: no such model, parameter or file; a parameter that is missing.
+    Raises UsageError for an unknown model, parameter or file, and for a missing parameter.
     """
     asked = find_faults(MotionOptions, motion)
     if isinstance(asked, list):
@@ -92,8 +92,8 @@ def show_models(
     chosen = list(_chosen(names, changes, bench))
     met = [_met(model, options, asked) for model, options in chosen]
     for each in met:
-        told = f"half the step changes it by {number(100 * each.change, 2)} % at most"
-        print_line(f"{each.model.name}: {each.model.summary}; {told}")
+        accuracy = f"half the step changes it by {number(100 * each.change, 2)} % at most"
+        print_line(f"{each.model.name}: {each.model.summary}; {accuracy}")
     with writing(path):
         path.write_text(draw(_figure(met, asked)), encoding="utf-8", newline="\n")
         table = _table(met, asked)
@@ -106,7 +106,7 @@ def show_models(
 def _chosen(
     names: Sequence[str], changes: Sequence[str], bench: str
 ) -> Iterator[tuple[AnyModel, Any]]:
-    """Each model with its validated options."""
+    """Models with their validated options."""
     rooms: Sequence[Kinds[Any]] = (friction_models(), specimens())
     every = [name for room in rooms for name in room]
     if wrong := [name for name in names if name not in every]:
@@ -131,9 +131,9 @@ def _chosen(
                 tree[key] = reduce(lambda value, step: {step: value}, deeper[::-1], override.value)
         options = find_faults(known[name].options, tree)
         if isinstance(options, list):
-            told = (": ".join((*map(str, place), message)) for place, _, message in options)
+            messages = (": ".join((*map(str, place), message)) for place, _, message in options)
             raise UsageError(
-                f"{name}: {'; '.join(told)}; --set PARAMETER=VALUE states it, and "
+                f"{name}: {'; '.join(messages)}; --set PARAMETER=VALUE states it, and "
                 f"`campaign kinds {name}` lists all"
             )
         yield known[name], options
@@ -143,7 +143,7 @@ def _chosen(
 
 
 def _met(model: AnyModel, options: Any, motion: MotionOptions) -> ModelCycle:
-    """With a step that is halved until that changes little."""
+    """Simulate a model; the step is halved until the change is at most `ACCURACY`."""
     per_cycle, coarse = PER_CYCLE, _cycle(model, options, motion, PER_CYCLE)
     while True:
         per_cycle *= 2
@@ -155,7 +155,7 @@ def _met(model: AnyModel, options: Any, motion: MotionOptions) -> ModelCycle:
 
 
 def _cycle(model: AnyModel, options: Any, motion: MotionOptions, per_cycle: int) -> Array:
-    """Friction in the last cycle, at `PER_CYCLE` samples of it."""
+    """Friction in the last cycle, at `PER_CYCLE` samples."""
     if isinstance(model, Specimen):
         time, _, angle = _motion(motion, CYCLES, per_cycle)
         friction = model.torque(options, time, angle)

@@ -1,6 +1,6 @@
-"""`campaign new`: a package with one kind, a test of it, and what pip needs to install it.
+"""`campaign new`: an installable package with one kind and its test.
 
-The texts lie in `package_templates`; the pages of docs/developers show the same ones.
+The texts are in `package_templates`; the pages of docs/developers show the same ones.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ POINTS = {
     "backend": ("campaign.backends", "BACKEND"),
     "format": ("campaign.exports", "EXPORT"),
 }
-"""By what is made: the group of its entry point, and the object in its module."""
+"""Group of the entry point, and the object in the module, by kind."""
 
 
 def new_package(kind: str, name: str, folder: Path) -> None:
-    """Write the package NAME with a kind of that name into a new folder, and say how to go on.
+    """Write the package NAME with a kind of that name into a new folder, and print the next steps.
 
-    Raises UsageError when the kind is unknown, the name is none for a module or taken, or the
-    folder is there already or cannot be written.
+    Raises UsageError for an unknown kind, an invalid or used name, and a folder that exists or
+    cannot be written.
     """
     if kind not in POINTS:
         raise UsageError(f"there is no package for {kind!r}; there are {', '.join(POINTS)}")
@@ -46,7 +46,7 @@ def new_package(kind: str, name: str, folder: Path) -> None:
 
 
 def package_files(kind: str, name: str) -> dict[str, str]:
-    """The text of each file by its path in the package."""
+    """Texts of the files by path in the package."""
     group, attribute = POINTS[kind]
     words = {
         "name": name,
@@ -69,6 +69,6 @@ def package_files(kind: str, name: str) -> dict[str, str]:
 def _check_name(name: str) -> None:
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or len(name) > 60:
         raise UsageError(f"{name!r} is no name: lower-case letters and digits, single _ between")
-    spec = importlib.util.find_spec(name)  # also of a mere folder, which has no origin
+    spec = importlib.util.find_spec(name)  # a plain folder has one too, without an origin
     if keyword.iskeyword(name) or (spec is not None and spec.origin is not None):
         raise UsageError(f"{name!r} is a name of Python or of an installed package; take another")

@@ -1,9 +1,9 @@
 """Printing: rich on a terminal, plain lines elsewhere; no markup from files.
 
-What a file, a line or a command line has brought must not command the terminal. Two doors see to
-it, whoever prints: inside of `plain_streams`, whatever is written to standard output or standard
-error loses its control characters; the consoles of this module write past that, and take them out
-of what they are given before they add their own.
+Text from a file, a serial line or the command line must not control the terminal. Two filters
+remove control characters. `plain_streams` filters all writes to standard output and standard error.
+The consoles of this module bypass these streams; they filter their input and then add their own
+control characters.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from rich.text import Text
 from campaign.plain_text import json_text, printable
 
 TYPED = "  campaign "
-"""What a line begins with that is to be typed as it is, and therefore never broken."""
+"""Start of a line with a command to type, which is never wrapped."""
 INTERVAL = 10.0
-"""s between two lines of one phase where nothing is redrawn."""
+"""Seconds between two lines of one phase without redrawing."""
 ONE_LINE = 20
-"""Characters up to which no cell of a table on a terminal goes on below."""
+"""Longest cell of a table, in characters, that is never wrapped."""
 
 
 _ours: TextIO | None = None
@@ -46,7 +46,7 @@ _ours: TextIO | None = None
 
 
 class PlainConsole(Console):
-    """A console that obeys nothing in what it prints; cursor and colours are its own."""
+    """A console that removes control characters from its input; cursor and colors are its own."""
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(file=_beneath(stream), markup=False, highlight=False, emoji=False)
@@ -54,13 +54,13 @@ class PlainConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterator[Segment]:
-        """The pieces of what is printed, each without control characters but line ends."""
+        """Segments of the output without control characters except tabs and line ends."""
         for text, style, control in super().render(renderable, options):
             yield Segment(text if control else _plain(text), style, control)
 
 
 class PlainStream:
-    """A text stream without control characters but tabs and line ends."""
+    """A text stream without control characters except tabs and line ends."""
 
     def __init__(self, stream: TextIO) -> None:
         self.beneath = stream
@@ -74,7 +74,7 @@ class PlainStream:
             self.write(line)
 
     def __getattr__(self, name: str) -> Any:
-        if name == "buffer":  # there is no way past
+        if name == "buffer":  # it would bypass the filter
             raise AttributeError(name)
         return getattr(self.beneath, name)
 
@@ -103,7 +103,7 @@ def redirect_prints() -> Iterator[None]:
 
 
 class _Kept(io.StringIO):
-    """What is written for a terminal, kept."""
+    """Buffer for output to a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -111,8 +111,9 @@ class _Kept(io.StringIO):
 
 @contextmanager
 def paged() -> Iterator[None]:
-    """Inside the block, output for a terminal is kept; what is longer than its screen is then
-    shown by the program that `PAGER` names (`less`; "" or `cat` for none).
+    """Inside the block, buffer output to a terminal.
+
+    Output longer than the screen goes to the program `PAGER` (`less`; "" or `cat` for none).
     """
     before = sys.stdout
     if before is None or not before.isatty():
@@ -132,7 +133,7 @@ def paged() -> Iterator[None]:
 
 
 def _paged(command: Sequence[str], text: str) -> bool:
-    """Whether a pager has shown the text; as of `git`, `less` keeps its colours."""
+    """Whether a pager has shown the text; `less` keeps colors, as with `git`."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the pager
     try:
         environment = {"LESS": "FRX", **os.environ}
@@ -145,46 +146,46 @@ def _paged(command: Sequence[str], text: str) -> bool:
 
 
 def _beneath(stream: TextIO) -> TextIO:
-    """What a plain stream writes to, also while a live display has put itself in front."""
+    """Stream below a plain stream, also during a live display."""
     stream = getattr(stream, "rich_proxied_file", stream)
     return stream.beneath if isinstance(stream, PlainStream) else stream
 
 
 def console() -> Console:
-    """Standard output: what a command was asked for."""
+    """Console for standard output: the requested output of a command."""
     return PlainConsole(_ours or sys.stdout)
 
 
 def error_console() -> Console:
-    """Standard error: progress, warnings, everything else."""
+    """Console for standard error: progress, warnings, everything else."""
     return PlainConsole(sys.stderr)
 
 
 def on_a_terminal() -> bool:
-    """Whether a person reads the output."""
+    """Whether the output is a terminal."""
     return console().is_terminal
 
 
 def print_line(text: str = "", hang: int = 0) -> None:
-    """One line of output; on a terminal it goes on below between words, and no word is broken.
+    """Print one line; on a terminal it is wrapped between words.
 
-    hang: columns by which what goes on below is indented further.
+    hang: further indent, in columns, of wrapped lines.
     """
     _print_words(console(), Text(_plain(text)), hang)
 
 
 def print_text(text: str) -> None:
-    """Output in lines that are as they are, also on a terminal."""
+    """Print text without wrapping, also on a terminal."""
     (_ours or sys.stdout).write(text)
 
 
 def print_note(text: str, style: str = "") -> None:
-    """One line on standard error, likewise."""
+    """Print one line on standard error, like `print_line`."""
     _print_words(error_console(), Text(_plain(text), style=style))
 
 
 def _print_words(out: Console, text: Text, hang: int = 0) -> None:
-    """Line by line; where a terminal is too narrow for one, the rest of it goes below, indented."""
+    """Print text; on a terminal, wrap lines that are too long."""
     if out.is_terminal:
         text = Text(_broken(text.plain, out.width, hang), style=text.style)
     out.print(text, soft_wrap=True)
@@ -207,10 +208,10 @@ def _wrapped(line: str, width: int, hang: int) -> str:
 
 @contextmanager
 def waiting(first: str) -> Iterator[Callable[[str, str], None]]:
-    """What is done meanwhile, on standard error; hand on the phase, and all of it in words.
+    """Show progress on standard error; yields a function of the phase and the full text.
 
-    A line redrawn in place on a terminal, which begins with `first`; elsewhere one for each phase,
-    and one now and then.
+    On a terminal, one line redrawn in place, first with `first`. Elsewhere, a line for each phase,
+    at most every `INTERVAL` seconds.
     """
     out = error_console()
     if out.is_terminal and not out.is_dumb_terminal:
@@ -229,18 +230,18 @@ def waiting(first: str) -> Iterator[Callable[[str, str], None]]:
 
 
 def _joined(text: str) -> str:
-    """An uncertainty in one line with its number: no line is broken at these spaces."""
+    """Text with no-break spaces around ±, so that a number and its uncertainty stay together."""
     return text.replace(" ± ", "\xa0±\xa0")
 
 
 def open_page(page: Path) -> None:
-    """In a browser; a note where there is none."""
+    """Open a page in a browser; print a note without a browser."""
     if not webbrowser.open(page.resolve().as_uri()):
         print_note("no browser was found; open the file by hand", style="yellow")
 
 
 def print_json(tree: Any) -> None:
-    """For machines: every letter of every text, escaped where it is not printable."""
+    """Print JSON; unprintable characters are escaped, none is removed."""
     print_line(json_text(tree))
 
 
@@ -251,13 +252,12 @@ def print_table(
     spare: Sequence[str] = (),
     beside: bool = False,
 ) -> None:
-    """A table for people on a terminal, tab-separated lines for other programs.
+    """Print a table on a terminal, tab-separated lines elsewhere.
 
-    On a terminal no word is broken: columns that are `spare` are left out, the first of them first,
-    until the others fit, and rows that fit in no way stand one cell below the other. What was left
-    out is named in a line below.
+    On a terminal no word is broken. `spare` columns are left out in their order until the others
+    fit; a line below names them. If no table fits, each row is printed with one cell per line.
 
-    beside: on standard error.
+    beside: print on standard error.
     """
     out = error_console() if beside else console()
     if not out.is_terminal:
@@ -272,10 +272,10 @@ def print_table(
             _print_record(out, headings, row)
         return
     out.print(fitting)
-    there = {str(column.header) for column in fitting.columns}
-    if missing := [heading for heading in headings if heading not in there]:
-        told = f"left out: {', '.join(missing)}; with `| cat` all is shown"
-        _print_words(out, Text(told, style="dim"))
+    headers = {str(column.header) for column in fitting.columns}
+    if missing := [heading for heading in headings if heading not in headers]:
+        note = f"left out: {', '.join(missing)}; with `| cat` all is shown"
+        _print_words(out, Text(note, style="dim"))
 
 
 def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
@@ -284,7 +284,7 @@ def _columns(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator
 
 
 def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table | None:
-    """A table that fits the terminal; None where there is none."""
+    """Table that fits the terminal; None if that is not possible."""
     unlimited = out.options.update(width=1_000_000)
     while True:
         widths = [_least(column) for column in columns]
@@ -298,14 +298,14 @@ def _fitting(out: Console, columns: list[list[str]], spare: list[str]) -> Table 
 
 
 def _least(column: Sequence[str]) -> int:
-    """Width at which no word is broken; short cells and names stay in one line."""
+    """Least width without broken words; short cells and names stay in one line."""
     whole = all(cell_len(cell) <= ONE_LINE or " " not in cell for cell in column)
     parts = (part for cell in column for part in ([cell] if whole else cell.split(" ")))
     return max(cell_len(line) for part in parts for line in part.split("\n"))
 
 
 def _shared(columns: Sequence[Sequence[str]], widths: list[int], left: int) -> list[int]:
-    """The widths, and what is left of a line given to whoever needs it, least need first."""
+    """Widths with the free width of a line shared between the columns, least need first."""
     needs = [max(map(cell_len, column)) - at for column, at in zip(columns, widths, strict=True)]
     wider = list(widths)
     for place, each in enumerate(order := sorted(range(len(needs)), key=needs.__getitem__)):
@@ -316,7 +316,7 @@ def _shared(columns: Sequence[Sequence[str]], widths: list[int], left: int) -> l
 
 
 def _table(columns: Sequence[Sequence[str]], widths: Sequence[int]) -> Table:
-    """Columns of these widths, each with its heading first."""
+    """Table from columns of these widths, each with its heading first."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column, width in zip(columns, widths, strict=True):
         table.add_column(column[0], width=width)
@@ -327,12 +327,12 @@ def _table(columns: Sequence[Sequence[str]], widths: Sequence[int]) -> Table:
 
 
 def _broken(text: str, width: int, hang: int = 0) -> str:
-    """Each line of a text in lines of that width."""
+    """Text with each line wrapped to that width."""
     return "\n".join(_wrapped(line, width, hang) for line in text.split("\n"))
 
 
 def _print_record(out: Console, headings: Sequence[str], row: Sequence[str]) -> None:
-    """A row where no table fits: its first cell, and what else there is below it, line by line."""
+    """Print a row that fits in no table: the first cell, then one line per other cell."""
     _print_words(out, Text(row[0], style="bold"))
     wide = max(map(len, headings[1:]), default=0)
     for heading, cell in zip(headings[1:], row[1:], strict=True):
@@ -345,7 +345,7 @@ def _plain(text: str) -> str:
 
 
 def bytes_text(count: int) -> str:
-    """Bytes for people, decimal: `14.2 MB`."""
+    """Text of a byte count, decimal: `14.2 MB`."""
     size, unit = float(count), "B"
     for unit in ("B", "kB", "MB", "GB", "TB"):
         if size < 1000 or unit == "TB":

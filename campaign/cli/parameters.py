@@ -19,22 +19,22 @@ def option(name: str, metavar: str, told: str, **more: Any) -> Any:
 
 
 def flag(name: str, told: str) -> Any:
-    """An option that is there or not."""
+    """An option without a value."""
     return typer.Option(name, help=told)
 
 
 def several(name: str, metavar: str, told: str) -> Any:
-    """An option of which each value is one more."""
+    """An option that may be given again."""
     return typer.Option(name, metavar=metavar, help=f"{told}; may be given again.")
 
 
 def argument(metavar: str, told: str, **more: Any) -> Any:
-    """An argument; whether it may be absent is what its metavar shows."""
+    """An argument; brackets in its metavar mark an optional one."""
     return typer.Argument(metavar=metavar, help=told, show_default=False, **more)
 
 
 def workers_option(told: str) -> Any:
-    """`--workers`: how many of something at once, one per processor when absent."""
+    """`--workers`: count of parallel items; by default one per processor."""
     told = f"{told}; one per processor if absent."
     return option("--workers", "N", told, min=1, max=256)
 

@@ -37,20 +37,20 @@ from campaign.trial import Most, Role, Trial
 from campaign.units import Quantity, convert
 
 NOTES = 5
-"""of a test that are shown; the others are in the JSON."""
+"""Most notes of a test that the text shows; the JSON has all."""
 LEAST = 0.005
-"""Share of a limit from which on its use is shown."""
+"""Least share of a limit for its use to be shown."""
 
 
 def show_plan(request: Request, results: Path, *, as_json: bool, details: bool = False) -> ExitCode:
-    """Show the plan; ARCHIVE when the run that it would replay is damaged.
+    """Show the plan; return ARCHIVE if the run to replay is damaged.
 
-    details: of several tests, too.
+    details: show them also for several tests.
 
-    Raises LimitError, after that, when it breaks a limit or is unstable.
+    Raises LimitError, after printing, if the plan exceeds a limit or is unstable.
     """
     prepared = prepare(request)
-    backend = prepared.open_backend()  # refuses what it cannot execute; it is not connected
+    backend = prepared.open_backend()  # checks the trials; does not connect
     source = archive_of(backend)
     losses = _losses(prepared.plan, lacking(backend, prepared.plan.trials))
     cost = costs(backend, prepared.plan)
@@ -67,7 +67,7 @@ def show_plan(request: Request, results: Path, *, as_json: bool, details: bool =
 
 
 def _losses(plan: Plan, names: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
-    """Each channel that a test could use and will not have, and what there will be none of."""
+    """Missing channels that tests could use, each with the results that need it."""
     known = experiments()
     return [
         {"test": test.name, "channel": name, "no": lost_without(known[test.kind], name)}
@@ -113,7 +113,7 @@ def _print(
 
 
 def in_short(most: Most) -> str:
-    """E.g. `at most 14 trials, 0:42 of bench time`."""
+    """Text such as `at most 14 trials, 0:42 of bench time`."""
     return f"at most {_trials(most.trials)}, {clock(most.duration)} of bench time"
 
 
@@ -122,7 +122,7 @@ def _trials(count: int) -> str:
 
 
 def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
-    """Each later stage of a test, over all points of its matrix."""
+    """Lines on the later stages of a test, each over all points of its matrix."""
     for number in sorted({stage.number for stage in stages}):
         own = [stage for stage in stages if stage.number == number]
         points = f" at {len(own)} points" if len(own) > 1 else ""
@@ -130,7 +130,7 @@ def stage_lines(stages: Sequence[PlannedStage]) -> Iterator[str]:
 
 
 def print_warnings(plan: Plan) -> None:
-    """What experiments say of their tests, and a line for each that is stable and hardly so."""
+    """Print the warnings of experiments, and a line for each low stability margin."""
     tests: dict[str, list[str]] = {}
     for test in plan.tests:
         for line in test.warnings:
@@ -146,7 +146,7 @@ def _sought(test: PlannedTest) -> str:
 
 
 def _by_hand(trials: Sequence[Trial]) -> Iterator[str]:
-    """What a person does before which trial, as often as it changes within the test."""
+    """Lines on manual steps before trials, at each change within the test."""
     done: tuple[str, ...] = ()
     steps = []
     for trial in trials:
@@ -166,7 +166,7 @@ KEPT = {
 
 
 def policy_lines(policy: Policy) -> Iterator[str]:
-    """What the protocol wants done besides its trials, a line for each thing."""
+    """Lines on the protocol's policy: faults, rests, kept samples."""
     if policy.faults:
         responses = (f"{name}: {_response(one)}" for name, one in policy.faults.items())
         others = () if "default" in policy.faults else ("else: skip",)
@@ -194,13 +194,13 @@ def _row(test: PlannedTest) -> tuple[str, ...]:
 
 
 def _closest(test: PlannedTest) -> list[LimitUse]:
-    """How close it comes to its limits, the closest first; those that it hardly uses apart."""
-    found = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)
-    return [use for use in found if use is found[0] or use.margin.fraction >= LEAST]
+    """Uses of the limits, the closest first; without hardly used ones after the first."""
+    uses = sorted(test.closest, key=lambda use: use.margin.fraction, reverse=True)
+    return [use for use in uses if use is uses[0] or use.margin.fraction >= LEAST]
 
 
 def _print_needed(plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]]) -> None:
-    """What somebody must do, what there will be none of, and what may follow."""
+    """Print manual steps, missing results and later stages of a test."""
     trials = [plan.trials[number - 1] for number in test.numbers]
     lacking = (f"without {loss['channel']}: no {loss['no']}" for loss in losses)
     for line in (*_by_hand(trials), *lacking, *stage_lines(test.stages)):
@@ -217,7 +217,7 @@ def _print_chosen(test: PlannedTest) -> None:
 def _print_details(
     plan: Plan, test: PlannedTest, losses: Sequence[Mapping[str, str]], cost: Cost | None
 ) -> None:
-    """How close the test comes to every limit, and what its trials are noted with."""
+    """Print all details of a test: limits, options, loop, stages, cost, notes."""
     trials = [plan.trials[number - 1] for number in test.numbers]
     print_line(f"{test.name}{f': {test.title}' if test.title else ''}")
     warm_ups = sum(trial.role is Role.WARM_UP for trial in trials)
@@ -258,7 +258,7 @@ def _print_details(
 
 
 def chosen_lines(test: PlannedTest) -> Iterator[str]:
-    """One line for each: `settle_angle = "1 deg"`, and why."""
+    """Lines on the chosen options: `settle_angle = "1 deg"`, and the reason."""
     texts = {name: as_toml(test.kind, name, test.options[name]) for name in test.chosen}
     width = max((len(f"{name} = {text}") for name, text in texts.items()), default=0)
     for name, reason in test.chosen.items():
@@ -267,7 +267,7 @@ def chosen_lines(test: PlannedTest) -> Iterator[str]:
 
 
 def as_toml(kind: str, name: str, value: Any) -> str:
-    """An option's value (SI) as a protocol writes it; of a long list the ends."""
+    """Value (SI) of an option in protocol syntax; a long list is shortened."""
     known = {info.name: info.quantity for info in describe(experiments()[kind].options)}
     quantity = known.get(name)
     quantity = quantity and quantity.here
@@ -293,14 +293,14 @@ MILLISECOND = 1e-3
 
 @dataclass(frozen=True)
 class Cost:
-    """Of the trials of one test.
+    """Cost of the trials of one test.
 
     Attributes:
-        steps: of the integration, in all.
+        steps: total integration steps.
         shortest, longest: step (s).
-        because: what the shortest is needed for; empty when it is as long as steps get.
+        because: reason for the shortest step; empty for the longest possible one.
         of_milliseconds: steps per millisecond of bench time, on average.
-        alone: trials that are executed one by one, because too few of the plan are like them.
+        alone: count of trials executed one by one, as too few of the plan have their structure.
     """
 
     steps: int
@@ -312,18 +312,18 @@ class Cost:
 
 
 def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
-    """By test; empty for a backend that does not compute."""
+    """Costs by test; empty for a backend that does not simulate."""
     if not isinstance(backend, KnowsCost):
         return {}
     like = _like(plan)
     alone = _alone(backend, like)
     known = {trial.number: backend.cost(trial) for trial in like.values()}
-    found = {}
+    by_test = {}
     for test in plan.tests:
         each = [known[like[number].number] for number in test.numbers]
         shortest = min(each, key=lambda cost: cost.step)
         steps = sum(cost.steps for cost in each)
-        found[test.name] = Cost(
+        by_test[test.name] = Cost(
             steps=steps,
             shortest=shortest.step,
             longest=max(cost.step for cost in each),
@@ -331,17 +331,17 @@ def costs(backend: Backend, plan: Plan) -> Mapping[str, Cost]:
             of_milliseconds=MILLISECOND * steps / sum(cost.steps * cost.step for cost in each),
             alone=sum(number in alone for number in test.numbers),
         )
-    return found
+    return by_test
 
 
 def _like(plan: Plan) -> dict[int, Trial]:
-    """By number, the first trial that differs in its seed alone: its cost stands for all."""
+    """First trial that differs in its seed only, by number: both have the same cost."""
     first: dict[Hashable, Trial] = {}
     return {t.number: first.setdefault(t.apart_from_seed, t) for t in plan.trials}
 
 
 def _alone(backend: Backend, like: Mapping[int, Trial]) -> frozenset[int]:
-    """Numbers of the trials that have too few companions."""
+    """Numbers of the trials in groups that are too small for joint execution."""
     if not isinstance(backend, ExecutesTogether):
         return frozenset()
     group = {trial.number: backend.group(trial) for trial in like.values()}
@@ -351,7 +351,7 @@ def _alone(backend: Backend, like: Mapping[int, Trial]) -> frozenset[int]:
 
 
 def cost_lines(cost: Cost) -> Iterator[str]:
-    """For people: the step, why it is what it is, and what cannot be done together."""
+    """Lines on the step, its reason, and trials that are simulated alone."""
     step = f"{1e3 * cost.shortest:.4g}"
     if cost.longest != cost.shortest:
         step += f" to {1e3 * cost.longest:.4g}"

@@ -1,4 +1,4 @@
-"""From the command line to a plan and a backend."""
+"""Plan and backend from the command line."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from campaign.text import nearest
 from campaign.trial import Tree, Trial
 
 IMPORT = "import"
-"""The backend that serves what was recorded elsewhere."""
+"""Backend for recordings of other programs."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What `plan` and `run` have in common, as typed.
+    """Common arguments of `plan` and `run`, as typed.
 
     Attributes:
         changes: every `--set`, those of the backend included.
         seed: for tests without their own; drawn when None.
-        truth: a bench that is simulated in place of each test's; empty: what the tests say.
+        truth: bench to simulate in place of each test's; empty: as the tests state.
     """
 
     protocol: str
@@ -52,7 +52,7 @@ class Request:
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A plan and the backend that is to execute it, not yet connected."""
+    """A plan and its backend, not yet connected."""
 
     path: Path
     plan: Plan
@@ -60,7 +60,7 @@ class PreparedRun:
     options: Options
 
     def open_backend(self) -> Backend:
-        """A backend that accepts every trial of the plan. Raises UsageError when it does not."""
+        """Open the backend. Raises UsageError if it refuses a trial of the plan."""
         return open_backend(self.kind, self.options, self.plan.trials, self.plan.truths)
 
 
@@ -69,16 +69,16 @@ def prepare(request: Request) -> PreparedRun:
     path = find_protocol(request.protocol)
     kind = find_backend(request.backend)
     ours = tuple(text for text in request.changes if _is_backend_setting(text))
-    theirs = tuple(text for text in request.changes if text not in ours)
+    overrides = tuple(text for text in request.changes if text not in ours)
     options = backend_options(kind, ours)
     protocol = load_protocol(
         path,
         experiments(),
-        overrides=theirs,
+        overrides=overrides,
         shipped=protocols_folder(),
         truth=request.truth,
     )
-    _check_recordings(protocol, kind)  # before what only a simulation asks for
+    _check_recordings(protocol, kind)  # before the requirements of a simulation
     check_benches(protocol, kind.needs, f"the backend {kind.name!r}", request.only)
     options = _with_mapping(options, protocol)
     with _as_executed(protocol, kind) as protocol:
@@ -90,7 +90,7 @@ def prepare(request: Request) -> PreparedRun:
 
 
 def _check_keep(plan: Plan, kind: BackendKind) -> None:
-    """Raise UsageError where samples that are not kept would be missed."""
+    """Raise UsageError if samples are needed that the protocol does not keep."""
     keep = plan.protocol.policy.keep
     if keep == "all":
         return
@@ -114,14 +114,14 @@ def _check_keep(plan: Plan, kind: BackendKind) -> None:
 
 
 def _with_mapping(options: Options, protocol: Protocol) -> Options:
-    """A backend that reads files by a mapping has that of the protocol, unless it names one."""
+    """Options with the protocol as mapping, for a backend that needs one and names none."""
     if protocol.columns and getattr(options, "mapping", None) == "":
         return options.model_copy(update={"mapping": str(protocol.path.resolve())})
     return options
 
 
 def _as_executed(protocol: Protocol, kind: BackendKind) -> AbstractContextManager[Protocol]:
-    """The protocol with the recordings that its tests have in place of trials, if they have any."""
+    """Protocol with the recordings of its tests in place of trials, for the backend `import`."""
     if kind.name == IMPORT:
         from campaign.importing.recorded_tests import with_recordings
 
@@ -130,7 +130,7 @@ def _as_executed(protocol: Protocol, kind: BackendKind) -> AbstractContextManage
 
 
 def _check_recordings(protocol: Protocol, kind: BackendKind) -> None:
-    """Raise ProtocolError where a test has recordings and the backend executes trials."""
+    """Raise ProtocolError if a test has recordings and the backend executes trials."""
     if kind.name == IMPORT:
         return
     for test in protocol.tests:
@@ -149,12 +149,12 @@ def open_backend(
     trials: Sequence[Trial],
     truths: Mapping[str, Tree] | None = None,
 ) -> Backend:
-    """A backend that accepts every one of `trials`, not yet connected.
+    """Open a backend that accepts all `trials`, without connecting it.
 
     `truths`: the plants that the trials name, for a backend that simulates them.
 
-    Raises UsageError when it does not, or is known not to record what one of them requires;
-    ArchiveError when it does not and the run that it serves is damaged.
+    Raises UsageError if it refuses a trial (ArchiveError if the run that it replays is damaged), or
+    is known not to record a required channel.
     """
     backend = calls.opened(kind, options)
     if isinstance(backend, SimulatesTruth):
@@ -179,11 +179,10 @@ def open_backend(
 
 
 def check_connected(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:
-    """Ask a connected backend again what it could not know before, while nothing has moved.
+    """Check a connected backend again, with data from its bench, before anything moves.
 
-    Raises UsageError when it refuses one of `trials` now, by what its bench has said of itself, or
-    does not record what one requires. Only who moves something is asked for refusals again: for
-    the others a trial that is refused later costs nothing but time.
+    Raises UsageError if it refuses one of `trials` or does not record a required channel. Refusals
+    are checked for live backends only: for others, a later refusal costs only time.
     """
     trials = tuple(trials)
     for trial in trials if kind.live else ():
@@ -199,18 +198,18 @@ def _refused(kind: BackendKind, backend: Backend, trial: Trial) -> str:
 
 
 def check_channels(kind: BackendKind, backend: Backend, trials: Iterable[Trial]) -> None:
-    """Raises UsageError when the backend is known not to record what one of `trials` requires.
+    """Raise UsageError if the backend is known not to record a channel that a trial requires.
 
-    What it cannot know before it is connected is asked again when it is.
+    `check_connected` repeats the check when the backend is connected.
     """
-    told: dict[tuple[str, tuple[str, ...]], str] = {}  # of several trials alike the first
+    messages: dict[tuple[str, tuple[str, ...]], str] = {}  # the first of several equal trials
     for trial in trials:
         known = calls.channels(backend, trial) if trial.requires else None
         names = () if known is None else tuple(missing(trial.requires, known))
-        if names and (trial.test, names) not in told:
-            told[trial.test, names] = _not_recorded(kind, trial, names)
-    if told:
-        raise UsageError("\n".join(told.values()))
+        if names and (trial.test, names) not in messages:
+            messages[trial.test, names] = _not_recorded(kind, trial, names)
+    if messages:
+        raise UsageError("\n".join(messages.values()))
 
 
 def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
@@ -224,11 +223,11 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
         from campaign.importing.description import RecordingDescription
 
         described = RecordingDescription.model_validate(trial.recording, context={"si": True})
-        there = ", ".join(each.name for each in described.channels)
+        recorded = ", ".join(each.name for each in described.channels)
         tables = ", ".join(f"[columns.NAME.{name}]" for name in names)
         return (
             f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}\n"
-            f"its mapping makes {there}: say by {tables} which column it is"
+            f"its mapping makes {recorded}: say by {tables} which column it is"
         )
     return (
         f"{trial.name} ({trial.label}): the experiment {trial.kind!r} requires {what}; "
@@ -238,21 +237,22 @@ def _not_recorded(kind: BackendKind, trial: Trial, names: Sequence[str]) -> str:
 
 
 def lacking(backend: Backend, trials: Iterable[Trial]) -> dict[str, tuple[str, ...]]:
-    """By test, the channels that its analysis can use and that are known not to be recorded."""
-    found: dict[str, dict[str, None]] = {}
+    """Channels by test that its analysis can use but the backend is known not to record."""
+    by_test: dict[str, dict[str, None]] = {}
     for trial in trials:
         known = calls.channels(backend, trial) if trial.can_use else None
         if known is not None and (names := missing(trial.can_use, known)):
-            found.setdefault(trial.test, {}).update(dict.fromkeys(names))
-    return {test: tuple(names) for test, names in found.items()}
+            by_test.setdefault(trial.test, {}).update(dict.fromkeys(names))
+    return {test: tuple(names) for test, names in by_test.items()}
 
 
 def short_settings(
     port: str | None, source: str | None, results: Path, handover: Path | None = None
 ) -> tuple[str, ...]:
-    """`--port`, `--from`, `--handover` as the `--set` they are short for.
+    """Settings (`--set`) that `--port`, `--from` and `--handover` stand for.
 
-    A run is looked for in `results`; a folder is where it is from here, also at a resume.
+    `results`: folder of a named run. A folder becomes an absolute path, which stays valid at a
+    resume.
     """
     settings = {
         "port": port,
@@ -267,9 +267,9 @@ def short_settings(
 
 
 def find_protocol(text: str) -> Path:
-    """The file `text`; else, of that name, the one in `protocols/` here or the shipped one.
+    """Path of a protocol: the file `text`, else that name in `protocols/`, else a shipped one.
 
-    Which of these two it is stands on standard error. Raises UsageError where there is none.
+    Prints one found by name on standard error. Raises UsageError without a match.
     """
     path, name = Path(text), text.removesuffix(".toml")
     if path.exists() and not path.is_dir():
@@ -280,7 +280,7 @@ def find_protocol(text: str) -> Path:
             print_note(f"protocol: {found}")
             return found
     if path.exists():
-        return path  # a folder: whoever reads it says so
+        return path  # a folder: the reader reports it
     if path.suffix not in ("", ".toml"):
         raise UsageError(f"{text}: no such file")
     names = shipped_protocols()
@@ -289,7 +289,7 @@ def find_protocol(text: str) -> Path:
 
 
 def find_backend(name: str) -> BackendKind:
-    """The backend of that name. Raises UsageError naming those there are."""
+    """Backend of that name. Raises UsageError, with the existing names, for an unknown one."""
     kinds = backends()
     if name not in kinds:
         raise UsageError(f"there is no backend {name!r}; there are {', '.join(kinds)}")
@@ -297,7 +297,7 @@ def find_backend(name: str) -> BackendKind:
 
 
 def backend_options(kind: BackendKind, changes: tuple[str, ...]) -> Options:
-    """The backend's options with every `backend.OPTION=VALUE` in its place."""
+    """Options of the backend with every `backend.OPTION=VALUE`. Raises UsageError if invalid."""
     overrides, problems = parse_overrides(changes)
     if problems:
         raise UsageError("\n".join(str(problem) for problem in problems))

@@ -22,7 +22,7 @@ FASTER = {
     Work.SEALING: "a lower sample_rate, or fewer and longer trials; a faster disk",
     Work.REPORT: "leave --report out; `campaign report` makes it at any time",
 }
-"""What would make it less."""
+"""Advice that reduces the time, by kind of work."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class Row:
 
 
 def rows(spent: dict[Work, Spent], elapsed: float, processor: float, workers: int) -> Iterator[Row]:
-    """What was done, in order, and the rest.
+    """Rows of the kinds of work, in order, and of the rest.
 
-    What `workers` do side by side counts on the clock with its share of one of them, and what the
-    main thread waits meanwhile is what no worker was at work. With threads the clocks add up to
-    `elapsed`; beside worker processes this one goes on with journal and sealed file.
+    Clock time of parallel work is its total time divided by `workers`. The waiting time of the main
+    thread counts only without work of the workers. With threads the clock times add up to
+    `elapsed`. Worker processes overlap with the journal and the sealed file.
     """
     at_work = sum(each.others for each in spent.values()) / workers
     left, left_processor = elapsed, processor
@@ -54,7 +54,7 @@ def rows(spent: dict[Work, Spent], elapsed: float, processor: float, workers: in
 
 
 def print_profile(stopwatch: Stopwatch, workers: int) -> None:
-    """A table, and what would make the longest of it shorter."""
+    """Print a table, and advice to reduce the largest part."""
     elapsed, processor = stopwatch.elapsed()
     table = list(rows(stopwatch.spent(), elapsed, processor, workers))
     threads = "1 worker" if workers == 1 else f"{workers} workers"

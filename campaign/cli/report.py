@@ -1,6 +1,6 @@
 """`campaign report`: page, tables and figures from an archive.
 
-What makes a page is imported within the functions: other processes analyse in the meantime.
+The functions import the code for pages, while other processes analyze.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from campaign.report.drawing.figures import Column
 
 LISTED = 4
-"""Most files of a folder that are named one by one."""
+"""Most files of a folder that are listed by name."""
 
 
 @unwinding()
@@ -47,7 +47,7 @@ def report_run(
     zoom: bool = False,
     references: Sequence[Path] = (),
 ) -> tuple[Path, ExitCode]:
-    """Build the report of the run that `name` means; its page, and the exit code."""
+    """Build the report of the run that `name` matches; return its page and the exit code."""
     from campaign.references.values import read_values
 
     path = find_run(results, name)
@@ -57,7 +57,7 @@ def report_run(
     written: list[PreparedResults] = []
     try:
         with workers(run, choose_processes(run), measure_anew=measure_anew) as at_work:
-            # Imported while they begin to analyse.
+            # Import while the workers begin to analyze.
             from campaign.cli.keep_results import written_results
             from campaign.experiments import experiments
             from campaign.report.build import build_report
@@ -94,7 +94,7 @@ def report_run(
 
 
 def _say(report: Report, path: Path, kept: Sequence[str], *, measure_anew: bool) -> ExitCode:
-    """Key numbers, what is missing or damaged, and the files; the exit code of all that."""
+    """Print key numbers, missing results, damage and files; return the exit code."""
     from campaign.cli.damage import say_damaged
     from campaign.execution.run_reference import reference
 
@@ -127,7 +127,7 @@ def _print_key_numbers(opening: FirstScreen) -> None:
 
 
 def _published(results: PreparedResults) -> str:
-    """The results' path; "" where there is a warning instead."""
+    """Publish a results file; return its path, or "" after a warning."""
     try:
         return str(results.publish())
     except ArchiveError as error:
@@ -136,10 +136,10 @@ def _published(results: PreparedResults) -> str:
 
 
 def _command(path: Path, *, measure_anew: bool) -> str:
-    """What to type for the same numbers again, from where this command was typed.
+    """Command that repeats the report from the current folder.
 
-    A page goes to others, whom no folder of this machine concerns: of an absolute path only the
-    name is told, and that its folder must be.
+    An absolute path is reduced to its name and `--results FOLDER`, as pages do not show private
+    folders.
     """
     from campaign.execution.run_reference import reference
 
@@ -153,7 +153,7 @@ def _command(path: Path, *, measure_anew: bool) -> str:
 
 
 def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
-    """Those that `--trials` means; where it means none, that is said."""
+    """Numbers of the trials that `--trials` selects; prints a note if there is none."""
     from campaign.report.content.trial_choice import chosen_trials
 
     chosen = chosen_trials(run, wanted)
@@ -163,7 +163,7 @@ def _wanted_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
 
 
 def _told(files: Iterable[str]) -> Iterator[str]:
-    """The files of a report, folder by folder; of many the kinds, with how many there are."""
+    """Texts on the files of a report by folder; for many files, counts by kind."""
     folders: dict[str, list[PurePosixPath]] = {}
     for file in map(PurePosixPath, files):
         folders.setdefault(str(file.parent), []).append(file)
@@ -187,9 +187,9 @@ def draw_figures(
     useless: Sequence[str] = (),
     column: str = "",
 ) -> tuple[tuple[Path, ...], ExitCode]:
-    """Write a figure of a run's report, TEST/KEY, or all; drawings, and whether all could be read.
+    """Write a figure of a run's report, TEST/KEY, or all; return paths and exit code for damage.
 
-    useless: options that were given besides and are of the whole page; UsageError for any.
+    useless: given options that apply to the whole page only. Raises UsageError for any.
     """
     if useless:
         raise UsageError(

@@ -45,7 +45,7 @@ from campaign.trial import trial_number
 
 SIM = "sim"
 TIMES = 10
-"""How many times the error of an older engine its samples may be off before they are different."""
+"""Largest deviation of equal samples, in multiples of the error of an older engine."""
 
 
 def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
@@ -58,7 +58,7 @@ def rerun_trial(name: str, wanted: str, results: Path) -> ExitCode:
     tree = run.header.backend_options if simulated else {}
     options = kind.options.model_validate(tree, context={"si": True})
     bench = in_written_order(archived.trial.bench, run.header.sources.values())
-    # It is the only one of its run.
+    # The new run has one trial.
     trial = archived.trial.model_copy(update={"number": 1, "bench": bench})
     texts = run.header.truth.sources.values()
     plants = run.header.truth.plants
@@ -111,19 +111,19 @@ def find_trial(run: RunReader, wanted: str) -> ArchivedTrial:
 
 
 def _say(what: str, before: Recording, again: Recording) -> ExitCode:
-    found = differences(before, again)
-    if not found:
+    lines = differences(before, again)
+    if not lines:
         size = f"{len(before.channels)} channels of {len(before.time)} samples"
         print_line(f"{what}: equal to the bit, {size}")
         return ExitCode.DONE
     print_line(f"{what}: different")
-    for line in found:
+    for line in lines:
         print_line(f"  {line}")
     return ExitCode.TRIALS_FAILED
 
 
 def _say_digests(what: str, archived: ArchivedTrial, again: ArchivedTrial) -> ExitCode:
-    """Of a trial without samples: whether those of today have the digests of its record."""
+    """Compare the new samples with the digests of a trial without samples."""
     was, now = archived.digests(), again.digests()
     different = [name for name in {**was, **now} if was.get(name) != now.get(name)]
     if not different and archived.ending.outcome is again.ending.outcome:
@@ -136,11 +136,11 @@ def _say_digests(what: str, archived: ArchivedTrial, again: ArchivedTrial) -> Ex
 def _say_change(
     engine: int, bench: Bench, what: str, before: Recording, again: Recording
 ) -> ExitCode:
-    """Another engine has other samples: how much they changed, beside the older one's error."""
-    older, found = min(engine, ENGINE), changes(before, again)
+    """Compare samples of two engines: changes of the channels against the older engine's error."""
+    older, changed = min(engine, ENGINE), changes(before, again)
     dry = any(is_dry(each) for each in bench.friction.values())
-    bounds = {name: TIMES * _error(older, name, dry=dry) for name in found}
-    beyond = [name for name, change in found.items() if not change <= bounds[name]]
+    bounds = {name: TIMES * _error(older, name, dry=dry) for name in changed}
+    beyond = [name for name, change in changed.items() if not change <= bounds[name]]
     if before.ending.outcome is not again.ending.outcome:
         verdict = f"different: {before.ending.outcome} → {again.ending.outcome}"
     elif _is_noisy(bench):
@@ -150,7 +150,7 @@ def _say_change(
     else:
         verdict = f"the same within {TIMES} times the error of engine {older}"
     print_line(f"{what}: simulated by engine {engine}, repeated by engine {ENGINE}: {verdict}")
-    for name, change in found.items():
+    for name, change in changed.items():
         print_line(f"  {name}: changed by {change:.2g} of its rms; {bounds[name]:.2g} is allowed")
     return ExitCode.DONE if verdict.startswith("the same") else ExitCode.TRIALS_FAILED
 

@@ -46,9 +46,9 @@ from campaign.trial import Tree, Trial
 
 @dataclass(frozen=True)
 class Remade:
-    """The plan as it would be executed today, and how it differs from the archived one.
+    """The present plan, and its differences from the archived one.
 
-    Its trials are those of the first stage; what followed from them is in the archive.
+    It has the trials of the first stage; those of later stages are in the archive.
     """
 
     kind: BackendKind
@@ -75,10 +75,10 @@ def resume_run(
     where: ExecutorChoice = HERE,
     watch: bool = False,
 ) -> ExitCode:
-    """Execute what is left of a run; the archive's path is the last line of standard output.
+    """Execute the remaining trials of a run; the archive's path is the last line of output.
 
-    A `port` that is given is where the bench is today: no change that somebody has to accept.
-    With a key to `sign` the run with: that it can sign is known before anything moves.
+    port: present port of the bench; no change that needs acceptance.
+    sign: key to sign the run with; tested before anything moves.
     """
     if watch:
         require_watch(where.executor)
@@ -88,7 +88,7 @@ def resume_run(
     read = say_damaged(path, run.damaged)
     check_resumable(run)
     if run.first_stage:
-        run.full_plan.trial(1)  # the sealed file needs it: if it is damaged, nothing is executed
+        run.full_plan.trial(1)  # the sealed file needs it: do not execute a damaged plan
     with compiling_meanwhile(run.header.backend) as compiling:
         remade = remake(run, port)
         _check_truth(run, remade.trials)
@@ -143,7 +143,7 @@ def resume_run(
 
 
 def remake(run: RunReader, port: str | None = None) -> Remade:
-    """Plan again from the protocol's file; from the archive when that is gone."""
+    """Plan again from the protocol's file, or from the archive if that is missing."""
     if port is not None:
         run = _at_port(run, port)
     protocol, truth = Path(run.header.protocol_path), run.header.truth.option
@@ -158,7 +158,7 @@ def remake(run: RunReader, port: str | None = None) -> Remade:
 
 
 def _at_port(run: RunReader, port: str) -> RunReader:
-    """The run as if it had begun with its bench at `port`."""
+    """Run with the bench at `port` in its header. Raises UsageError for a backend without port."""
     if "port" not in run.header.backend_options:
         raise UsageError(f"the backend {run.header.backend!r} has no port; leave --port out")
     header = run.header.model_copy(
@@ -218,7 +218,7 @@ def _changes(
     trials: Sequence[Trial],
     truths: Mapping[str, Tree],
 ) -> tuple[str, ...]:
-    """How what the run would be executed with today differs from what it was begun with."""
+    """Differences of the present conditions from those at the start of the run."""
     plug_ins = provenance.plug_ins(trials, kind.name, truths.values())
     settings = options.model_dump(mode="json")
     now = Conditions(normalised, kind.name, settings, provenance.versions(), plug_ins)
@@ -226,7 +226,7 @@ def _changes(
 
 
 def _check_truth(run: RunReader, trials: Sequence[Trial]) -> None:
-    """What is simulated in place of a bench is archived when a run begins, and stays what it is."""
+    """Raise UsageError if the truth differs from the one archived at the start of the run."""
     truths = {trial.truth for trial in trials} - {""}
     had = run.header.truth.plants.keys()
     if truths <= had and bool(truths) == bool(had):

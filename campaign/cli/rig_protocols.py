@@ -30,15 +30,15 @@ PILOT = "pilot = true    # no Stribeck curve is described: ten speeds determine 
 
 @unwinding()
 def init_for_bench(folder: Path, written: str) -> None:
-    """Write a bench's protocols into `folder`, and say what they would do.
+    """Write a bench's protocols into `folder`, and print their trials and bench time.
 
-    Raises ProtocolError for a bench that is wrong, UsageError when a file would be overwritten or
-    cannot be written; nothing is written then.
+    Raises, before writing, ProtocolError for an invalid bench, and UsageError if a file exists.
+    Raises UsageError also if a file cannot be written.
     """
     bench = load_bench(written)
     source = _source(written)
     own = folder / "benches" / source.name
-    # A motor on a table has no hull that swings, and nothing to compensate.
+    # Without compensations, e.g. a motor on a table, there is nothing to stabilize.
     names = ("identify", *(["stabilize"] if bench.compensation else []))
     files = {
         folder / f"{name}.toml": _text(name, bench, f"benches/{source.name}") for name in names
@@ -59,13 +59,13 @@ def init_for_bench(folder: Path, written: str) -> None:
     protocols = [path for path in files if path.parent == folder]
     for path in protocols:
         _with_reasons(path)
-    # What cannot be simulated is executed on hardware, or by hand.
+    # A bench with missing fields cannot be simulated: trials are handed out.
     where = f"{protocols[0]}{' --backend files --handover out' if lacking(bench) else ''}"
     print_line(f"now: campaign plan {where}, then campaign run {where} --report")
 
 
 def _check_fit(name: str, experiment: Experiment, bench: Bench) -> None:
-    """Raises UsageError where no values would suit the bench."""
+    """Raise UsageError if no values of the options suit the bench."""
     try:
         if experiment.fit is not None:
             with axis_terms(bench.sides):
@@ -75,7 +75,7 @@ def _check_fit(name: str, experiment: Experiment, bench: Bench) -> None:
 
 
 def _source(written: str) -> Path:
-    """The file of a bench that has been loaded by that word."""
+    """File of a bench from its name or path, as typed."""
     shipped = protocols_folder() / "benches" / f"{written}.toml"
     return shipped if shipped.is_file() else Path(written)
 
@@ -85,7 +85,7 @@ def _is(one: Path, other: Path) -> bool:
 
 
 def _text(name: str, bench: Bench, file: str) -> str:
-    """The template of that name for a bench whose file the protocol names."""
+    """Text of a protocol from the template of that name."""
     words = {
         "bench": bench.name,
         "quoted": bench.name.replace("\\", "\\\\").replace('"', '\\"'),
@@ -98,7 +98,7 @@ def _text(name: str, bench: Bench, file: str) -> str:
 
 
 def _with_reasons(path: Path) -> None:
-    """Say what a protocol would do, and write what was chosen into it as comments."""
+    """Print trials and bench time of a protocol; add the chosen options to it as comments."""
     try:
         plan = make_plan(load_protocol(path, experiments(), shipped=protocols_folder()), seed=0)
     except CampaignError as error:
@@ -119,16 +119,16 @@ def _with_reasons(path: Path) -> None:
 
 
 def _comments(lines: Iterator[str]) -> Iterator[str]:
-    told = list(lines)
-    if told:
+    listed = list(lines)
+    if listed:
         yield "# Today it follows from the bench:\n"
-    for line in told:
+    for line in listed:
         wrapped = textwrap.wrap(line, WIDTH, initial_indent="#   ", subsequent_indent="#     ")
         yield "".join(f"{each}\n" for each in wrapped)
 
 
 def _refusals(plan: Plan) -> Iterator[str]:
-    """Why the plan would be refused as it is."""
+    """Reasons to refuse the plan."""
     for check in (check_limits, check_loops):
         try:
             check(plan)

@@ -1,4 +1,4 @@
-"""`campaign run`: prepare, check, ask, execute, seal."""
+"""`campaign run`: prepare, check, prompt, execute, seal."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from campaign.stopwatch import UNTIMED, Stopwatch, Work
 
 @dataclass(frozen=True)
 class Remarks:
-    """What the command line adds to the record.
+    """Additions of the command line to the record.
 
     Attributes:
-        operator: in place of the protocol's, when not empty.
+        operator: replaces the protocol's, when not empty.
         note, tags: added to the protocol's.
     """
 
@@ -55,8 +55,8 @@ def run_protocol(
 ) -> ExitCode:
     """Execute a protocol; the archive's path is the last line of standard output.
 
-    With a key to `sign` the run with: that it can sign is known before anything moves. With a
-    `stopwatch`, what took how long is told at the end.
+    sign: key to sign the run with; tested before anything moves.
+    stopwatch: if given, its times are printed at the end.
     """
     if watch:
         require_watch(where.executor)
@@ -114,7 +114,7 @@ def run_protocol(
 def run_header(
     prepared: PreparedRun, request: Request, name: str, began: datetime, remarks: Remarks
 ) -> RunHeader:
-    """Everything the archive keeps about the run before its first trial."""
+    """Header of the archive: all data on the run from before its first trial."""
     plan, asked = prepared.plan, prepared.plan.protocol
     policy = asked.policy.model_dump(mode="json")
     return RunHeader(

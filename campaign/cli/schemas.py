@@ -40,7 +40,7 @@ schema = { path = "./schemas/bench.json" }
 
 @unwinding()
 def init_folder(folder: Path) -> None:
-    """Copy what is shipped into `folder` and say how to go on."""
+    """Copy the shipped files into `folder`, and print the next steps."""
     written = copy_shipped(folder)
     print_line(f"{len(written)} files written to {folder}")
     _write_schemas(folder)
@@ -48,14 +48,14 @@ def init_folder(folder: Path) -> None:
 
 
 def print_schema(of: str) -> None:
-    """The JSON Schema of what SCHEMAS names. Raises UsageError for anything else."""
+    """Print the JSON Schema of a name in SCHEMAS. Raises UsageError for another name."""
     if of not in SCHEMAS:
         raise UsageError(f"there is no schema of {of!r}; there are {', '.join(SCHEMAS)}")
     print_json(SCHEMAS[of]())
 
 
 def _write_schemas(folder: Path) -> None:
-    """Those of protocols and benches, and the rules that name them; what is there stays."""
+    """Write the schemas of protocols and benches, and their rules; existing files stay."""
     files = {
         f"{FOLDER}/{of}.json": json.dumps(SCHEMAS[of](), indent=1, ensure_ascii=False) + "\n"
         for of in ("protocol", "bench")

@@ -69,18 +69,18 @@ class Session:
     """Trials, and the backend that accepts them, not yet connected.
 
     Attributes:
-        trials: the whole plan, and what had followed from it before it is gone on with.
-        finished: those that are not executed (again), by number.
-        folder: of the run, while it is in progress: the one that it has or will have.
-        yes: whether nobody is asked anything.
-        clear_stop: the count of a stop of the bench from outside that a person has seen.
-        checks_step: whether it is told afterwards what half the step has changed.
-        repeats: the run whose trial is repeated; a backend that serves a run says so itself.
-        timing: told what takes how long.
-        stages: what may follow from the trials.
-        asked: those of the stages that were asked before, as the journal tells.
+        trials: the whole plan, with the trials of stages from before a resume.
+        finished: trials that are not executed again, by number.
+        folder: present or future folder of the run in progress.
+        yes: whether prompts are suppressed.
+        clear_stop: count of a panic stop that the operator has seen.
+        checks_step: whether the effect of half the step is reported afterwards.
+        repeats: run of a repeated trial; for a replay, the backend states the run itself.
+        timing: timing sink.
+        stages: stages that may follow from the trials.
+        asked: stages that were evaluated before, from the journal.
         guardian: of a program that moves a bench.
-        executor: what executes the trials; this machine's own threads or processes when None.
+        executor: executor of the trials; None: threads or processes of this machine.
         watch: whether channels of the running trial are drawn; trials are then executed in this
             process.
     """
@@ -105,12 +105,12 @@ class Session:
 
     @property
     def source(self) -> RunReader | None:
-        """The archived run that this one is made from, if any."""
+        """Archived run that is the source of this one, if any."""
         return self.repeats or archive_of(self.backend)
 
     @property
     def left(self) -> Iterator[Trial]:
-        """The trials that are executed."""
+        """Trials to execute."""
         return (trial for trial in self.trials if trial.number not in self.finished)
 
 
@@ -123,13 +123,13 @@ def conduct(
 ) -> ExitCode:
     """Execute a session; the archive's path is the last line of standard output.
 
-    `open_archive` is called once the bench is connected: a bench that is not there leaves no run.
-    The sealed run is signed with the key `sign`, however it ended.
+    `open_archive` is called after the bench is connected: without a bench there is no run. The
+    sealed run is signed with the key `sign` after any ending.
     """
     began = time.monotonic()
     outcome, code = execute(session, open_archive)
     codes = [code]
-    with suppress(OSError):  # the terminal is gone; the archive says it, too
+    with suppress(OSError):  # the terminal is closed; the archive has the outcome
         say_outcome(outcome, time.monotonic() - began)
     try:
         if session.checks_step:
@@ -145,10 +145,10 @@ def conduct(
 
 
 def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[RunOutcome, ExitCode]:
-    """Connect, execute, seal and let go; also the exit code that follows from all of it.
+    """Connect, execute, seal and disconnect; return the outcome and the exit code.
 
-    Raises UsageError, before anything moves and before there is an archive, when the connected
-    bench turns out to refuse a trial, or not to record what one requires.
+    Raises UsageError, before any motion and without an archive, if the connected bench refuses a
+    trial or does not record a required channel.
     """
     outcome: RunOutcome | None = None
     source = session.source
@@ -159,9 +159,9 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
     if isinstance(session.backend, SupportsTiming):
         session.backend.timing = session.timing
     try:
-        # Signals first: from the moment that the bench is connected, a stop has to be orderly.
+        # Signals first: once the bench is connected, a stop must be orderly.
         with (
-            chdir(here),  # and back, wherever a plug-in has gone
+            chdir(here),  # a plug-in may change the folder
             StopSwitch(session.guardian).on_signals() as stop,
         ):
             stop.make_safe = partial(safe_at_once, session.backend)
@@ -195,7 +195,7 @@ def execute(session: Session, open_archive: Callable[[], RunWriter]) -> tuple[Ru
 
 
 def _what_is_kept(folder: Path) -> str:
-    """For whoever leaves at once: the run in its folder, or the archive that is whole already."""
+    """Message at an immediate exit: folder of the run, or its sealed archive."""
     sealed = folder.with_suffix(SEALED)
     if sealed.is_file():
         return f"left at once; the run is in {sealed}"
@@ -206,14 +206,14 @@ def _what_is_kept(folder: Path) -> str:
 
 @contextmanager
 def _saying_what_is_kept(folder: Path) -> Iterator[None]:
-    """A run that breaks off without an outcome: say where it is and what can be done with it."""
+    """For a run that fails without an outcome: print its place and how to continue."""
     try:
         yield
     except (AbortedError, NotSafeError):
-        raise  # they say so themselves, after what matters more
+        raise  # their messages include it, after more important text
     except Exception:
-        there = (path for path in (folder, folder.with_suffix(SEALED)) if path.exists())
-        if kept := next(there, None):
+        existing = (path for path in (folder, folder.with_suffix(SEALED)) if path.exists())
+        if kept := next(existing, None):
             print_warning(f"the finished trials are in {kept}; {how_to_go_on(kept)}")
         raise
 
@@ -256,9 +256,10 @@ def _execute(session: Session, backend: Backend, writer: RunWriter, stop: StopSw
 
 
 def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
-    """How many trials at once: what was asked for, else what backend and machine allow.
+    """Count of parallel trials: as requested, else as backend and machine allow.
 
-    Where they are processes, what these need is imported from now on.
+    For worker processes, starts the import of their modules. Raises UsageError for several workers
+    on a backend that executes one trial at a time.
     """
     if not kind.several:
         if wanted is not None and wanted > 1:
@@ -274,12 +275,12 @@ def choose_workers(kind: BackendKind, trials: int, wanted: int | None) -> int:
 
 
 def in_processes(kind: BackendKind, workers: int, trials: int) -> bool:
-    """Whether the workers are processes: where they take less time than they cost to begin."""
+    """Whether the workers are processes: for enough trials to outweigh the start of a process."""
     return kind.picklable and workers > 1 and trials >= FEWEST_FOR_PROCESSES
 
 
 def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
-    """How the run ended, and what can be done about it."""
+    """Print the outcome of the run, and how to continue."""
     done = outcome.outcomes.get(Outcome.COMPLETED, 0)
     failed = {o.value: n for o, n in outcome.outcomes.items() if o is not Outcome.COMPLETED}
     trials = "trial" if done == 1 else "trials"
@@ -294,15 +295,15 @@ def say_outcome(outcome: RunOutcome, elapsed: float) -> None:
 
 
 def print_warning(text: str) -> None:
-    """Something went wrong that does not end the command."""
+    """Print a warning: a problem that does not end the command."""
     print_note(text, "yellow")
 
 
 def _report(outcome: RunOutcome) -> ExitCode:
-    """Build the report; what goes wrong with it is said, and must not hide how the run ended.
+    """Build the report; its failure is printed and must not hide the outcome of the run.
 
     Raises:
-        Exception: a bug, after a run that has nothing worse to say.
+        Exception: a bug, after a run with exit code DONE.
     """
     try:
         return _build_report(outcome)
@@ -335,7 +336,7 @@ def _build_report(outcome: RunOutcome) -> ExitCode:
 
 
 def require_watch(executor: str) -> None:
-    """Raises UsageError, before anything moves, when nothing could be drawn."""
+    """Raise UsageError if `--watch` cannot draw."""
     if importlib.util.find_spec("plotext") is None:
         raise UsageError("--watch needs plotext: pip install 'campaign[watch]'")
     if executor:
@@ -344,7 +345,7 @@ def require_watch(executor: str) -> None:
 
 @contextmanager
 def watching(console: Console) -> Iterator[Shown]:
-    """Channels of the running trial, for as long as the block lasts; else the usual display."""
+    """Display of the running trial's channels inside the block; on a plain terminal, progress."""
     if not console.is_terminal or console.is_dumb_terminal:
         print_note("--watch: this terminal cannot show pictures; progress is printed in lines")
         with progress_display(console) as usual:

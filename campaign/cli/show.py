@@ -34,9 +34,9 @@ from campaign.trial import Tree
 def show_archive(
     name: str | None, results: Path, *, as_json: bool, metrics: bool = False
 ) -> ExitCode:
-    """What a run was, how it ended, its tests, and all that did not go as planned.
+    """Print a run: facts, ending, tests, failures, decisions and other deviations from the plan.
 
-    `metrics`: also what was measured in each recording when it was executed.
+    `metrics`: also print the archived metrics of each recording.
     """
     run = open_run(find_run(results, name))
     story = run.story
@@ -57,11 +57,11 @@ def _print(run: RunReader, story: Lines) -> None:
     headings = ("test", "kind", "planned", *(outcome.value for outcome in Outcome))
     tests, shown = _tests(run), on_a_terminal()
     begun = {each.test for each in run.outlines}
-    if told := [row for row in tests if row[0] in begun or not shown]:
+    if listed := [row for row in tests if row[0] in begun or not shown]:
         none = [
-            each.value for k, each in enumerate(Outcome, 3) if all(row[k] == "0" for row in told)
+            each.value for k, each in enumerate(Outcome, 3) if all(row[k] == "0" for row in listed)
         ]
-        print_table(headings, told, spare=(*none, "kind"))
+        print_table(headings, listed, spare=(*none, "kind"))
     if idle := [row[0] for row in tests if row[0] not in begun and shown]:
         print_line(f"no trial was executed of {', '.join(idle)}")
     failed = [each for each in run.outlines if each.outcome is not Outcome.COMPLETED]
@@ -77,9 +77,9 @@ def _print(run: RunReader, story: Lines) -> None:
 
 def _print_metrics(run: RunReader) -> None:
     rows = [
-        (trial.trial.name, trial.trial.label, *_metric(found))
+        (trial.trial.name, trial.trial.label, *_metric(estimate))
         for trial in run.trials
-        for found in trial.estimates
+        for estimate in trial.estimates
     ]
     _section(("trial", "what", "quantity", "value (95 %)", "unit", "without, because"), rows)
     if not rows:
@@ -102,7 +102,7 @@ def _name(trial: int | None) -> str:
 
 
 def _repeated(story: Lines) -> list[TrialFinished]:
-    """Every attempt at the trials that took more than one."""
+    """All attempts of the trials with more than one."""
     counts = Counter(attempt.trial for attempt in story.attempts)
     several = [attempt for attempt in story.attempts if counts[attempt.trial] > 1]
     return sorted(several, key=lambda attempt: (attempt.trial, attempt.attempt))
@@ -132,7 +132,7 @@ def _damage(damage: Damage) -> tuple[str, ...]:
 
 
 def _tree(run: RunReader, story: Lines) -> dict[str, object]:
-    """Everything that is known without a sample, SI."""
+    """JSON tree of the run without samples, SI."""
     return {
         "path": str(run.path),
         "header": run.header.model_dump(
@@ -154,7 +154,8 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
                 "started": trial.started,
                 "ended": trial.ended,
                 "metrics": [
-                    plain(asdict(found)) | found.reason.columns() for found in trial.estimates
+                    plain(asdict(estimate)) | estimate.reason.columns()
+                    for estimate in trial.estimates
                 ],
                 "measured_by": trial.measured_by,
             }
@@ -164,8 +165,8 @@ def _tree(run: RunReader, story: Lines) -> dict[str, object]:
         "decisions": _dumped(story.all(Decision)),
         "operator_steps": _dumped(story.all(OperatorStep)),
         "stages": [
-            {**told, "trials": [trial.number for trial in stage.trials]}
-            for told, stage in zip(_dumped(run.stages), run.stages, strict=True)
+            {**record, "trials": [trial.number for trial in stage.trials]}
+            for record, stage in zip(_dumped(run.stages), run.stages, strict=True)
         ],
         "resumed": _dumped(story.all(RunResumed)),
         "damaged": [vars(damage) for damage in run.damaged],
@@ -205,7 +206,7 @@ def _facts(run: RunReader) -> list[tuple[str, str]]:
 
 
 def _truth(truth: Truth) -> str:
-    """What was simulated in place of the stated benches."""
+    """Text on the truths that were simulated in place of the stated benches."""
     names = ", ".join(dict.fromkeys(str(plant.get("name")) for plant in truth.plants.values()))
     return f"{names} ({', '.join(truth.sources)}), simulated in place of what is stated" * bool(
         names
@@ -219,7 +220,7 @@ def _signature(run: RunReader) -> str:
 
 
 def _plug_in(record: Tree) -> str:
-    """One kind of an installed package."""
+    """Text on one kind of an installed package."""
     sha256 = str(record.get("sha256", ""))[:12]
     package = f"{record.get('distribution')} {record.get('version')}"
     return f"{record.get('room')} {record.get('name')} of {package}, sources {sha256}"

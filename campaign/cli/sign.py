@@ -27,11 +27,10 @@ WHAT_IT_PROVES = "proves who, not when"
 
 @unwinding()
 def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitCode:
-    """Sign a run that is sealed and sound; the signature's path is the last line of the output.
+    """Sign a sealed, sound run; the signature's path is the last line of the output.
 
     Raises:
-        UsageError: it is not sealed, has a signature that nobody wants to replace, or the key
-            cannot be used.
+        UsageError: it is not sealed, has a signature (without `replace`), or the key is unusable.
         ArchiveError: it is damaged, or the signature cannot be written.
     """
     sealed = find_run(results, name)
@@ -57,7 +56,7 @@ def sign_archive(name: str, results: Path, key: Path, *, replace: bool) -> ExitC
 
 
 def rehearse_signing(key: Path) -> None:
-    """Sign a test text, so that a key that cannot sign costs no bench time. Raises UsageError."""
+    """Sign a test text, to detect an unusable key before the run. Raises UsageError."""
     made = signing.sign_test_text(key, ask=has_terminal())
     if made.asked:
         print_note(
@@ -68,7 +67,7 @@ def rehearse_signing(key: Path) -> None:
 
 
 def sign_new_run(sealed: Path, key: Path) -> ExitCode:
-    """Sign what was just sealed; what goes wrong is said, and the run is kept: ARCHIVE then."""
+    """Sign a new run; a failure is printed, keeps the run, and returns ARCHIVE or INTERRUPTED."""
     try:
         with unwinding():
             if not sealed.is_file():
@@ -94,7 +93,7 @@ def _say_unsigned(sealed: Path, reason: str) -> None:
 
 @contextmanager
 def _locked(sealed: Path) -> Iterator[None]:
-    """Nobody goes on with the run while it is signed."""
+    """Lock the run against a resume while it is signed."""
     try:
         lock = RunLock.acquire(sealed.parent, sealed.stem)
     except OSError as error:
@@ -114,7 +113,7 @@ def _check_free(sealed: Path, *, replace: bool) -> None:
 
 
 def _sign(sealed: Path, key: Path, *, replace: bool) -> None:
-    """The new signature is made before an old one is touched."""
+    """Sign the run, then set an old signature aside and write the new one."""
     from campaign.archive.verification.statement import run_statement
 
     made = signing.sign(run_statement(sealed), key, ask=has_terminal())

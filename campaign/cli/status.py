@@ -16,12 +16,12 @@ from campaign.plain_text import printable
 from campaign.wire.messages import Holder, Latch, Message, Nak, Status
 
 INTERVAL = 0.1
-"""s between two questions."""
+"""Seconds between two queries."""
 
 
 @dataclass
 class Answers:
-    """What has been heard: the newest of each."""
+    """Newest received message of each kind."""
 
     status: Status | None = None
     latch: Latch | None = None
@@ -29,7 +29,7 @@ class Answers:
     refused: bool = field(default=False)
 
     def take(self, message: Message) -> None:
-        """One message of the controller."""
+        """Store one message of the controller."""
         match message:
             case Status():
                 self.status = message
@@ -42,12 +42,12 @@ class Answers:
 
     @property
     def whole(self) -> bool:
-        """Whether everything is known."""
+        """Whether all messages have arrived."""
         return self.status is not None and self.latch is not None and self.holder is not None
 
 
 def show_status(port: str, baud: int, patience: float, *, as_json: bool) -> ExitCode:
-    """Ask, without disturbing whoever holds the controller. Raises BackendError without answer."""
+    """Query and print, without disturbing the holder. Raises BackendError without an answer."""
     answers = Answers()
     line = open_port(port, baud, exclusive=False)
     try:

@@ -15,11 +15,11 @@ from campaign.options import Options
 from campaign.recording import Outcome
 
 TOLERANCE = 1e-3
-"""Of a channel's RMS: what steps are chosen for."""
+"""Largest change relative to a channel's RMS; the design value of the steps."""
 SHOWN = 3
-"""trials beyond it that are named."""
+"""Most trials beyond the tolerance that the message names."""
 SETTING = "backend.check_step=true"
-"""What the option is short for."""
+"""Setting that the option `--check-step` stands for."""
 
 
 class Change(NamedTuple):
@@ -40,32 +40,36 @@ def is_checked(options: Options) -> bool:
 
 
 def say_step_check(archive: Path) -> None:
-    """What was found, and a warning for what is beyond the tolerance."""
-    found = _changes(archive)
-    if not found:
+    """Print the largest change, or a warning on the trials beyond the tolerance."""
+    changes = _changes(archive)
+    if not changes:
         print_note("step check: no trial completed")
         return
-    beyond = [each for each in found if each.share is None or each.share > TOLERANCE]
+    beyond = [each for each in changes if each.share is None or each.share > TOLERANCE]
     if not beyond:
-        print_note(f"step check: half the step changes no channel by more than {found[0]}")
+        print_note(f"step check: half the step changes no channel by more than {changes[0]}")
         return
     named = "; ".join(str(each) for each in beyond[:SHOWN])
     more = f"; and {len(beyond) - SHOWN} more" if len(beyond) > SHOWN else ""
     print_note(
-        f"step check: half the step changes {len(beyond)} of {len(found)} trials by more than "
+        f"step check: half the step changes {len(beyond)} of {len(changes)} trials by more than "
         f"{TOLERANCE:g} of a channel's RMS: {named}{more}; steps: --set backend.longest_step=...",
         "yellow",
     )
 
 
 def _changes(archive: Path) -> Sequence[Change]:
-    """Of each completed trial, the largest first."""
-    found = []
+    """Largest change of each completed trial, in descending order."""
+    changes = []
     for trial in open_run(archive).trials:
-        told = trial.ending.telemetry.get(CHANGE)
-        if trial.ending.outcome is Outcome.COMPLETED and isinstance(told, dict) and told:
-            found.append(_largest(told, trial.trial.name))
-    return sorted(found, key=_size, reverse=True)
+        by_channel = trial.ending.telemetry.get(CHANGE)
+        if (
+            trial.ending.outcome is Outcome.COMPLETED
+            and isinstance(by_channel, dict)
+            and by_channel
+        ):
+            changes.append(_largest(by_channel, trial.trial.name))
+    return sorted(changes, key=_size, reverse=True)
 
 
 def _largest(told: Mapping[str, JsonValue], trial: str) -> Change:

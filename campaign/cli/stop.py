@@ -13,11 +13,11 @@ from campaign.link.port import Port, open_port
 from campaign.link.safe import SafeWatch, safe_frame
 
 INTERVAL = 0.02
-"""s between two SAFE."""
+"""Seconds between two SAFE messages."""
 REOPEN = 0.1
-"""s until a line that was lost is tried again."""
+"""Seconds before a lost line is opened again."""
 LATCHING = 1.0
-"""s after which a controller that is safe, and says nothing of a latch, is taken to have none."""
+"""Seconds after which a safe controller that reports no latch is assumed to have none."""
 CONFIRMED = "safe state confirmed"
 NOT_LATCHED = "safe now, not latched"
 NOT_CONFIRMED = "SAFE STATE NOT CONFIRMED"
@@ -25,10 +25,10 @@ NOT_CONFIRMED = "SAFE STATE NOT CONFIRMED"
 
 @dataclass
 class Attempt:
-    """One panic stop, however many times the line has to be opened for it.
+    """One panic stop, over any count of line openings.
 
     Attributes:
-        safe_at: since when (steady clock, s) it has been seen safe; None while it has not.
+        safe_at: start of the confirmed safe state (steady clock, s); None while not confirmed.
     """
 
     deadline: float
@@ -40,7 +40,7 @@ class Attempt:
         self.watch = SafeWatch(self._sequence)
 
     def insist(self, line: Port) -> None:
-        """SAFE again and again until the end. Raises OSError when the line is lost."""
+        """Send SAFE repeatedly until the end. Raises OSError when the line is lost."""
         while not self.is_over():
             line.write(self._frame)
             again = time.monotonic() + INTERVAL
@@ -48,7 +48,7 @@ class Attempt:
                 self.watch.feed(line.read())
 
     def is_over(self) -> bool:
-        """Whether there is nothing more to be reached."""
+        """Whether the stop is complete, or the deadline has passed."""
         now = time.monotonic()
         safe = self.watch.confirmed.is_set()
         if not safe:
@@ -61,15 +61,15 @@ class Attempt:
 
     @property
     def latched(self) -> bool:
-        """Whether the controller has said that it stays off."""
+        """Whether the controller has reported a latched stop."""
         return self.watch.latch is not None and self.watch.latch.latched
 
 
 def stop_bench(port: str, baud: int, patience: float) -> ExitCode:
-    """Send SAFE until the controller says that it is at rest with its drive off, and stays so.
+    """Send SAFE until the controller reports a latched safe state: at rest, drive off.
 
-    Needs no session and no other process: another one may hang, or read the same port beside us.
-    `patience` in s. A port that cannot be opened is said at once, as what it is: not confirmed.
+    Independent of sessions and other processes, which may hang or read the same port. `patience`
+    in s. A port that cannot be opened results in "not confirmed" at once.
     """
     attempt, trouble = Attempt(time.monotonic() + patience), ""
     try:

@@ -20,11 +20,11 @@ from campaign.trends.rig_trends import JUMP, TREND, Trends, Verdict, follow
 from campaign.trends.tables import detectable_words, headline, not_judged, sentences
 
 STEM = 90
-"""Letters of a run's name that a folder is called by."""
+"""Most characters of a run's name in the name of a folder."""
 REASONS = 6
 """Most reasons for not judging that the terminal lists."""
 SHOWN = 12
-"""Most numbers without a trend that the terminal lists; the page has them all."""
+"""Most numbers without a trend that the terminal lists; the page has all."""
 NAMED = 3
 """Most runs that the command on the page names."""
 
@@ -42,7 +42,7 @@ def trend_of_archives(
     *,
     open_it: bool,
 ) -> tuple[Path, ExitCode]:
-    """Follow the numbers of the runs that `names` mean; the page, and whether all was read.
+    """Estimate the trends of the runs that `names` match; return page and exit code for damage.
 
     exchanged: `SOURCE@RUN`, a systematic part and the first run with another piece.
     """
@@ -89,7 +89,7 @@ def _without_folder(told: str) -> str:
 def _command(
     names: Sequence[str], over: str, models: Sequence[str], exchanged: Sequence[str]
 ) -> str:
-    """What makes the same again; names of runs, and no folders of anybody."""
+    """Command that repeats the analysis; with names of runs, without private folders."""
     shown = [Path(name).name for name in names]
     if len(shown) > NAMED:
         shown = [*shown[: NAMED - 1], "...", shown[-1]]

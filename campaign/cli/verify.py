@@ -1,4 +1,4 @@
-"""`campaign verify`: integrity of archives, byte by byte, and who signed them."""
+"""`campaign verify`: integrity of archives, byte by byte, and their signatures."""
 
 from __future__ import annotations
 
@@ -24,39 +24,39 @@ from campaign.errors import ArchiveError, ExitCode, UsageError
 def verify_archives(
     names: Sequence[str], results: Path, *, as_json: bool, wanted: ExpectedSigner | None = None
 ) -> ExitCode:
-    """Verify the runs that `names` mean; ARCHIVE when anything is wrong with any of them.
+    """Verify the runs that `names` match; return ARCHIVE if any is damaged.
 
-    A run without the signature that is `wanted` is wrong, too; results have none. Results, which
-    `*.nxs` means as well when a shell spells it out, are held against their own hash.
+    A run without the `wanted` signature fails, too. Results files, which a shell's `*.nxs` also
+    matches, have no signature and are verified against their own hash.
     """
     paths = list(dict.fromkeys(path for name in names for path in find_runs(results, name)))
-    found = []
+    checks = []
     for path in paths:
         if holds_results(path):
             kept = _of_results(path)
-            found.append((kept, check_signature(path, None)))
+            checks.append((kept, check_signature(path, None)))
             if kept.sound and not as_json:
                 print_line(f"{path}: sound (holds results of a run, and no run)")
             elif not as_json:
                 _print_problems(kept)
             continue
         with _progress(path) as progress:
-            found.append((verify_run(path, progress), check_signature(path, wanted)))
+            checks.append((verify_run(path, progress), check_signature(path, wanted)))
         if not as_json:
-            _print(*found[-1])
+            _print(*checks[-1])
     if as_json:
-        print_json([_tree(*one) for one in found])
-    good = all(run.sound and signature.valid is not False for run, signature in found)
+        print_json([_tree(*one) for one in checks])
+    good = all(run.sound and signature.valid is not False for run, signature in checks)
     return ExitCode.DONE if good else ExitCode.ARCHIVE
 
 
 def _of_results(path: Path) -> Verification:
-    """Whether a file of results is as it was written; it has no trials and no seal."""
+    """Verification of a results file, which has no trials and no seal."""
     problems: tuple[Damage, ...] = ()
     try:
         read_any_results(path)
     except OtherLayoutError:
-        pass  # its hash was right
+        pass  # its hash matches
     except ArchiveError as error:
         problems = (Damage.of(path, error),)
     return Verification(path, problems, remarks=(), trials=0, datasets=0)
@@ -68,7 +68,7 @@ def _print_problems(found: Verification) -> None:
 
 
 def _print(found: Verification, signature: SignatureCheck) -> None:
-    """One line per problem on standard output; one when there is none; one for a signature."""
+    """Print one line per problem, or one line without problems, and a line on the signature."""
     _print_problems(found)
     if found.sound:
         root = f", seal {found.root}" if found.root else ""
@@ -98,7 +98,7 @@ def _tree(found: Verification, signature: SignatureCheck) -> dict[str, object]:
 
 @contextlib.contextmanager
 def _progress(path: Path) -> Iterator[Callable[[int], object]]:
-    """A bar on a terminal; what is read is about twice what the run has in bytes."""
+    """Progress bar on a terminal; verification reads about twice the bytes of the run."""
     console = error_console()
     if not console.is_terminal:
         yield lambda count: None
@@ -123,7 +123,7 @@ RECOMPUTED = "anyone who changes a run can compute its checksums anew; only a si
 
 @dataclass(frozen=True)
 class ExpectedSigner:
-    """Whose signature a run must have."""
+    """Required signer of a run, and the allowed keys."""
 
     signer: str
     allowed: signing.AllowedSigners
@@ -131,13 +131,13 @@ class ExpectedSigner:
 
 @dataclass(frozen=True)
 class SignatureCheck:
-    """What was found out about the signature of one run.
+    """Result of the check of one run's signature.
 
     Attributes:
-        file: its name; empty when there is none.
-        valid: None when nobody asked.
-        text: one line for people; empty for a run that is not sealed and cannot have one.
-        key: of a valid one, kind and fingerprint.
+        file: name of the signature file; empty without one.
+        valid: None if not checked.
+        text: message of one line; empty for an unsealed run, which cannot have a signature.
+        key: kind and fingerprint of a valid key.
     """
 
     file: str
@@ -147,7 +147,7 @@ class SignatureCheck:
 
 
 def wanted_signature(signer: str | None, allowed: Path | None) -> ExpectedSigner | None:
-    """What the two options of `verify` mean. Raises UsageError when they cannot be used."""
+    """Signer from the two options of `verify`. Raises UsageError if they are unusable."""
     if signer is None and allowed is None:
         return None
     if not signer or allowed is None:
@@ -160,7 +160,7 @@ def wanted_signature(signer: str | None, allowed: Path | None) -> ExpectedSigner
 
 
 def check_signature(run: Path, wanted: ExpectedSigner | None) -> SignatureCheck:
-    """Whether the run has the signature that is wanted. Raises UsageError when nobody can tell."""
+    """Check the run for the wanted signature. Raises UsageError if the check is not possible."""
     file = signature_path(run).name if run.is_file() and has_signature(run) else ""
     if wanted is None:
         return _unchecked(run, file)

@@ -1,1 +1,1 @@
-"""Runs held against each other: which numbers differ, by how much, and how sure that is."""
+"""Comparison of runs: different numbers, sizes of the differences, and their certainty."""

@@ -1,7 +1,6 @@
 """Differences between two runs besides their results: protocol, bench, backend, versions.
 
-Field by field, in a reader's units. A difference that was declared has one of these for a cause, or
-the bench itself.
+Field by field, in display units. The cause of a declared difference is one of these, or the bench.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from campaign.physics.truth import simulated
 from campaign.trial import Tree, canonical_json
 
 UNTOLD = frozenset({"bench", "name", "title", "description", "limits", "loops", "trials", "chosen"})
-"""What of a protocol's test says nothing of its own: it is told elsewhere, or follows."""
+"""Keys of a protocol's test that are reported elsewhere or follow from others."""
 NOT_MOVING = ("description", "known")
-"""Tables of a bench that act on no motion; how well values are known is told apart."""
+"""Tables of a bench that do not affect the motion; `known` is reported separately."""
 NONE = "–"
 
 
@@ -33,8 +32,8 @@ class Change:
     """One field that differs.
 
     Attributes:
-        where: `run`, `backend`, `versions`, or the test's name, with `bench` or `truth` behind it.
-        path: dotted, as `--set` takes it, where it is of a protocol or a bench.
+        where: `run`, `backend`, `versions`, or a test's name, also with `: bench` or `: truth`.
+        path: dotted; for a protocol or a bench as in `--set`.
     """
 
     where: str
@@ -44,12 +43,12 @@ class Change:
 
 
 def changes(reference: RunReader, other: RunReader, pairing: Pairing) -> tuple[Change, ...]:
-    """All that differs; what several tests have alike, such as a bench, is told of the first."""
-    found: dict[tuple[str, str, str], Change] = {}
+    """All differences; one that several tests share, e.g. of their bench, only for the first."""
+    differences: dict[tuple[str, str, str], Change] = {}
     for change in (*_of_runs(reference, other), *_of_tests(reference, other, pairing)):
         part = change.where.partition(": ")[2] or change.where
-        found.setdefault((part, change.path, f"{change.reference}\0{change.other}"), change)
-    return tuple(found.values())
+        differences.setdefault((part, change.path, f"{change.reference}\0{change.other}"), change)
+    return tuple(differences.values())
 
 
 def _of_runs(one: RunReader, other: RunReader) -> Iterator[Change]:
@@ -77,14 +76,14 @@ def _of_tests(reference: RunReader, other: RunReader, pairing: Pairing) -> Itera
     trees = [_trees(reference), _trees(other)]
     for pair in pairing.tests:
         one, another = pair.reference, pair.other
-        told = one.name if one.name == another.name else f"{one.name} / {another.name}"
+        names = one.name if one.name == another.name else f"{one.name} / {another.name}"
         yield from _of_protocol(
-            told, pair, trees[0].get(one.name, {}), trees[1].get(another.name, {})
+            names, pair, trees[0].get(one.name, {}), trees[1].get(another.name, {})
         )
-        yield from _benches(f"{told}: bench", one.bench, another.bench)
+        yield from _benches(f"{names}: bench", one.bench, another.bench)
         plants = reference.header.truth.plants, other.header.truth.plants
         if any(plants):
-            yield from _benches(f"{told}: truth", _true(one, plants[0]), _true(another, plants[1]))
+            yield from _benches(f"{names}: truth", _true(one, plants[0]), _true(another, plants[1]))
     for side, tests in ((0, pairing.only_reference), (1, pairing.only_other)):
         for test in tests:
             words = [NONE, NONE]
@@ -93,7 +92,7 @@ def _of_tests(reference: RunReader, other: RunReader, pairing: Pairing) -> Itera
 
 
 def _of_protocol(told: str, pair: PairedTest, was: Tree, now: Tree) -> Iterator[Change]:
-    """Options in units of their own, and how the test was swept, ordered and repeated."""
+    """Differences of options (in their units), matrix, repeats, order, seed, stages, bench."""
     for path, one, other in _differing(pair.reference.options, pair.other.options):
         quantity = option_quantity(pair.reference, path) or option_quantity(pair.other, path)
         yield Change(told, path, plain(one, quantity), plain(other, quantity))
@@ -118,8 +117,8 @@ def _benches(where: str, one: Bench | None, other: Bench | None) -> Iterator[Cha
         return
 
     def told(path: str, name: str, was: Any, now: Any) -> Change:
-        found = number_at(one, path) or number_at(other, path)
-        quantity = None if found is None else found[1]
+        field = number_at(one, path) or number_at(other, path)
+        quantity = None if field is None else field[1]
         return Change(where, name, plain(was, quantity), plain(now, quantity))
 
     a, b = (bench.model_dump(mode="json", exclude=set(NOT_MOVING)) for bench in (one, other))
@@ -132,7 +131,7 @@ def _benches(where: str, one: Bench | None, other: Bench | None) -> Iterator[Cha
 
 
 def _true(test: AnalysedTest, plants: Mapping[str, Tree]) -> Bench | None:
-    """The bench that was simulated; None where the archive does not have it any more."""
+    """Simulated bench of a test; None if the archive does not have it."""
     if test.bench is None:
         return None
     digests = dict.fromkeys(archived.trial.truth for archived in test.trials)
@@ -164,7 +163,7 @@ def _fields(where: str, one: Mapping[str, Any], other: Mapping[str, Any]) -> Ite
 def _differing(
     one: Mapping[str, Any], other: Mapping[str, Any], above: str = ""
 ) -> Iterator[tuple[str, Any, Any]]:
-    """Dotted path and both values of what differs; None for what is not there."""
+    """Dotted path and both values of each difference; None for a missing value."""
     for key in dict.fromkeys((*one, *other)):
         was, now = one.get(key), other.get(key)
         path = f"{above}{key}"

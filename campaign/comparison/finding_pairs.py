@@ -1,4 +1,4 @@
-"""Findings of two runs as pairs, with difference and reservations."""
+"""Pairs of findings of two runs, with difference and reason for no verdict."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from campaign.references.verdict import JudgedNumber
 
 @dataclass(frozen=True, kw_only=True)
 class Pair(JudgedNumber):
-    """A finding of the reference beside the same of another run.
+    """A finding of the reference and the matching one of another run.
 
     Attributes:
-        test, other_test: the tests they are of.
-        display: the unit that a reader is shown.
+        test, other_test: their tests.
+        display: unit for display.
     """
 
     test: AnalysedTest
@@ -31,7 +31,7 @@ class Pair(JudgedNumber):
 
     @property
     def simulated_bare(self) -> bool:
-        """Whether both numbers are simulated, measured there, and neither has an interval."""
+        """Whether both numbers are from simulations, not given, and without an interval."""
         return (
             {self.test.source, self.other_test.source} == {SIMULATION}
             and self.quantity not in DERIVED
@@ -46,9 +46,9 @@ class Pair(JudgedNumber):
 
 
 def pairs_of(tested: PairedTest, shared: Collection[str] = ()) -> Iterator[Pair]:
-    """The pairs of one test with their differences, not yet judged.
+    """Pairs of one test with their differences, before verdicts.
 
-    shared: sources of systematic parts that are the same for both runs: `shared_sources`.
+    shared: sources of systematic parts that both runs share: `shared_sources`.
     """
     for one, another in tested.findings:
         pair = Pair.of(

@@ -1,10 +1,9 @@
 """Reasons why a difference of two findings with intervals is not judged.
 
-Some numbers follow from others of the same test: one change of an error is a change of each of its
-ratios, too, and would be declared as often as there are ratios.
+Some numbers follow from others of the same test: a changed error changes all of its ratios, and
+each ratio would be declared different.
 
-Besides, the interval of a single trial does not hold what a comparison of benches asks of it: there
-is no scatter between trials in it.
+The interval of a single trial does not include the scatter between trials.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT
 
 
 def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Finding]) -> Reason:
-    """Why two findings are not judged although both have intervals; `NONE` when they are.
+    """Reason not to judge two findings that both have intervals; `NONE` to judge them.
 
     sides, findings: of the reference and of the other run.
     """
@@ -42,7 +41,7 @@ def doubt(sides: tuple[AnalysedTest, AnalysedTest], findings: tuple[Finding, Fin
 
 
 def trials_behind(test: AnalysedTest, finding: Finding) -> int:
-    """How many trials the finding may rest on: those that its conditions do not contradict."""
+    """Count of trials that the finding may use: those that its conditions do not exclude."""
     return sum(
         archived.ending.outcome is Outcome.COMPLETED
         and archived.trial.role is Role.MEASUREMENT

@@ -1,4 +1,4 @@
-"""Figures of two runs drawn over each other."""
+"""Overlaid figures of two runs."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from campaign.report.palette import OTHERS, Look
 from campaign.result import Curve, Figure, Panel
 
 PARTS = 8
-"""Most panels that a figure is taken apart into."""
+"""Most panels of an overlay."""
 SAMPLES = 20_000
-"""Samples of a figure from which on it is one of recordings, not of numbers."""
+"""Samples above which a figure shows recordings and is not overlaid."""
 
 
 @dataclass(frozen=True)
 class Letters:
-    """What the two runs are called in a picture."""
+    """Letters of the two runs in a picture."""
 
     reference: str
     other: str
 
     @property
     def looks(self) -> tuple[Look, Look]:
-        """The reference's and the other's: the first two of those that are nobody's own."""
+        """Looks of the reference and the other: the first two that no series reserves."""
         return OTHERS[0], OTHERS[1]
 
 
 def overlays(
     reference: AnalysedTest, other: AnalysedTest, letters: Letters
 ) -> Iterator[Figure | str]:
-    """Figures that both tests have, one over the other; a sentence for each that cannot be so."""
-    theirs = {figure.key: figure for figure in other.result.figures}
+    """Overlays of the figures that both tests have; for an impossible one, a sentence why."""
+    others = {figure.key: figure for figure in other.result.figures}
     for figure in reference.result.figures:
-        if figure.key in theirs:
-            yield _overlay(figure, theirs[figure.key], letters)
+        if figure.key in others:
+            yield _overlay(figure, others[figure.key], letters)
 
 
 def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
@@ -57,29 +57,29 @@ def _overlay(one: Figure, other: Figure, letters: Letters) -> Figure | str:
     if len(panels) > PARTS:
         return f"“{one.title}” has too many curves to be laid over each other."
     across = one.across if len(panels) == len(one.panels) else 2
-    told = f"{letters.reference} and {letters.other} over each other."
+    caption = f"{letters.reference} and {letters.other} over each other."
     if one.caption == other.caption:  # else it is of one run
-        told = f"{told} {one.caption}"
-    return replace(one, panels=tuple(panels), caption=told, thesis=(), trials=(), across=across)
+        caption = f"{caption} {one.caption}"
+    return replace(one, panels=tuple(panels), caption=caption, thesis=(), trials=(), across=across)
 
 
 def _both(one: Panel, other: Panel, letters: Letters, title: str | None = None) -> Panel:
-    """The curves of two panels in one, each run's in its own look."""
+    """One panel with the curves of both, each run in its own look."""
     curves = tuple(
         _renamed(curve, letter)
         for letter, panel in ((letters.reference, one), (letters.other, other))
         for curve in panel.curves
     )
-    told = _common(one.title, other.title) if title is None else title
-    return replace(one, curves=curves, marks=(), title=told)
+    heading = _common(one.title, other.title) if title is None else title
+    return replace(one, curves=curves, marks=(), title=heading)
 
 
 def _parts(one: Panel, other: Panel) -> Iterator[tuple[Panel, Panel]]:
-    """The curves that both have, in their order, in as few panels as `_few` lets them be."""
-    theirs = {_key(curve): curve for curve in other.curves}
+    """Pairs of panels with the common curves, in order; each panel satisfies `_few`."""
+    others = {_key(curve): curve for curve in other.curves}
     parts: list[list[Curve]] = []
     for curve in one.curves:
-        if _key(curve) not in theirs:
+        if _key(curve) not in others:
             continue
         if not parts or curve.style in [each.style for each in parts[-1]]:
             parts.append([])
@@ -89,18 +89,18 @@ def _parts(one: Panel, other: Panel) -> Iterator[tuple[Panel, Panel]]:
         title = f"{head}: {_told(curves[0])}" if head else _told(curves[0])
         yield (
             replace(one, curves=tuple(curves), title=title),
-            replace(other, curves=tuple(theirs[_key(each)] for each in curves), title=title),
+            replace(other, curves=tuple(others[_key(each)] for each in curves), title=title),
         )
 
 
 def _common(one: str, other: str) -> str:
-    """What two titles have in common, comma by comma: behind may stand what one run found."""
+    """Common leading parts of two titles, split at commas: later parts may be results of a run."""
     pieces = zip(one.split(", "), other.split(", "), strict=False)
     return ", ".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pieces))
 
 
 def _key(curve: Curve) -> tuple[str, str, str]:
-    """What a curve has in common with its partner in the other run."""
+    """Key that matches a curve with its partner in the other run."""
     return curve.label, curve.series, curve.style
 
 
@@ -117,13 +117,13 @@ def _fits(one: Panel, other: Panel) -> bool:
 
 
 def _few(panel: Panel) -> bool:
-    """Whether style alone tells a run's curves apart: at most one of points, line and band each."""
+    """Whether style alone distinguishes a run's curves: at most one curve of each style."""
     styles = [curve.style for curve in panel.curves]
     return len(styles) == len(set(styles))
 
 
 def _renamed(curve: Curve, letter: str) -> Curve:
-    """A run's curve in the run's look; published values beside it would be drawn twice."""
+    """A run's curve in the run's look, without its quantity: no published values beside it."""
     label = f"{letter}: {_told(curve)}" if _told(curve) else letter
     return replace(curve, label=label, series=letter, quantity="")
 

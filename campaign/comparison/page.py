@@ -1,4 +1,4 @@
-"""The comparison as a folder: page, tables and figures."""
+"""The folder of a comparison: page, tables and figures."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from campaign.report.page.pieces import Files, FoldedSection, Items, Paragraph, 
 
 NAME = "comparison"
 UNTOLD = ("test", "quantity", "conditions", "p")
-"""Columns that a test's own tables leave to the table of all pairs."""
+"""Columns that only the table of all pairs has, not a test's own tables."""
 HEADLINES = 12
-"""Most declared differences that are told on top of the page."""
+"""Most declared differences that the page lists at the top."""
 
 
 def write_comparison(
@@ -49,13 +49,13 @@ def write_comparison(
     templates: Path | None = None,
     formats: Sequence[Format] = (),
 ) -> Path:
-    """Write the comparison into the folder `output`; the page's path. As `write_article`."""
+    """Write the comparison into the folder `output`; return the page's path. As `write_article`."""
     make = partial(article_of, comparison)
     return write_article(NAME, make, output, packaged_templates, templates, formats)
 
 
 def article_of(comparison: Comparison) -> Article:
-    """What the comparison says."""
+    """Page of a comparison."""
     making = PageParts()
     making.problems += [problem for side in comparison.sides for problem in side.problems]
     several = len(comparison.against) > 1
@@ -64,7 +64,7 @@ def article_of(comparison: Comparison) -> Article:
         for each in comparison.against
         for part in _against(each, comparison, making, several=several)
     ]
-    told = [damage_text(each.letter, each.damaged) for each in comparison.sides if each.damaged]
+    damage = [damage_text(each.letter, each.damaged) for each in comparison.sides if each.damaged]
     others = "; each of the others is compared with it" if several else ""
     return Article(
         name=NAME,
@@ -75,7 +75,7 @@ def article_of(comparison: Comparison) -> Article:
         "less the reference.",
         facts=tuple((side.letter, tuple(_facts(side))) for side in comparison.sides),
         parts=(
-            *problems_part("this comparison", [*told, *making.problems]),
+            *problems_part("this comparison", [*damage, *making.problems]),
             *parts,
             Part("how", "How it was judged", tuple(map(Paragraph, _how(comparison)))),
         ),
@@ -161,8 +161,8 @@ def _headlines(against: Against) -> Iterator[Piece]:
     if declared:
         yield Items(tuple(declared))
     if bare := bare_differing(against)[:HEADLINES]:
-        told = "Simulated, without an interval, and not equal (nothing is declared of them):"
-        yield Paragraph(told)
+        heading = "Simulated, without an interval, and not equal (nothing is declared of them):"
+        yield Paragraph(heading)
         yield Items(tuple(map(headline, bare)))
 
 
@@ -213,22 +213,22 @@ def _test(
 def _figures(
     tested: PairedTest, pairs: Sequence[Pair], letters: Letters, name: str, making: PageParts
 ) -> tuple[tuple[ShownFigure, ...], tuple[str, ...]]:
-    """Numbers side by side, figures over each other, and why some are not."""
+    """Figures of the numbers side by side and of overlaid curves; reasons for missing overlays."""
     folder = making.folder
-    found = [
+    figures = [
         making.attempt(
             f"{name}: numbers side by side", lambda: _side_by_side(pairs, letters, name, folder)
         )
     ]
     notes = []
-    # Each run in the look that it has in all pictures of the page.
+    # A run has one look in all pictures of the page.
     chosen = dict(zip((letters.reference, letters.other), letters.looks, strict=True))
     for each in overlays(tested.reference, tested.other, letters):
         if isinstance(each, str):
             notes.append(each)
         else:
-            found.append(making.drawn(each, f"{name}-", chosen))
-    return tuple(figure for figure in found if figure is not None), tuple(notes)
+            figures.append(making.drawn(each, f"{name}-", chosen))
+    return tuple(figure for figure in figures if figure is not None), tuple(notes)
 
 
 def _side_by_side(

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 PANELS = 6
-"""Most quantities of a test that are shown side by side."""
+"""Most quantities of a test that one figure shows."""
 
 
 def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
-    """Each with its name: `Coulomb friction · direction positive`."""
+    """Pairs with their names: `Coulomb friction · direction positive`."""
     return [
         (pair, f"{axis_quantity_name(pair.test, pair.quantity)} · {place}".removesuffix(" · "))
         for pair, place in zip(pairs, row_names(pairs), strict=True)
@@ -34,11 +34,13 @@ def with_names(pairs: Sequence[Pair]) -> list[tuple[Pair, str]]:
 
 
 def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
-    """Both runs' numbers of each quantity that has several, a panel each; None without any."""
+    """Figure of both runs' numbers, one panel per quantity with several; None without any."""
     groups: dict[str, list[Pair]] = {}
     for pair in pairs:
-        told = pair.testable or not any(p.testable and p.quantity == pair.quantity for p in pairs)
-        if told and not (math.isnan(pair.reference.value) or math.isnan(pair.other.value)):
+        selected = pair.testable or not any(
+            p.testable and p.quantity == pair.quantity for p in pairs
+        )
+        if selected and not (math.isnan(pair.reference.value) or math.isnan(pair.other.value)):
             groups.setdefault(pair.quantity, []).append(pair)
     several = [group[:MOST] for group in groups.values() if len(group) > 1][:PANELS]
     if not several:
@@ -54,7 +56,7 @@ def draw_side_by_side(pairs: Sequence[Pair], letters: Letters) -> str | None:
 
 
 def _draw_group(ax: Axes, pairs: Sequence[Pair], letters: Letters) -> None:
-    """The numbers of one quantity, the reference's above the other's."""
+    """Draw the numbers of one quantity, the reference's above the other's."""
     first = pairs[0]
     unit, names = first.display, row_names(pairs)
     common = {n: v for n, v in first.conditions.items() if n not in _varied(pairs)}
@@ -90,7 +92,7 @@ def _draw_number(ax: Axes, estimate: Estimate, look: Look, y: float, label: str)
 
 
 def row_names(pairs: Sequence[Pair]) -> list[str]:
-    """The conditions of each pair in which others of its test and quantity differ."""
+    """Conditions of each pair that vary within its test and quantity."""
     groups: dict[tuple[str, str], list[Pair]] = {}
     for pair in pairs:
         groups.setdefault((pair.test.name, pair.quantity), []).append(pair)
@@ -109,6 +111,6 @@ def row_names(pairs: Sequence[Pair]) -> list[str]:
 
 
 def _varied(pairs: Sequence[Pair]) -> frozenset[str]:
-    """Names of conditions that do not have one value in all pairs."""
+    """Names of conditions that vary between the pairs."""
     names = {name for pair in pairs for name in pair.conditions}
     return frozenset(n for n in names if len({repr(p.conditions.get(n)) for p in pairs}) > 1)

@@ -25,7 +25,7 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 @dataclass(frozen=True)
 class Side:
-    """A run with what its analyses found; A is the reference."""
+    """A run with its analyzed tests; A is the reference."""
 
     letter: str
     run: RunReader
@@ -37,12 +37,12 @@ class Side:
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
-        """What of the run is damaged, as far as the analyses looked at it."""
+        """Damage of the run that its reader and its analyses detected."""
         return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Why tests of it have no result."""
+        """Reasons of its tests without a result."""
         return tuple(f"{self.letter}: {t.name}: {t.problem}" for t in self.tests if t.problem)
 
 
@@ -51,9 +51,9 @@ class Against:
     """Another run against the reference.
 
     Attributes:
-        pairs: in the order of the reference's tests and findings, judged.
-        shared: by the reference's test, the sources of systematic parts that cancel.
-        changes: what differs besides.
+        pairs: with verdicts, in the order of the reference's tests and findings.
+        shared: sources of systematic parts that cancel, by the reference's test.
+        changes: differences besides the results.
     """
 
     reference: Side
@@ -64,15 +64,15 @@ class Against:
     changes: tuple[Change, ...]
 
     def of(self, verdict: Verdict) -> tuple[Pair, ...]:
-        """The pairs that came to this, the largest change first where one was declared."""
-        found = [pair for pair in self.pairs if pair.verdict is verdict]
+        """Pairs with this verdict; for `DIFFERENT`, the largest change first."""
+        pairs = [pair for pair in self.pairs if pair.verdict is verdict]
         if verdict is Verdict.DIFFERENT:
-            found.sort(key=size_of, reverse=True)
-        return tuple(found)
+            pairs.sort(key=size_of, reverse=True)
+        return tuple(pairs)
 
     @property
     def equal(self) -> bool:
-        """Whether both runs found the same numbers, to the last digit, and each all of them."""
+        """Whether both runs have the same findings with exactly equal numbers and intervals."""
         alone = any(tested.only_reference or tested.only_other for tested in self.pairing.tests)
         alone = alone or bool(self.pairing.only_reference or self.pairing.only_other)
         numbers = ((pair.reference, pair.other) for pair in self.pairs)
@@ -80,30 +80,30 @@ class Against:
 
     @property
     def without_interval(self) -> tuple[Pair, ...]:
-        """Pairs of simulated numbers neither of which has an interval, as without any noise."""
+        """Pairs of simulated numbers without intervals, as from noise-free simulations."""
         return tuple(pair for pair in self.pairs if pair.simulated_bare)
 
     @property
     def tested(self) -> int:
-        """How many of the pairs have a p value."""
+        """Count of pairs in the family."""
         return sum(pair.testable for pair in self.pairs)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs, the first of which is what the others are held against."""
+    """Comparison of runs with the first one."""
 
     sides: tuple[Side, ...]
     against: tuple[Against, ...]
 
     @property
     def title(self) -> str:
-        """What is compared with what: by the runs' titles where these tell them apart."""
+        """Title: the runs' titles if these are unique, else their names."""
         titles = [side.title for side in self.sides]
         names = [side.run.header.name for side in self.sides]
         reference, *others = titles if len(set(titles)) == len(titles) else names
-        told = " and ".join(filter(None, (", ".join(others[:-1]), others[-1])))
-        return f"{told} compared with {reference}"
+        compared = " and ".join(filter(None, (", ".join(others[:-1]), others[-1])))
+        return f"{compared} compared with {reference}"
 
     @property
     def tested(self) -> int:
@@ -112,7 +112,7 @@ class Comparison:
 
     @property
     def different(self) -> tuple[Pair, ...]:
-        """What was declared different."""
+        """Pairs that are declared different."""
         return tuple(pair for each in self.against for pair in each.of(Verdict.DIFFERENT))
 
 
@@ -122,7 +122,7 @@ def _same(one: Estimate, other: Estimate) -> bool:
 
 
 def size_of(pair: Pair) -> float:
-    """What is sorted by; a change of sign is larger than any share."""
+    """Sort key: size of the relative change; infinite if that is not defined."""
     share = abs(pair.found.change.value)
     return math.inf if math.isnan(share) else share
 
@@ -132,12 +132,12 @@ def compare_runs(
     experiments: Mapping[str, Experiment],
     exchanged: Sequence[str] = (),
 ) -> Comparison:
-    """Analyse the runs and hold all but the first against the first.
+    """Analyze the runs and compare each with the first.
 
-    exchanged: sources of systematic parts that are not the same for all runs, although all benches
-        say the same of them: a motor that was exchanged for one of its kind.
+    exchanged: sources of systematic parts that differ between runs although all benches state the
+        same value, e.g. of an exchanged motor.
 
-    Raises UsageError when runs are not several ones, or have nothing in common.
+    Raises UsageError for fewer than two runs, a repeated run, and runs without common findings.
     """
     _check(runs)
     sides = tuple(
@@ -145,14 +145,14 @@ def compare_runs(
         for letter, run in zip(LETTERS, runs, strict=False)
     )
     others = [_exchanged(sides[0], name) for name in exchanged]
-    found = [_against(sides[0], other, others) for other in sides[1:]]
-    verdicts = iter(with_verdicts([pair for each in found for pair in each.pairs]))
-    against = (replace(each, pairs=tuple(next(verdicts) for _ in each.pairs)) for each in found)
+    unjudged = [_against(sides[0], other, others) for other in sides[1:]]
+    verdicts = iter(with_verdicts([pair for each in unjudged for pair in each.pairs]))
+    against = (replace(each, pairs=tuple(next(verdicts) for _ in each.pairs)) for each in unjudged)
     return Comparison(sides, tuple(against))
 
 
 def _exchanged(reference: Side, name: str) -> str:
-    """The source of this name. Raises UsageError for one that there is not."""
+    """Source of this name. Raises UsageError for an unknown one."""
     axis = next((test.sides for test in reference.tests if test.bench), BOTH_ROTARY)
     source = source_called(name, SOURCES.values(), axis)
     if source is None:
@@ -170,7 +170,7 @@ def _check(runs: Sequence[RunReader]) -> None:
 
 
 def refuse_twice(runs: Iterable[RunReader]) -> None:
-    """Raises UsageError for a run that is named twice, by its place or by its content."""
+    """Raise UsageError for two runs with the same path or content."""
     seen: dict[str, RunReader] = {}
     for run in runs:
         for key in filter(None, (str(run.path.resolve()), run.root)):
@@ -203,7 +203,7 @@ def _against(reference: Side, other: Side, exchanged: Sequence[str]) -> Against:
 
 
 def _nothing_common(reference: Side, other: Side) -> Iterator[str]:
-    """Why two runs cannot be compared, with what each has."""
+    """Lines on why two runs cannot be compared, with tests and quantities of each."""
     yield (
         f"{reference.run.name} and {other.run.name} have no finding in common: none is of the same "
         "quantity under the same conditions"
@@ -211,6 +211,6 @@ def _nothing_common(reference: Side, other: Side) -> Iterator[str]:
     for side in (reference, other):
         kinds = dict.fromkeys(test.kind for test in side.tests)
         quantities = dict.fromkeys(f.quantity for t in side.tests for f in t.result.findings)
-        found = ", ".join(list(quantities)[:8]) + (" ..." if len(quantities) > 8 else "")
-        yield f"  {side.run.name} has {', '.join(kinds) or 'no test'}: {found or 'nothing found'}"
+        listing = ", ".join(list(quantities)[:8]) + (" ..." if len(quantities) > 8 else "")
+        yield f"  {side.run.name} has {', '.join(kinds) or 'no test'}: {listing or 'nothing found'}"
         yield from (f"    {problem}" for problem in side.problems)

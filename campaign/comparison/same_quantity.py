@@ -1,7 +1,7 @@
 """Matching findings of two runs by quantity and conditions.
 
-Tests go together that are of the same kind: those of the same name first, then, of those left over,
-those that have most findings in common. Whatever has no partner is kept and told.
+Only tests of the same kind match: first those of the same name, then, of the others, those with the
+most findings in common. Tests and findings without a partner are kept and reported.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from campaign.units import same_dimension
 
 @dataclass(frozen=True)
 class PairedTest:
-    """A test of the reference and the one of another run that it goes with.
+    """A test of the reference and the matching one of another run.
 
     Attributes:
         findings: (reference, other), in the reference's order.
@@ -32,7 +32,7 @@ class PairedTest:
 
 @dataclass(frozen=True)
 class Pairing:
-    """All tests of two runs; those without a partner apart."""
+    """All tests of two runs, with and without a partner."""
 
     tests: tuple[PairedTest, ...]
     only_reference: tuple[AnalysedTest, ...]
@@ -40,16 +40,16 @@ class Pairing:
 
 
 def pair_tests(reference: Sequence[AnalysedTest], other: Sequence[AnalysedTest]) -> Pairing:
-    """Each test at most once, in the reference's order."""
+    """Match tests, each at most once, in the reference's order."""
     partners: dict[int, int] = {}
     for same_name in (True, False):
         for _, i, j in sorted(_candidates(reference, other, same_name=same_name)):
             if i not in partners and j not in partners.values():
                 partners[i] = j
-    found = [_paired(reference[i], other[j]) for i, j in sorted(partners.items())]
+    pairs = [_paired(reference[i], other[j]) for i, j in sorted(partners.items())]
     taken = set(partners.values())
     return Pairing(
-        tuple(found),
+        tuple(pairs),
         tuple(test for i, test in enumerate(reference) if i not in partners),
         tuple(test for j, test in enumerate(other) if j not in taken),
     )
@@ -58,26 +58,26 @@ def pair_tests(reference: Sequence[AnalysedTest], other: Sequence[AnalysedTest])
 def pair_findings(
     reference: Iterable[Finding], other: Iterable[Finding]
 ) -> tuple[list[tuple[Finding, Finding]], list[Finding], list[Finding]]:
-    """Pairs, and what is left over on either side; each finding takes part once, in order."""
+    """Match findings, each once, in order: pairs, and the findings left over on both sides."""
     pairs: list[tuple[Finding, Finding]] = []
     alone: list[Finding] = []
-    theirs = list(other)
+    others = list(other)
     free: dict[Hashable, list[int]] = {}
-    for place, finding in enumerate(theirs):
+    for place, finding in enumerate(others):
         free.setdefault(_words(finding), []).append(place)
     for finding in reference:
         places = free.get(_words(finding), [])
-        partner = next((n for n in places if same_finding(finding, theirs[n])), None)
+        partner = next((n for n in places if same_finding(finding, others[n])), None)
         if partner is None:
             alone.append(finding)
         else:
             places.remove(partner)
-            pairs.append((finding, theirs[partner]))
-    return pairs, alone, [theirs[n] for n in sorted(n for places in free.values() for n in places)]
+            pairs.append((finding, others[partner]))
+    return pairs, alone, [others[n] for n in sorted(n for places in free.values() for n in places)]
 
 
 def same_finding(one: Finding, other: Finding) -> bool:
-    """Whether both are one quantity under one set of conditions, in units that go together."""
+    """Whether two findings have the same quantity and conditions, in units of one dimension."""
     if one.quantity != other.quantity or not same_dimension(one.unit, other.unit):
         return False
     stated = [_stated(one.conditions), _stated(other.conditions)]
@@ -89,7 +89,7 @@ def same_finding(one: Finding, other: Finding) -> bool:
 def _candidates(
     reference: Sequence[AnalysedTest], other: Sequence[AnalysedTest], *, same_name: bool
 ) -> Iterator[tuple[int, int, int]]:
-    """(less is better, place in the reference, place in the other) of what may go together."""
+    """Tests that may match: (less is better, index in the reference, index in the other)."""
     for i, one in enumerate(reference):
         for j, another in enumerate(other):
             if one.kind != another.kind or (one.name == another.name) != same_name:
@@ -105,12 +105,12 @@ def _paired(reference: AnalysedTest, other: AnalysedTest) -> PairedTest:
 
 
 def _measured(test: AnalysedTest) -> Iterator[Finding]:
-    """What a recording says; what follows from published values says nothing of a run."""
+    """Findings from recordings, without those recomputed from published values."""
     return (finding for finding in test.result.findings if not finding.recomputed)
 
 
 def _words(finding: Finding) -> Hashable:
-    """What two findings must have in common to the letter: the rest are numbers."""
+    """Quantity, names of conditions, and text values: equal for findings that match."""
     stated = _stated(finding.conditions)
     words = frozenset((name, value) for name, value in stated.items() if isinstance(value, str))
     return finding.quantity, frozenset(stated), words

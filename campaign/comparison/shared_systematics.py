@@ -1,10 +1,10 @@
 """Systematic parts that two runs share.
 
-Only constants of the bench can be: what a current is worth, how heavy the load is. Both tests then
-say the same value of a bench of the same name, know it equally well, and have their samples from
-the same kind of source; where a truth was simulated, it has the same value for both, too. All other
-parts (interpolation, resolution, windows ...) are errors of one evaluation: they are taken as
-independent, which adds them in squares.
+Only constants of the bench can be shared, e.g. torque constant and inertia. Conditions: both tests
+state the same value and uncertainty for a bench of the same name. Their samples are from the same
+kind of source. If a truth was simulated, its value is the same for both. All other parts
+(interpolation, resolution, windows ...) are errors of one evaluation. They are treated as
+independent and add in squares.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from campaign.physics.truth import value_at
 from campaign.trial import Tree, canonical_json
 
 Plants = Mapping[str, Tree]
-"""What was simulated in place of stated benches, by digest: `RunHeader.truth.plants`."""
+"""Simulated truths in place of stated benches, by digest: `RunHeader.truth.plants`."""
 
 
 def shared_sources(
     one: AnalysedTest, other: AnalysedTest, plants: Plants, other_plants: Plants
 ) -> frozenset[str]:
-    """Sources of systematic parts, by name, that shift both tests' numbers alike."""
+    """Names of the sources of systematic parts that shift both tests' numbers equally."""
     if not one.source or one.source != other.source:
         return frozenset()
     if one.bench is None or other.bench is None or one.bench.name != other.bench.name:
@@ -41,19 +41,19 @@ def shared_sources(
 
 
 def source_called(name: str, sources: Iterable[str], sides: Sides) -> str | None:
-    """The source that a page of such a rig calls so, or that has this code; None for none."""
+    """Source by its name, or by its name in terms of the axis; None if unknown."""
     return next((each for each in sources if name in (each, in_axis_terms(each, sides))), None)
 
 
 def _known(test: AnalysedTest, path: str) -> tuple[object, object] | None:
-    """The bench's value at a path and how well it is known; None where it has none."""
+    """Value of the bench at a path, and its entry in `known.values`; None without a value."""
     if test.bench is None or (value := number_at(test.bench, path)) is None:
         return None
     return value[0], test.bench.known.values.get(path)
 
 
 def _true(test: AnalysedTest, path: str, plants: Plants) -> frozenset[str]:
-    """What the path's value was in simulations; nothing where the stated bench was simulated."""
+    """Simulated values at a path; empty if the stated bench was simulated."""
     return frozenset(_at(plants.get(digest), path) for digest in _truths(test))
 
 
@@ -69,9 +69,9 @@ def _at(plant: Tree | None, path: str) -> str:
 
 
 def constants(test: AnalysedTest, plants: Plants) -> Mapping[str, str]:
-    """What a test rests on, by the name of its systematic part: the same text, the same constant.
+    """Constants of a test by the name of their systematic part; equal texts mean equal constants.
 
-    The rules are those of `shared_sources`, for more than two runs.
+    The conditions are those of `shared_sources`, for more than two runs.
     """
     if not test.source or test.bench is None:
         return {}

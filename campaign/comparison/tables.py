@@ -1,4 +1,4 @@
-"""Tables of pairs: for the page, as CSV, and for a terminal."""
+"""Tables and texts of pairs: for the page, CSV and terminal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from campaign.text import interval, pretty_unit
 def pair_table(
     key: str, title: str, pairs: Iterable[Pair], letters: tuple[str, str], note: str = ""
 ) -> Table:
-    """A row per pair, numbers in the unit of the row."""
+    """Table with one row per pair, each in its own unit."""
     reference, other = letters
     return Table(
         key,
@@ -48,12 +48,12 @@ def pair_table(
 
 
 def shorter(table: Table, *names: str) -> Table:
-    """The table without these columns."""
+    """Table without the named columns."""
     return replace(table, columns=tuple(c for c in table.columns if c.name not in names))
 
 
 def alone_table(against: Against) -> Table | None:
-    """What only one of the runs found; None where both found the same."""
+    """Table of findings in only one of the runs; None without any."""
     rows: list[Mapping[str, Cell]] = []
     reference, other = against.reference.letter, against.other.letter
     for tested in against.pairing.tests:
@@ -83,7 +83,7 @@ def alone_table(against: Against) -> Table | None:
 
 
 def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
-    """What differs besides, a row per field."""
+    """Table of the differences besides the results, one row per field."""
     return Table(
         "circumstances",
         "What differs between the runs besides",
@@ -101,33 +101,33 @@ def changes_table(changes: Sequence[Change], letters: tuple[str, str]) -> Table:
 
 
 def not_judged(pairs: Iterable[Pair]) -> Iterator[str]:
-    """`12 of one trial each: ...`: each reason once, the most frequent first."""
-    told = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
-    for reason, count in told.most_common():
+    """Reasons for no verdict with their counts, as `12: ...`, the most frequent first."""
+    counts = Counter(str(pair.reason) for pair in pairs if pair.verdict is Verdict.NOT_JUDGED)
+    for reason, count in counts.most_common():
         yield f"{count}: {reason}"
 
 
 def name_of(pair: Pair) -> str:
-    """`coulomb torque, direction positive`."""
+    """Name of a pair: `coulomb torque, direction positive`."""
     words = condition_words(pair.test, pair.conditions)
     name = axis_quantity_name(pair.test, pair.quantity)
     return f"{name}, {words}" if words else name
 
 
 def number_of(estimate: Estimate, unit: str) -> str:
-    """An estimate in a unit, without it."""
-    told = in_unit(estimate, unit)
-    low, high = told.combined
-    if told.kind in ("at least", "at most"):
-        sign, end = ("≥", low) if told.kind == "at least" else ("≤", high)
+    """Text of an estimate in a unit, without the unit."""
+    shown = in_unit(estimate, unit)
+    low, high = shown.combined
+    if shown.kind in ("at least", "at most"):
+        sign, end = ("≥", low) if shown.kind == "at least" else ("≤", high)
         return f"{sign} {interval(end, None, None)}"
-    return interval(told.value, low, high)
+    return interval(shown.value, low, high)
 
 
 def change_of(pair: Pair) -> str:
-    """`+10.0 % (8.9 to 11.1 %)`; a bound as such; `–` where there is none.
+    """Text of a change: `+10.0 % (8.9 to 11.1 %)`, a bound, or `–` for none.
 
-    Where the difference is no share of the reference, it is told in its own unit.
+    If a relative change is not defined, the difference in its own unit.
     """
     change = pair.found.change
     value, low, high = (
@@ -154,14 +154,14 @@ def _difference_of(pair: Pair) -> str:
 
 
 def headline(pair: Pair) -> str:
-    """A declared pair in one sentence, without a full stop."""
+    """Sentence on a declared pair, without a period."""
     unit = pretty_unit(pair.display)
     numbers = [number_of(each, pair.display) for each in (pair.reference, pair.other)]
     return f"{name_of(pair)}: {change_of(pair)}, from {numbers[0]} to {numbers[1]} {unit}".rstrip()
 
 
 def sentences(against: Against, tested: int) -> Iterator[str]:
-    """What the comparison with one run comes to. `tested`: size of the family."""
+    """Sentences that summarize the comparison with one run. `tested`: size of the family."""
     pairs, judged = against.pairs, against.tested
     if against.equal:
         yield f"Equal: all {len(pairs)} numbers are the same to the last digit."
@@ -199,13 +199,13 @@ def sentences(against: Against, tested: int) -> Iterator[str]:
 
 
 def bare_differing(against: Against) -> tuple[Pair, ...]:
-    """Of the simulated numbers without an interval those that differ, the largest change first."""
-    found = [pair for pair in against.without_interval if pair.found.difference.value]
-    return tuple(sorted(found, key=size_of, reverse=True))
+    """Different simulated numbers without an interval, the largest change first."""
+    differing = [pair for pair in against.without_interval if pair.found.difference.value]
+    return tuple(sorted(differing, key=size_of, reverse=True))
 
 
 def bench_lines(against: Against) -> Iterator[str]:
-    """`map: bench: inertia: 1 kg·m² -> 2 kg·m²`: what differs in benches and truths."""
+    """Differences of benches and truths: `map: bench: inertia: 1 kg·m² -> 2 kg·m²`."""
     for change in against.changes:
         if change.where.endswith((": bench", ": truth")):
             path = f" {change.path}:" if change.path else ""
@@ -213,7 +213,7 @@ def bench_lines(against: Against) -> Iterator[str]:
 
 
 def _row(pair: Pair) -> Mapping[str, Cell]:
-    found = pair.found
+    comparison = pair.found
     return {
         "test": pair.test.name,
         "finding": name_of(pair),
@@ -222,8 +222,8 @@ def _row(pair: Pair) -> Mapping[str, Cell]:
         "unit": pretty_unit(pair.display),
         "reference": in_unit(pair.reference, pair.display),
         "other": in_unit(pair.other, pair.display),
-        "difference": in_unit(found.difference, pair.display),
-        "change": found.change,
+        "difference": in_unit(comparison.difference, pair.display),
+        "change": comparison.change,
         "p": pair.adjusted,
         "verdict": str(pair.verdict),
         "reason": str(pair.reason),

@@ -9,10 +9,10 @@ from campaign.experiments.interface import Experiment
 
 
 def experiments_by_model() -> Mapping[str, Experiment]:
-    """Every experiment whose analysis identifies, by the name of its model.
+    """Experiments whose analysis identifies parameters, by the name of their model.
 
-    Packages that cannot be used are left out. A name of the program stays the program's; one that
-    two packages claim is nobody's, as of every kind.
+    Leaves out unusable packages and names that two packages claim. The program's own experiment
+    takes precedence over a package.
     """
     kinds = experiments()
     claims: dict[tuple[str, bool], list[Experiment]] = {}

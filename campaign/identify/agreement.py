@@ -11,20 +11,20 @@ from campaign.identify.tables import parameter_text, parameter_unit, parameter_w
 from campaign.text import pretty_unit
 
 SAME = {"coulomb_torque": "coulomb", "viscous_friction": "viscous"}
-"""Names of one method for what others call so."""
+"""Names of one method, with the names that other methods use."""
 COMPARED = ("coulomb", "viscous", "inertia")
 WORTH_TELLING = 0.1
-"""of the larger of two values by which they are apart at least."""
+"""Least difference of two values that is reported, relative to the larger one."""
 OVER_TEMPERATURE = "_over_temperature"
-"""How names end of a model whose friction is that at one temperature, and no mean over several."""
+"""Ending of a name that marks a model of friction at one temperature, not a mean over several."""
 
 
 def disagreements(sections: Sequence[Section]) -> Iterator[str]:
-    """Of measured numbers whose intervals exclude each other, a sentence; the widest gap alone.
+    """Sentences on measured numbers with disjoint intervals; for each number, the widest gap.
 
-    Friction at one temperature is not held against a mean over several.
+    Friction at one temperature is not compared with a mean over several.
     """
-    found: dict[tuple[str, bool], list[tuple[str, Estimate, str]]] = {}
+    estimates: dict[tuple[str, bool], list[tuple[str, Estimate, str]]] = {}
     for section in sections:
         names = {each.estimate.name for each in section.identified.parameters}
         for each in section.identified.parameters:
@@ -34,10 +34,10 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
             measured = each.estimate.origin is Origin.MEASURED and each.estimate.has_interval
             if name.split("_")[0] in COMPARED and measured:
                 at_one = f"{name.split('_')[0]}{OVER_TEMPERATURE}" in names
-                found.setdefault((name, at_one), []).append(
+                estimates.setdefault((name, at_one), []).append(
                     (section.model.name, each.estimate, parameter_unit(section, each.estimate))
                 )
-    for (name, _), several in found.items():
+    for (name, _), several in estimates.items():
         pairs = [(_gap(one[1], other[1]), one, other) for one, other in combinations(several, 2)]
         gap, one, other = max(pairs, key=lambda pair: pair[0], default=(0.0, None, None))
         if gap <= 0 or one is None or other is None:
@@ -52,7 +52,7 @@ def disagreements(sections: Sequence[Section]) -> Iterator[str]:
 
 
 def _gap(one: Estimate, other: Estimate) -> float:
-    """Between two intervals; 0 where they meet, or the values are hardly apart."""
+    """Gap between two intervals; 0 if they overlap or the values differ little."""
     (a, b), (c, d) = one.combined, other.combined
     if None in (a, b, c, d):
         return 0.0

@@ -22,7 +22,7 @@ from campaign.physics.friction import coulomb, friction_models
 from campaign.protocol.bench_edit import with_known
 
 LEAST_CORRELATION = 0.1
-"""below which two values count as told apart."""
+"""Correlations below this magnitude are not written."""
 FRICTION = "friction.load."
 CURVE = (
     "coulomb_torque",
@@ -31,13 +31,13 @@ CURVE = (
     "stribeck_exponent",
     "viscous_friction",
 )
-"""What a curve of sliding is made of: another one replaces it whole."""
+"""Keys of a sliding curve; another curve replaces all of them."""
 
 
 def bench_text(found: Identification, command: str) -> str:
-    """The bench's own text with the identified values in it; comments stay.
+    """Bench file with the identified values; comments stay.
 
-    Raises CampaignError where the run does not hold the bench's file, or it cannot be edited.
+    Raises CampaignError if the run lacks the bench file, or the file cannot be edited.
     """
     name, text = _source(found)
     text = without_identified(text)
@@ -75,13 +75,13 @@ def bench_text(found: Identification, command: str) -> str:
 
 
 def keys_by_method(found: Identification) -> dict[str, list[str]]:
-    """Names of methods, and keys of the bench file whose values are theirs."""
+    """Keys of the bench file by the method that provides their values."""
     sliding = _of_sliding(found.sections)
     method = {
         parameter.bench: section.model.name
         for section in found.sections
         for parameter in _going(section, sliding).values()
-    }  # of a key that several fill in, the last
+    }  # if several methods provide a key, the last one counts
     return {name: [k for k in method if method[k] == name] for name in method.values()}
 
 
@@ -102,15 +102,15 @@ def _source(found: Identification) -> tuple[str, str]:
 
 
 def _filled(section: Section) -> dict[str, Parameter]:
-    """Parameters that have a place in a bench, by their names."""
+    """Parameters with a key of the bench file, by name."""
     return {each.estimate.name: each for each in section.identified.parameters if each.bench}
 
 
 def _going(section: Section, sliding: Section | None) -> dict[str, Parameter]:
-    """What of a method goes into the file, by name; friction is that of `sliding`."""
+    """Parameters of a method for the file, by name; `sliding` alone provides sliding friction."""
     filled = _filled(section)
     if section is not sliding and _tells_sliding(filled):
-        # A curve whose numbers are of two models is the curve of neither.
+        # Do not mix numbers of two models in one curve.
         return {n: each for n, each in filled.items() if not _is_friction(each.bench)}
     if section is sliding and not _tells_curve(section):
         return {n: each for n, each in filled.items() if not _bends(each.bench)}
@@ -118,16 +118,18 @@ def _going(section: Section, sliding: Section | None) -> dict[str, Parameter]:
 
 
 def _of_sliding(sections: Sequence[Section]) -> Section | None:
-    """Whose friction of sliding a bench gets: one with a Stribeck curve, then one that tells the
-    directions apart, as for what one number leaves to an offset a bench has no key; then the last.
+    """Section that provides the sliding friction of the bench file.
+
+    Preferred: one with a Stribeck curve, then one with both directions (a bench has no key for an
+    offset), then the last.
     """
 
     def tells(section: Section) -> tuple[bool, bool]:
         both = _tells_sliding(_filled(section), "negative.coulomb_torque")
         return _tells_curve(section), both
 
-    told = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
-    return max(told, key=tells, default=None)
+    candidates = [each for each in reversed(sections) if _tells_sliding(_filled(each))]
+    return max(candidates, key=tells, default=None)
 
 
 def _tells_sliding(filled: Mapping[str, Parameter], key: str = "coulomb_torque") -> bool:
@@ -139,17 +141,17 @@ def _is_friction(path: str) -> bool:
 
 
 def _tells_curve(section: Section) -> bool:
-    """Whether a Stribeck curve is measured, whole: what the motion leaves open is no fact."""
+    """Whether the section measures a complete Stribeck curve, without values from settings."""
     settings = section.identified.settings
     left_open = any(path.endswith(("static_torque", "stribeck_velocity")) for path in settings)
     return _tells_sliding(_filled(section), "static_torque") and not left_open
 
 
 def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]:
-    """Its settings; bristles of the bench stay where the curve that slides over them is told.
+    """Settings of a section for the file; they keep bristles of the bench (LuGre).
 
-    Where no curve is told and the bench has no bristles, friction is Coulomb and viscous friction;
-    with bristles the rest of the bench's curve stays.
+    Without a measured curve, friction is Coulomb and viscous. If the bench then has bristles, its
+    model and the rest of its curve stay.
     """
     settings = dict(section.identified.settings)
     model, load = f"{FRICTION}model", bench.friction.get("load")
@@ -167,29 +169,29 @@ def _settings(section: Section, bench: Bench) -> dict[str, tuple[Any, str, str]]
 
 
 def _bends(path: str) -> bool:
-    """Whether it is of a curve that Coulomb and viscous friction have not."""
+    """Whether a key of friction is unknown to Coulomb and viscous friction."""
     return _is_friction(path) and path.rpartition(".")[2] not in {"model", *coulomb.CURVE}
 
 
 def _stale(values: Mapping[str, Any], bench: Bench) -> list[str]:
-    """Keys of the bench's friction that are of another curve, or unknown to the model."""
+    """Keys of the bench's friction that the new curve does not set or the model does not know."""
     load, model = bench.friction.get("load"), values.get(f"{FRICTION}model")
     if load is None or model is None:
         return []
-    curve = [f"{FRICTION}{way}{key}" for way in ("", "negative.") for key in CURVE]
+    curve = [f"{FRICTION}{direction}{key}" for direction in ("", "negative.") for key in CURVE]
     known = friction_models()[model].options.model_fields
     unknown = [f"{FRICTION}{key}" for key in type(load).model_fields if key not in known]
     return [path for path in (*curve, *unknown) if path not in values]
 
 
 def _without(document: Any, path: str) -> None:
-    """A file without a key, and without what it says is known of that."""
+    """Remove a key from a bench file, and its entry in `known.values`."""
     *tables, key = path.split(".")
-    here = document
+    table = document
     for name in tables:
-        here = here.get(name, {})
-    if key in here:
-        del here[key]
+        table = table.get(name, {})
+    if key in table:
+        del table[key]
     of_values = document.get("known", {}).get("values", {})
     if path in of_values:
         del of_values[path]
@@ -221,7 +223,7 @@ def _identified(found: Identification, command: str) -> dict[str, str]:
 
 
 def _edited(text: str, values: Mapping[str, Any], stale: Sequence[str]) -> str:
-    """Each value where its key is, or in a table that is made for it; without what is stale."""
+    """Text with each value at its key, in a new table if needed; without the `stale` keys."""
     import tomlkit
 
     newline = "\r\n" if "\r\n" in text else "\n"
@@ -230,12 +232,12 @@ def _edited(text: str, values: Mapping[str, Any], stale: Sequence[str]) -> str:
         _without(document, path)
     for path, value in values.items():
         *tables, key = path.split(".")
-        here: Any = document
+        table: Any = document
         for depth, name in enumerate(tables):
-            if name not in here:
-                inline = isinstance(here, tomlkit.items.InlineTable)  # as of `friction = {}`
+            if name not in table:
+                inline = isinstance(table, tomlkit.items.InlineTable)  # as of `friction = {}`
                 outer = depth + 1 < len(tables)
-                here[name] = tomlkit.inline_table() if inline else tomlkit.table(outer)
-            here = here[name]
-        here[key] = value
+                table[name] = tomlkit.inline_table() if inline else tomlkit.table(outer)
+            table = table[name]
+        table[key] = value
     return document.as_string().replace("\n", newline)

@@ -1,16 +1,15 @@
 """Identified twins of a bench's compensations.
 
-A compensation has a model of all friction together, however many interfaces a rig has, so that it
-takes what goes to no interface of the bench: the curve of sliding, in both directions. The twin
-stands beside what it is the twin of, so that both can be tried in one test; whatever was not
-identified (gains above all) is as it was there.
+A compensation models the sum of all friction, for any number of interfaces. So it receives the
+sliding curve of both directions, even if that belongs to no single interface of the bench. The twin
+stands beside its original, so that one test can compare both. Values that were not identified,
+above all gains, are those of the original.
 
-Which stiffness belongs to one bristle for all friction? Where all of it yields at one time, that at
-rest. Where some interfaces slip before the others, as torque ramps show, one bristle can have that
-at rest or that of the strongest interface, and is wrong in either case. The twin then has two: the
-strongest with its own stiffness and its own share of the torque, and one for all weaker ones with
-what is left of both. Damping is known as a sum; all of it goes to the strongest, which is the last
-to slip.
+If all interfaces yield together, one bristle has the stiffness at rest. If some interfaces slip
+first, as torque ramps show, one bristle is wrong with either stiffness: that at rest or that of the
+strongest interface. The twin then has two bristles. The strongest has its own stiffness and share
+of the torque; one for all weaker interfaces has the remainder of both. Only the sum of the damping
+is known; it goes to the strongest, which slips last.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from campaign.physics.compensation.identified import ENDING, identified_name, st
 from campaign.physics.loop import at_load
 
 DIGITS = 6
-"""of a number in a bench file."""
+"""Significant digits of a number in a bench file."""
 WEAKER = "weaker"
-"""What the interface is called that stands for all which slip before the strongest."""
+"""Name of the interface that represents all interfaces which slip before the strongest."""
 TORQUES = ("coulomb_torque", "static_torque")
 CURVE = (*TORQUES, "stribeck_velocity", "viscous_friction")
-"""What a curve needs to replace another; its exponent is 2 where none was found."""
+"""Keys that a curve needs to replace another; the exponent is 2 without an estimate."""
 EXPONENT, VISCOUS = "stribeck_exponent", "viscous_friction"
 STIFFNESS, DAMPING = "bristle_stiffness", "bristle_damping"
 DIRECTIONS = ("", "negative.")
@@ -42,11 +41,11 @@ Number = Estimate | float
 
 @dataclass(frozen=True)
 class Entries:
-    """What goes into a bench's file, by dotted path.
+    """Entries of a bench file by dotted path.
 
     Attributes:
-        values: as they are written.
-        known: how well they are known.
+        values: as written.
+        known: intervals and origins for `known.values`.
     """
 
     values: dict[str, Any] = field(default_factory=dict)
@@ -54,13 +53,13 @@ class Entries:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the compensations."""
+        """Names of the compensations."""
         return tuple(dict.fromkeys(path.split(".")[1] for path in self.values))
 
 
 @dataclass(frozen=True)
 class Bristles:
-    """Stiffness and damping of all friction together, and how it comes apart; None: unknown."""
+    """Stiffness and damping of the sum of all friction, and its division; None: unknown."""
 
     at_rest: Estimate | None = None
     damping: Estimate | None = None
@@ -69,7 +68,7 @@ class Bristles:
 
     @property
     def apart(self) -> tuple[Estimate, Estimate, Estimate] | None:
-        """At rest, the strongest, the weaker: where some slip before it and it is known how."""
+        """Stiffness at rest, strongest, weaker share; None unless known and some slip first."""
         if self.at_rest is None or self.strongest is None or self.weaker is None:
             return None
         if not self.strongest.value < self.at_rest.value:
@@ -78,9 +77,9 @@ class Bristles:
 
 
 def identified_compensations(found: Identification, text: str) -> Entries:
-    """Twins of the compensations of a bench's file `text`, each that any identified value goes to.
+    """Twins of the compensations of the bench file `text` that receive an identified value.
 
-    Twins that the file has already are left out of account: see `without_identified`.
+    Ignores twins that the file already has: see `without_identified`.
     """
     import tomlkit
 
@@ -102,7 +101,7 @@ def identified_compensations(found: Identification, text: str) -> Entries:
 
 
 def without_identified(text: str) -> str:
-    """A bench's file without the twins that an earlier identification left there."""
+    """Bench file without the twins of an earlier identification."""
     import tomlkit
 
     document = tomlkit.parse(text)
@@ -122,13 +121,13 @@ def without_identified(text: str) -> str:
 def _add(
     entries: Entries, name: str, stated: Mapping[str, Any], own: Mapping[str, Number | str]
 ) -> None:
-    """The twin of a compensation: what is stated of it, with its own values in place of that."""
+    """Add the twin of a compensation: stated values, replaced by its own identified values."""
     twin = f"compensation.{identified_name(name)}"
     replaced = {path.rpartition(".")[0] for path in own if path.endswith(".coulomb_torque")}
     for path, value in _flat(stated):
         table, _, key = path.rpartition(".")
         if key in (*CURVE, EXPONENT) and table.removesuffix(".negative") in replaced:
-            continue  # a curve is replaced whole
+            continue  # `own` replaces the whole curve
         entries.values[f"{twin}.{path}"] = value
     for path, number in own.items():
         if isinstance(number, Estimate):
@@ -147,14 +146,14 @@ def _flat(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]
 
 
 def _of_observer(sections: Sequence[Section]) -> Iterator[tuple[str, Number]]:
-    """The inertia, as the bench gets it: of the last method that found one."""
-    found = [each for each in _measured(sections) if each.bench == INERTIA]
-    if found:
-        yield "inertia", found[-1].estimate
+    """Inertia for an observer, as in the bench file: that of the last method with an estimate."""
+    inertias = [each for each in _measured(sections) if each.bench == INERTIA]
+    if inertias:
+        yield "inertia", inertias[-1].estimate
 
 
 def _of_friction(key: str, options: Any, found: Identification) -> Iterator[tuple[str, Any]]:
-    """Values of a friction model of all interfaces together, below the compensation's table."""
+    """Values for the friction model of a compensation, by path within its table."""
     fields = type(options).model_fields
     if at_load(options, found.bench) != (1.0, 1.0) or not set(CURVE) <= set(fields):
         return
@@ -198,15 +197,15 @@ def _two_bristles(
 
 
 def _curve(sections: Sequence[Section]) -> dict[str, Number]:
-    """The last that was found whole in both directions; nothing where there is none."""
+    """Last curve that is complete in both directions; empty without one."""
     for section in reversed(sections):
-        found = {e.lumped: e.estimate for e in _measured([section]) if e.lumped}
-        if all(way + name in found for way in DIRECTIONS for name in CURVE):
-            told: dict[str, Number] = {}
-            for way in DIRECTIONS:
-                told |= {way + name: found[way + name] for name in CURVE}
-                told[way + EXPONENT] = found.get(way + EXPONENT, 2.0)
-            return told
+        lumped = {e.lumped: e.estimate for e in _measured([section]) if e.lumped}
+        if all(side + name in lumped for side in DIRECTIONS for name in CURVE):
+            curve: dict[str, Number] = {}
+            for side in DIRECTIONS:
+                curve |= {side + name: lumped[side + name] for name in CURVE}
+                curve[side + EXPONENT] = lumped.get(side + EXPONENT, 2.0)
+            return curve
     return {}
 
 
@@ -219,7 +218,7 @@ def _bristles(found: Identification) -> Bristles:
         of_ramps.get("strongest_stiffness"),
         of_ramps.get("weaker_share"),
     )
-    # Nobody knows whether several interfaces yield at one time: their sum is no single bristle's.
+    # Several interfaces may not yield together: one bristle cannot have the sum of their stiffness.
     several = len(found.bench.friction) > 1
     return replace(known, at_rest=None) if several and known.apart is None else known
 
@@ -230,7 +229,7 @@ def _named(sections: Sequence[Section], method: str) -> dict[str, Estimate]:
 
 
 def _measured(sections: Sequence[Section]) -> list[Parameter]:
-    """Parameters that are known with an interval; positive ones and others."""
+    """Measured parameters with an interval, of any sign."""
     return [
         each
         for section in sections
@@ -240,7 +239,7 @@ def _measured(sections: Sequence[Section]) -> list[Parameter]:
 
 
 def _part(whole: Estimate, weaker: Estimate, *, own: bool) -> Estimate:
-    """The weaker interfaces' own share of a torque, or what is left of it."""
+    """The weaker interfaces' share of a torque (`own`), or the remainder."""
     share = weaker.value if own else 1.0 - weaker.value
     half = math.hypot(share * whole.half_width, whole.value * weaker.half_width)
     return _around(whole, share * whole.value, half)
@@ -252,19 +251,19 @@ def _less(whole: Estimate, part: Estimate) -> Estimate:
 
 
 def _around(one: Estimate, value: float, half: float) -> Estimate:
-    """With another value, and an interval that has all in it."""
+    """Estimate with another value and one interval that includes the systematic parts."""
     return replace(
         one, value=value, low=value - half, high=value + half, standard_error=None, systematic=()
     )
 
 
 def amount(value: float, unit: str) -> Any:
-    """With its unit; a number where it has none."""
+    """Text with the unit; a float without a unit."""
     return f"{value:.{DIGITS}g} {unit}" if unit else float(f"{value:.{DIGITS}g}")
 
 
 def known_of(estimate: Estimate) -> dict[str, Any]:
-    """Its entry in `known.values`."""
+    """Entry of an estimate in `known.values`."""
     low, high = estimate.combined
     if low is None or high is None:
         return {"origin": "measured"}

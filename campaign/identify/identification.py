@@ -32,17 +32,17 @@ from campaign.result import Result
 
 FRICTION = "friction."
 WHOLE = {"appendage": ("inertia", "frequency", "damping_ratio")}
-"""Tables that a bench has with all of these keys, or not at all."""
+"""Tables of a bench file that need all of these keys."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """What one model's analysis found of the run.
+    """Result of one model's analysis of the run.
 
     Attributes:
-        trials: numbers of those that suit it.
-        result: None where there is none, and `problem` says why.
-        changes: against the run that it is compared with; empty without any.
+        trials: numbers of the trials that the model can use.
+        result: None if the analysis has none; `problem` then states why.
+        changes: against the compared run; empty without one.
     """
 
     experiment: Experiment
@@ -54,23 +54,23 @@ class Section:
 
     @property
     def model(self) -> Model:
-        """What the analysis is called here."""
+        """Model of the experiment."""
         return self.experiment.model
 
     @property
     def identified(self) -> IdentifiedRig:
-        """Of a section without a result, nothing."""
+        """Identified rig; `NOTHING_IDENTIFIED` without a result."""
         return self.result.identified if self.result is not None else NOTHING_IDENTIFIED
 
 
 @dataclass(frozen=True)
 class Identification:
-    """All that was found; numbers are of the bench's axis.
+    """Results of all models; numbers in terms of the bench's axis.
 
     Attributes:
-        chosen, validation, compared: which trials of which runs.
-        bench: what was stated of the rig.
-        sections: one for each model, those that found nothing last.
+        chosen, validation, compared: runs, each with its selected trials.
+        bench: stated bench of the rig.
+        sections: one for each model; those without a result last.
     """
 
     chosen: ChosenRun
@@ -81,7 +81,7 @@ class Identification:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All of them."""
+        """Parameters of all sections."""
         return tuple(parameter for own in self.sections for parameter in own.identified.parameters)
 
 
@@ -98,12 +98,12 @@ def identify(
     """Identify the rig of a run.
 
     Args:
-        models: names of models; none: all that the trials suffice for.
+        models: names of models; empty: all models that can use the trials.
         settings: `METHOD.option=value`, as for `--set`.
-        say: is told what is being done.
+        say: reports progress.
 
-    Raises UsageError for unknown models, for trials of several benches and for a run that would
-    be held against itself, and ProtocolError for settings that are wrong.
+    Raises UsageError for unknown models, for trials of several benches, and for a run that is
+    compared with itself. Raises ProtocolError for invalid settings.
     """
     unknown = [name for name in models if name not in known]
     if unknown:
@@ -126,7 +126,7 @@ def identify(
 
 
 def _refuse_same(chosen: ChosenRun, other: ChosenRun, option: str) -> None:
-    """Raises UsageError where recordings would be held against themselves."""
+    """Raise UsageError if the two runs share trials or recordings."""
     both, what = [], "trials that the model is fitted to"
     if chosen.run.identity == other.run.identity:
         own = {each.trial.number for each in chosen.trials}
@@ -135,9 +135,9 @@ def _refuse_same(chosen: ChosenRun, other: ChosenRun, option: str) -> None:
         both = same_recordings(chosen, other)
         what = f"the same samples as {chosen.name} in trials"
     if both:
-        told = ", ".join(str(number) for number in both[:5]) + (" ..." if len(both) > 5 else "")
+        numbers = ", ".join(str(number) for number in both[:5]) + (" ..." if len(both) > 5 else "")
         raise UsageError(
-            f"{option}: {other.name} has {what} ({told}), so that it "
+            f"{option}: {other.name} has {what} ({numbers}), so that it "
             "says nothing; name another run, or another test of this one, as in RUN:TEST"
         )
 
@@ -147,10 +147,10 @@ def _bench(chosen: ChosenRun) -> Bench:
     for each in chosen.trials:
         tests.setdefault(str(each.trial.bench.get("name", "")), {})[each.trial.test] = None
     if len(tests) > 1:
-        told = "; ".join(f"{bench}: {', '.join(own)}" for bench, own in tests.items())
+        listing = "; ".join(f"{bench}: {', '.join(own)}" for bench, own in tests.items())
         first = next(iter(next(iter(tests.values()))))
         raise UsageError(
-            f"{chosen.name} has tests of several benches ({told}); name one, as in "
+            f"{chosen.name} has tests of several benches ({listing}); name one, as in "
             f"{chosen.run.name}:{first}"
         )
     return bench_of(chosen.trials[0].trial)
@@ -159,29 +159,29 @@ def _bench(chosen: ChosenRun) -> Bench:
 def _options(
     settings: Sequence[str], known: Mapping[str, Experiment], bench: Bench
 ) -> dict[str, Any]:
-    """Each method's options, validated; in the units of the bench's axis."""
+    """Validated options by method, in the units of the bench's axis."""
     overrides, problems = parse_overrides(settings)
     trees: dict[str, dict[str, Any]] = {name: {} for name in known}
     texts: dict[str, str] = {}
     for override in overrides:
         name, *keys = override.keys
         if name not in known or len(keys) != 1:
-            told = f"write METHOD.option=value; methods are {', '.join(known)}"
-            problems.append(override.origin.problem((), "key", told))
+            message = f"write METHOD.option=value; methods are {', '.join(known)}"
+            problems.append(override.origin.problem((), "key", message))
             continue
         trees[str(name)][str(keys[0])] = override.value
         texts[str(name)] = override.text
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     with axis_terms(bench.sides):
         for name, tree in trees.items():
-            made = find_faults(known[name].model.options, tree)
-            if isinstance(made, list):
-                problems += list(_placed(made, texts.get(name, name)))
+            result = find_faults(known[name].model.options, tree)
+            if isinstance(result, list):
+                problems += list(_placed(result, texts.get(name, name)))
             else:
-                found[name] = made
+                options[name] = result
     if problems:
         raise ProtocolError(problems)
-    return found
+    return options
 
 
 def _placed(faults: Sequence[tuple[Any, Any, str]], text: str) -> Iterator[Problem]:
@@ -198,8 +198,8 @@ def _section(
     validation: ChosenRun | None,
     say: Callable[[str], None],
 ) -> Section:
-    told = f"{experiment.model.name}, {chosen.name}"
-    say(told)
+    progress = f"{experiment.model.name}, {chosen.name}"
+    say(progress)
     trials, why = suitable(experiment, chosen.trials)
     if not trials:
         return Section(experiment, options, problem=why)
@@ -212,45 +212,45 @@ def _section(
         tuple(trials),
         options,
         unseen,
-        lambda text: say(f"{told}: {text}"),
+        lambda text: say(f"{progress}: {text}"),
     )
     try:
-        found = result_of(experiment, data)
+        result = result_of(experiment, data)
     except ValueError as error:
         return Section(experiment, options, numbers, problem=str(error))
-    except ArithmeticError as error:  # numbers of these recordings that no float holds
+    except ArithmeticError as error:  # e.g. overflow from extreme samples
         explain_in_debug()
         problem = f"it failed: {one_line(error)}"
         return Section(experiment, options, numbers, problem=problem)
-    if not found.identified.parameters:
-        problem = "; ".join(note.rstrip(".") for note in found.notes) or "nothing is identified"
+    if not result.identified.parameters:
+        problem = "; ".join(note.rstrip(".") for note in result.notes) or "nothing is identified"
         return Section(experiment, options, numbers, problem=problem)
-    return Section(experiment, options, numbers, _with_place(found, bench))
+    return Section(experiment, options, numbers, _with_place(result, bench))
 
 
 def fitted_again(
     section: Section, bench: Bench, chosen: ChosenRun, say: Callable[[str], None] = no_progress
 ) -> Section:
-    """The model that a section settled on, fitted to other trials of the same rig."""
+    """Fit the model that a section selected to other trials of the same rig."""
     options = section.options.model_copy(update=dict(section.identified.again))
     return _section(section.experiment, options, bench, chosen, None, say)
 
 
 def _with_place(result: Result, bench: Bench) -> Result:
-    """As found, without a place in the bench file for what makes no bench there."""
+    """Result without keys of the bench file for parameters that the bench cannot hold."""
     notes = list(result.notes)
-    found = _with_own_friction(result.identified, bench, notes)
-    found = _with_whole_tables(found, bench, notes)
-    return replace(result, identified=found, notes=tuple(notes))
+    identified = _with_own_friction(result.identified, bench, notes)
+    identified = _with_whole_tables(identified, bench, notes)
+    return replace(result, identified=identified, notes=tuple(notes))
 
 
 def _with_whole_tables(found: IdentifiedRig, bench: Bench, notes: list[str]) -> IdentifiedRig:
-    """Without keys of a table that the bench has not, and that would lack others."""
-    told = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
+    """Drop keys of a table that the bench lacks and that would stay incomplete."""
+    filled = {each.bench for each in found.parameters if each.estimate.origin is Origin.MEASURED}
     for table, keys in WHOLE.items():
         needed = {f"{table}.{key}" for key in keys}
-        missing = sorted(needed - told)
-        if not needed & told or not missing or getattr(bench, table) is not None:
+        missing = sorted(needed - filled)
+        if not needed & filled or not missing or getattr(bench, table) is not None:
             continue
         what = f"Without {', '.join(missing)} there is no [{table}] to write"
         notes.append(f"{what}: the file gets none of it.")
@@ -262,9 +262,9 @@ def _with_whole_tables(found: IdentifiedRig, bench: Bench, notes: list[str]) -> 
 
 
 def _with_own_friction(found: IdentifiedRig, bench: Bench, notes: list[str]) -> IdentifiedRig:
-    """Friction of all interfaces together is that of none: it goes to no bench with several.
+    """Set the `lumped` keys of friction; with several interfaces, drop its keys of the bench.
 
-    What compensates it has a model of all together, and takes it.
+    Estimated friction is the sum of all interfaces. Only compensations have a model of that sum.
     """
     found = replace(found, parameters=tuple(map(_lumped, found.parameters)))
     others = [name for name in bench.friction if name != "load"]
@@ -295,7 +295,7 @@ def _compared(
     compared: ChosenRun,
     say: Callable[[str], None],
 ) -> Section:
-    """The same model of another run, and how its parameters differ."""
+    """Section with the changes of its parameters to another run, by the same model."""
     other = fitted_again(section, bench, compared, say)
     if other.result is None:
         return replace(section, problem=f"{compared.name}: {other.problem}")
@@ -315,22 +315,22 @@ def _compared(
 
 
 def _shared(estimate: Estimate) -> list[str]:
-    """What is the same for both runs of one rig."""
+    """Sources of systematic parts that both runs of one rig share."""
     return [part.source for part in estimate.systematic if part.of_rig]
 
 
 def _judged(sections: Sequence[Section]) -> Iterator[Section]:
-    """With verdicts on all changes as one family."""
+    """Sections with verdicts; the changes of all sections are one family."""
     verdicts = iter(with_verdicts([change for each in sections for change in each.changes]))
     for each in sections:
         yield replace(each, changes=tuple(next(verdicts) for _ in each.changes))
 
 
 def widest(parameters: Sequence[Parameter]) -> Parameter | None:
-    """The parameter whose interval is widest as a share of it; None where none has any.
+    """Parameter with the widest interval relative to its value; None without any interval.
 
-    One whose interval holds zero is not known to be there at all, and is not asked for; nor is one
-    that is not determined for another reason than its interval.
+    Skips parameters whose interval includes zero: they may not exist. Skips parameters that are
+    not determined for another reason than their interval.
     """
     shares: Mapping[int, float] = {
         index: share

@@ -17,10 +17,10 @@ from campaign.trial import Outcome, Role
 
 @dataclass(frozen=True)
 class ChosenRun:
-    """A run, and the trials of it that are meant.
+    """A run and its selected trials.
 
     Attributes:
-        test: the one that was named, or "".
+        test: name of the selected test, or "".
         trials: completed measurements, in plan order.
     """
 
@@ -30,16 +30,16 @@ class ChosenRun:
 
     @property
     def name(self) -> str:
-        """As it was asked for."""
+        """`RUN` or `RUN:TEST`."""
         return f"{self.run.name}:{self.test}" if self.test else self.run.name
 
     def of_bench(self, bench: str) -> tuple[ArchivedTrial, ...]:
-        """Those of its tests on the bench of that name."""
+        """Trials on the bench of that name."""
         return tuple(t for t in self.trials if t.trial.bench.get("name") == bench)
 
 
 def choose(results: Path, named: str) -> ChosenRun:
-    """What `RUN` or `RUN:TEST` means. Raises UsageError where there is no such test or trial."""
+    """Select the trials of `RUN` or `RUN:TEST`. Raises UsageError without such a test or trial."""
     path, test = _split(results, named)
     run = open_run(path)
     tests = [str(each.get("name", "")) for each in run.header.tests]
@@ -61,17 +61,14 @@ def choose(results: Path, named: str) -> ChosenRun:
 
 
 def same_recordings(chosen: ChosenRun, other: ChosenRun) -> list[int]:
-    """Numbers of trials of `other` whose samples are those of a trial of `chosen`.
+    """Numbers of trials of `other` with the samples of a trial of `chosen`.
 
-    A recording that is imported twice is in two runs, and is one recording: channels that both
-    have hold the same samples, bit by bit.
+    A recording that is imported twice is in two runs: their common channels are bit-identical.
     """
     alike = {_length(each) for each in chosen.trials} & {_length(each) for each in other.trials}
     own = [_digests(each) for each in chosen.trials if _length(each) in alike]
     again = {each.trial.number: _digests(each) for each in other.trials if _length(each) in alike}
-    return sorted(
-        number for number, mine in again.items() if any(_same(mine, theirs) for theirs in own)
-    )
+    return sorted(number for number, new in again.items() if any(_same(new, old) for old in own))
 
 
 def _same(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
@@ -84,18 +81,18 @@ def _length(trial: ArchivedTrial) -> tuple[float, float]:
 
 
 def _digests(trial: ArchivedTrial) -> Mapping[str, str]:
-    """SHA-256 of each channel's samples, by its name; of channels that change."""
+    """SHA-256 of the samples by channel; without constant channels."""
     recording = trial.recording()
-    found = {}
+    digests = {}
     for name in recording.channels:
         samples = np.ascontiguousarray(recording[name], dtype=np.float64)
         if len(samples) and np.any(samples != samples[0]):
-            found[name] = hashlib.sha256(samples.tobytes()).hexdigest()
-    return found
+            digests[name] = hashlib.sha256(samples.tobytes()).hexdigest()
+    return digests
 
 
 def _split(results: Path, named: str) -> tuple[Path, str]:
-    """A run's path and a test; the colon of a path is none of ours."""
+    """Path of a run, and a test or ""; a colon that belongs to the path does not count."""
     before, colon, after = named.rpartition(":")
     if not colon or not before or Path(named).exists() or any(c in after for c in "/\\"):
         return find_run(results, named), ""

@@ -1,4 +1,4 @@
-"""The identification as a folder: page, tables, figures, JSON."""
+"""The folder of an identification: page, tables, figures, JSON."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CURES = {
     "loop": "record the wanted motion as well (channel `reference`)",
     "delay": "record faster, with sharper reversals, or with a reference signal on both channels",
 }
-"""What makes a systematic part smaller, by its source."""
+"""Advice that makes a systematic part smaller, by its source."""
 NAME = "identification"
 PAGE = f"{NAME}.html"
 
@@ -47,7 +47,7 @@ PAGE = f"{NAME}.html"
 @dataclass
 class _Making(PageParts):
     looks: Mapping[str, Look] = field(default_factory=dict)
-    """Of the series of all figures: the same series looks the same all over the page."""
+    """Looks of the series of all figures: a series has one look on the whole page."""
 
 
 def write_identification(
@@ -59,16 +59,16 @@ def write_identification(
     templates: Path | None = None,
     formats: Sequence[Format] = (),
 ) -> Path:
-    """Write the identification into the folder `output`; the page's path. As `write_article`.
+    """Write the identification into the folder `output`; return the page's path.
 
-    bench: name of the bench file that was written; "" for none.
+    bench: name of the written bench file; "" for none. Else as `write_article`.
     """
     make = partial(article_of, found, command, bench)
     return write_article(NAME, make, output, packaged_templates, templates, formats)
 
 
 def article_of(found: Identification, command: str, bench: str = "") -> Article:
-    """What the identification says."""
+    """Page of an identification."""
     making = _Making(looks=_looks(found))
     chosen, header = found.chosen, found.chosen.run.header
     with axis_terms(found.bench.sides):
@@ -109,8 +109,8 @@ def _parts(found: Identification, making: _Making) -> Iterator[Part]:
         yield Part(anchor, f"{summary[:1].upper()}{summary[1:]}", pieces, role="test")
     refused = [each for each in found.sections if each.result is None]
     if refused:
-        told = (f"{e.model.name} ({e.model.summary}): {e.problem.rstrip('.')}." for e in refused)
-        yield Part("refused", "Not determined from these recordings", (Items(tuple(told)),))
+        items = (f"{e.model.name} ({e.model.summary}): {e.problem.rstrip('.')}." for e in refused)
+        yield Part("refused", "Not determined from these recordings", (Items(tuple(items)),))
 
 
 def _found(
@@ -130,7 +130,7 @@ def _found(
 
 
 def next_measurement(found: Identification) -> str:
-    """About what methods disagree, and what to measure next to halve the widest interval."""
+    """Disagreements of methods, and the next measurement that halves the widest interval."""
     widest_one = widest(found.parameters)
     with axis_terms(found.bench.sides):
         advice = [] if widest_one is None else [_advice(widest_one)]
@@ -181,13 +181,13 @@ def _looks(found: Identification) -> Mapping[str, Look]:
     series: list[list[str]] = []
     for section in found.sections:
         for figure in section.result.figures if section.result else ():
-            with suppress(Exception):  # a plug-in's, which is told where it is shown
+            with suppress(Exception):  # of a plug-in; the page reports it at the figure
                 series.append(series_of(figure))
     return looks_of_page(series)
 
 
 def content_of(found: Identification) -> dict[str, Any]:
-    """Every parameter with its interval and origin, and what it came from, for machines."""
+    """JSON tree: every parameter with its interval, origin, method and trials."""
     return {
         "run": found.chosen.name,
         "digest": found.chosen.run.identity,

@@ -19,7 +19,7 @@ BOUNDS = {"at least": "≥", "at most": "≤"}
 
 
 def parameter_words(name: str) -> str:
-    """What a report calls it: `coulomb_torque_negative` as `Coulomb friction Tc (negative)`."""
+    """Report's words for a name: `Coulomb friction Tc (negative)` for `coulomb_torque_negative`."""
     whole = next((key for key in QUANTITIES if name.startswith(f"{key}_")), name)
     rest = words(name.removeprefix(whole).removeprefix("_"))
     return f"{quantity_words(whole)} ({rest})" if rest else quantity_words(name)
@@ -34,7 +34,7 @@ def parameter_unit(section: Section, estimate: Estimate) -> str:
 
 
 def parameters_table(sections: Sequence[Section]) -> Table:
-    """Every parameter of every method, each in its own unit."""
+    """Table of the parameters of all methods, each in its own unit."""
     rows = [
         _parameter_row(section, parameter)
         for section in sections
@@ -74,7 +74,7 @@ def _parameter_row(section: Section, parameter: Parameter) -> Mapping[str, Cell]
 
 
 def changes_table(before: str, after: str, section: Section) -> Table:
-    """A method's parameters of both runs, which have these names."""
+    """Table of a method's parameters from the runs named `before` and `after`."""
     rows = tuple(
         _change_row(each, parameter_unit(section, each.reference)) for each in section.changes
     )
@@ -111,7 +111,7 @@ def _change_row(change: JudgedNumber, unit: str) -> Mapping[str, Cell]:
 
 
 def parameter_text(estimate: Estimate, unit: str) -> str:
-    """`20.14 ± 0.41` in a unit; a bound, or that it is not determined."""
+    """Text of a value in a unit: `20.14 ± 0.41`, a bound, or `not determined`."""
     if estimate.origin is Origin.NOT_DETERMINED:
         return "not determined"
     shown = in_unit(estimate, unit)
@@ -126,7 +126,7 @@ def parameter_text(estimate: Estimate, unit: str) -> str:
 
 
 def systematic(estimate: Estimate, unit: str) -> str:
-    """`low-pass 0.03, delay 0.2`, in the unit that the estimate is shown in."""
+    """Text of the systematic parts in a unit: `low-pass 0.03, delay 0.2`."""
     return ", ".join(
         f"{in_axis_terms(part.source)} "
         + ("unknown" if (size := part.standard_uncertainty) is None else f"{size:.2g}")

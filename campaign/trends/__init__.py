@@ -1,1 +1,1 @@
-"""A rig's numbers over its runs: do they drift, have they jumped, do they follow anything?"""
+"""Trends of a rig's numbers over its runs: drifts, jumps, dependence on a covariate."""

@@ -19,25 +19,25 @@ from campaign.units import split_quantity
 TIME, ORDER = "time", "order"
 DAY = 86_400.0
 MONTH = 30.4375
-"""days: a twelfth of a year of 365.25."""
+"""Days of a month: a twelfth of 365.25."""
 ZERO_CELSIUS = 273.15
 BLURRED = 0.1
-"""Share of the variance of a covariate that its own errors may be: beyond, slopes come out too
-flat by more than a tenth."""
+"""Largest share of own errors in the variance of a covariate. Above it, slopes are underestimated
+by more than 10 %."""
 
 
 @dataclass(frozen=True)
 class Covariate:
-    """What numbers are held against.
+    """Independent variable of trends.
 
     Attributes:
         label: at an axis.
         unit: of its values.
-        per: what an effect is told per: `month`, `K`.
-        step: that, in `unit`.
+        per: unit of an effect: per `month`, `K`.
+        step: `per` in `unit`.
         ordered: whether numbers can jump along it.
-        at: its value for a test of a run ("": for all of it); NaN where nobody knows it.
-        of: the number that it is, where it is one of those that the runs found.
+        at: its value for a test of a run ("": for the whole run); NaN if unknown.
+        of: its series, if it is a number of the runs.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Covariate:
 
 
 def covariate_of(over: str, members: Sequence[Member], series: Sequence[Series]) -> Covariate:
-    """What `--over` means. Raises UsageError with what there is where it means nothing."""
+    """Covariate of `--over`. Raises UsageError, with the valid names, for an unknown one."""
     if over == TIME:
         return _time(members)
     if over == ORDER:
@@ -71,7 +71,7 @@ def _time(members: Sequence[Member]) -> Covariate:
     if members[-1].created == first:
         raise UsageError("all runs began at the same time; `--over order` takes them as they come")
     days = {m.number: (m.created - first).total_seconds() / DAY for m in members}
-    # Within days nobody asks for a drift per month.
+    # A drift per month is no useful unit for runs within days.
     last = days[members[-1].number]
     per, step = ("month", MONTH) if last > 14 else ("day", 1.0) if last > 0.5 else ("h", 1 / 24)
     label, unit, size = ("Time since", "d", 1.0) if last > 0.5 else ("Time since", "h", 24.0)
@@ -104,11 +104,11 @@ def _temperature(members: Sequence[Member]) -> Covariate:
 
 
 def _measured_temperature(member: Member, test: str) -> float:
-    """degC: median over the test's trials of their medians; else what a tag says.
+    """degC: median over the test's trials of their medians, else the tag; NaN if unknown.
 
-    Raises ArchiveError for a temperature that is damaged; what the analyses found so is left out.
+    Raises ArchiveError for damaged temperatures; trials that the analyses left out do not count.
     """
-    found = []
+    medians = []
     for each in (trial for one in member.tests for trial in one.trials):
         trial, completed = each.trial, each.ending.outcome is Outcome.COMPLETED
         if not completed or trial.role is not Role.MEASUREMENT or test not in ("", trial.test):
@@ -119,9 +119,9 @@ def _measured_temperature(member: Member, test: str) -> float:
         samples = each.recording()[TEMPERATURE]
         samples = samples[np.isfinite(samples)]
         if samples.size:
-            found.append(float(np.median(samples)) - (ZERO_CELSIUS if unit == "K" else 0.0))
-    if found:
-        return float(np.median(found))
+            medians.append(float(np.median(samples)) - (ZERO_CELSIUS if unit == "K" else 0.0))
+    if medians:
+        return float(np.median(medians))
     tag = _tagged(member, TEMPERATURE)
     if tag is None:
         return math.nan
@@ -134,7 +134,7 @@ def _measured_temperature(member: Member, test: str) -> float:
 
 
 def _tagged(member: Member, name: str) -> tuple[float, str] | None:
-    """Number and unit of a tag `name=...`; None where there is none, or no number in it."""
+    """Number and unit of a tag `name=...`; None without the tag or without a finite number."""
     for tag in member.run.header.tags:
         key, sign, text = tag.partition("=")
         if sign and key.strip() == name:
@@ -149,10 +149,10 @@ def _tagged(member: Member, name: str) -> tuple[float, str] | None:
 def _tag(name: str, members: Sequence[Member]) -> Covariate:
     from campaign.units import factor
 
-    told = {m.number: tag for m in members if (tag := _tagged(m, name)) is not None}
-    unit = next(iter(told.values()))[1]
+    tags = {m.number: tag for m in members if (tag := _tagged(m, name)) is not None}
+    unit = next(iter(tags.values()))[1]
     values: dict[int, float] = {}
-    for number, (value, own) in told.items():
+    for number, (value, own) in tags.items():
         try:
             values[number] = value if own == unit else value * float(factor(own, unit))
         except ValueError:
@@ -172,15 +172,15 @@ def _tag(name: str, members: Sequence[Member]) -> Covariate:
 
 
 def _finding(over: str, members: Sequence[Member], series: Sequence[Series]) -> Covariate:
-    """Another number of the same runs: by its quantity, or by the words that single it out."""
+    """Covariate from a number of the same runs, by its quantity or by unique words of its name."""
     wanted = over.replace("_", " ").lower().split()
     named = [s for s in series if s.quantity == over]
-    found = named or [
+    matches = named or [
         s
         for s in series
         if all(w in f"{s.test} {s.quantity} {s.name}".replace("_", " ").lower() for w in wanted)
     ]
-    if not found:
+    if not matches:
         tags = sorted({t.partition("=")[0] for m in members for t in m.run.header.tags if "=" in t})
         quantities = list(dict.fromkeys(s.quantity for s in series))
         more = " ..." if len(quantities) > 8 else ""
@@ -189,12 +189,12 @@ def _finding(over: str, members: Sequence[Member], series: Sequence[Series]) -> 
             f"({', '.join(tags) or 'there are none'}), nor found by the runs "
             f"({', '.join(quantities[:8])}{more})"
         )
-    if len(found) > 1:
-        told = "; ".join(f"{s.test}: {s.name}" for s in found[:6])
+    if len(matches) > 1:
+        names = "; ".join(f"{s.test}: {s.name}" for s in matches[:6])
         raise UsageError(
-            f"--over {over!r}: means {len(found)} numbers; add words of one of them ({told})"
+            f"--over {over!r}: means {len(matches)} numbers; add words of one of them ({names})"
         )
-    return _of_series(found[0])
+    return _of_series(matches[0])
 
 
 def _of_series(one: Series) -> Covariate:
@@ -220,7 +220,7 @@ def _of_series(one: Series) -> Covariate:
 
 
 def together(members: Sequence[Member], one: Covariate, other: Covariate) -> float:
-    """Correlation of two covariates over the runs; NaN where fewer than three know both."""
+    """Correlation of two covariates over the runs; NaN if constant or known in fewer than three."""
     pairs: Mapping[int, tuple[float, float]] = {
         m.number: (one.at(m, ""), other.at(m, "")) for m in members
     }

@@ -17,15 +17,15 @@ from campaign.trends.rig_trends import Trends, TrendSeries, Verdict
 Array = NDArray[np.float64]
 
 ALONG = 25
-"""Places at which a line's band is worked out: it is a smooth curve."""
+"""Points of a line and its band."""
 SMALL = 12
-"""Most small panels; the tables have all numbers."""
+"""Most small panels."""
 TITLE = 38
-"""Letters of a small panel's title."""
+"""Most characters of a small panel's title."""
 
 
 def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int) -> Figure:
-    """One number that was declared to change."""
+    """Figure of one declared number."""
     return Figure(
         f"declared-{place}",
         each.series.name[:1].upper() + each.series.name[1:],
@@ -38,7 +38,7 @@ def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int
 
 
 def small_multiples(rest: Sequence[TrendSeries], covariate: Covariate) -> Figure | None:
-    """What was judged and shows nothing, the smallest p values first; None without any."""
+    """Figure of judged numbers without a trend, in their order; None without any."""
     shown = rest[:SMALL]
     if not shown:
         return None
@@ -56,8 +56,8 @@ def small_multiples(rest: Sequence[TrendSeries], covariate: Covariate) -> Figure
 
 def _panel(each: TrendSeries, covariate: Covariate, *, small: bool) -> Panel:
     series = each.series
-    found = [in_unit(point.estimate, series.display) for point in series.points]
-    curves = [Curve.of(each.x, found, "" if small else "runs", "measured")]
+    estimates = [in_unit(point.estimate, series.display) for point in series.points]
+    curves = [Curve.of(each.x, estimates, "" if small else "runs", "measured")]
     marks: list[Mark] = []
     if each.verdict is Verdict.JUMPED:
         curves += _levels(each)
@@ -93,7 +93,7 @@ def _line(each: TrendSeries, label: str) -> Curve:
 
 
 def _levels(each: TrendSeries) -> list[Curve]:
-    """The mean of each stretch between jumps, weighed as in the search for them."""
+    """Unweighted mean of each segment between jumps."""
     values = np.array([
         in_unit(point.estimate, each.series.display).value for point in each.series.points
     ])  # fmt: skip

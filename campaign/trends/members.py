@@ -23,11 +23,11 @@ from campaign.experiments.interface import Experiment
 from campaign.trial import Outcome, Role
 
 LEAST = 3
-"""Runs: two can be compared, and show no trend."""
+"""Least number of runs; two can only be compared."""
 LISTED = 6
 """Most runs that a message names."""
 OWN_OF_EACH = ("operator", "machine", "status", "title", "seed")
-"""What differs between runs and explains no number of theirs."""
+"""Differences between runs that explain no change of a number."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Member:
     """One of the runs.
 
     Attributes:
-        number: its place in time, from 1.
-        tests: without figures, of which 200 runs would have too many.
-        constants: of the bench, by the name of the systematic part that they make; what is the
-            same text in two runs is the same constant.
-        exchanged: those of them that are another piece's from this run on, whatever the bench says.
+        number: place in order of time, from 1.
+        tests: without figures, to save memory for many runs.
+        constants: constants of the bench by the name of their systematic part; the same text in
+            two runs means the same constant.
+        exchanged: systematic parts whose piece was exchanged before this run.
     """
 
     number: int
@@ -55,32 +55,31 @@ class Member:
 
     @property
     def sides(self) -> Sides:
-        """Of the rig, in the words of which it is told."""
+        """Kinds of motion of the rig, for its terms."""
         return next((test.sides for test in self.tests if test.bench), BOTH_ROTARY)
 
     @property
     def damaged(self) -> tuple[Damage, ...]:
-        """What of the run is damaged, as far as anybody looked at it."""
+        """Damage of the run that was detected."""
         return damage_of(self.run, self.tests)
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Why tests of it have no result."""
+        """Reasons of its tests without a result."""
         return tuple(f"{self.name}: {t.name}: {t.problem}" for t in self.tests if t.problem)
 
     @cached_property
     def identical(self) -> Mapping[str, tuple[str, ...]]:
-        """By test, what determines the samples of its simulated trials; rigs never repeat."""
+        """Fingerprints of simulated trials by test: equal ones mean equal samples."""
         return {test.name: prints for test in self.tests if (prints := _fingerprints(test))}
 
 
 def members_of(
     runs: Sequence[RunReader], experiments: Mapping[str, Experiment]
 ) -> tuple[Member, ...]:
-    """The runs in the order of their beginnings, analysed.
+    """Analyze the runs, in order of their start.
 
-    Raises UsageError for fewer than three, for a run that is named twice, and for runs of several
-    rigs.
+    Raises UsageError for fewer than three runs, for a run named twice, and for several rigs.
     """
     _check(runs)
     begun = sorted(runs, key=lambda run: (_begun(run), run.name))
@@ -91,25 +90,25 @@ def members_of(
 def with_exchanged(
     members: Sequence[Member], exchanged: Sequence[tuple[str, Path]]
 ) -> tuple[Member, ...]:
-    """The same runs, told what no bench file says.
+    """Mark the constants of exchanged pieces, which no bench file states.
 
-    exchanged: systematic parts, each with the path of the run from which on its piece was another
-        one of its kind: an error that runs before and behind do not have in common.
+    exchanged: systematic parts, each with the path of the first run with the new piece. Runs
+        before and after do not share the error of the piece.
 
-    Raises UsageError for what is no constant of these runs, or none of the runs but the first.
+    Raises UsageError for an unknown constant, an unknown run, and the first run.
     """
     for name, path in exchanged:
-        told = f"--exchanged {name}@{path.stem}"
+        text = f"--exchanged {name}@{path.stem}"
         known = dict.fromkeys(source for member in members for source in member.constants)
         source = source_called(name, known, members[0].sides)
         if source is None:
-            there = ", ".join(in_axis_terms(each, members[0].sides) for each in known) or "nothing"
-            raise UsageError(f"{told}: {name!r} is none of {there}")
+            names = ", ".join(in_axis_terms(each, members[0].sides) for each in known) or "nothing"
+            raise UsageError(f"{text}: {name!r} is none of {names}")
         first = next((each.number for each in members if each.run.path == path), None)
         if first is None:
-            raise UsageError(f"{told}: none of the runs that are followed")
+            raise UsageError(f"{text}: none of the runs that are followed")
         if first == 1:
-            raise UsageError(f"{told}: the first run; name the first one with the new piece")
+            raise UsageError(f"{text}: the first run; name the first one with the new piece")
         members = [
             each if each.number < first else _with_another(each, source, first) for each in members
         ]
@@ -129,7 +128,7 @@ def _with_another(member: Member, source: str, first: int) -> Member:
 
 
 def changes_before(members: Sequence[Member]) -> tuple[tuple[Change, ...], ...]:
-    """For each run but the first, what differs from the one before it besides what it found."""
+    """Differences, without results, of each run but the first from the one before."""
     return tuple(
         tuple(
             change
@@ -158,14 +157,14 @@ def _check(runs: Sequence[RunReader]) -> None:
 
 
 def _of_one_rig(runs: Sequence[RunReader]) -> None:
-    """Raises UsageError where benches, or what executed the trials, are not the same."""
+    """Raise UsageError for different benches or different sources of samples."""
     for what, of in (("different rigs", _benches), ("different kinds", _kinds)):
         groups: dict[str, list[str]] = {}
         for run in runs:
             groups.setdefault(of(run), []).append(run.name)
         if len(groups) > 1:
-            told = "; ".join(f"{key}: {_listed(names)}" for key, names in groups.items())
-            raise UsageError(f"the runs are of {what}, which no trend leads through ({told})")
+            listing = "; ".join(f"{key}: {_listed(names)}" for key, names in groups.items())
+            raise UsageError(f"the runs are of {what}, which no trend leads through ({listing})")
 
 
 def _benches(run: RunReader) -> str:

@@ -16,10 +16,10 @@ from campaign.trial import Outcome, Role
 
 @dataclass(frozen=True)
 class TrendFit:
-    """What one method made of the runs.
+    """Parameters of one method over the runs.
 
     Attributes:
-        problems: runs that it could not use, and why.
+        problems: unusable runs, with the reason.
     """
 
     method: str
@@ -30,10 +30,7 @@ class TrendFit:
 def fit_models(
     members: Sequence[Member], known: Mapping[str, Experiment], models: Sequence[str]
 ) -> tuple[TrendFit, ...]:
-    """Each method's parameters over the runs.
-
-    Raises UsageError for names that no method has.
-    """
+    """Fit each method to all runs. Raises UsageError for unknown methods."""
     unknown = [name for name in models if name not in known]
     if unknown:
         raise UsageError(f"--model {unknown[0]!r}: there are {', '.join(known)}")
@@ -42,7 +39,7 @@ def fit_models(
 
 def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: str) -> TrendFit:
     first: Section | None = None
-    found: dict[str, tuple[Section, list[Point], list[str]]] = {}
+    fits: dict[str, tuple[Section, list[Point], list[str]]] = {}
     problems: list[str] = []
     seen: dict[tuple[str, ...], Member] = {}
     for member in members:
@@ -52,15 +49,15 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
             continue
         if first is None:
             first = section
-            found = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
+            fits = {p.estimate.name: (section, [], []) for p in section.identified.parameters}
         prints = tuple(text for own in member.identical.values() for text in own)
         twin = seen.setdefault(prints, member) if prints else member
         same = "" if twin is member else f"{TWIN} {twin.name}"
         for parameter in section.identified.parameters:
-            if parameter.estimate.name in found:
-                _, points, left_out = found[parameter.estimate.name]
+            if parameter.estimate.name in fits:
+                _, points, left_out = fits[parameter.estimate.name]
                 estimate = parameter.estimate
-                add_point(points, left_out, member, "", estimate, _unit(found, estimate.name), same)
+                add_point(points, left_out, member, "", estimate, _unit(fits, estimate.name), same)
     series = tuple(
         made(
             points,
@@ -69,10 +66,10 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
             title=known[name].model.summary,
             quantity=each,
             name=each.replace("_", " "),
-            unit=_unit(found, each),
+            unit=_unit(fits, each),
             display=_display(section, each),
         )
-        for each, (section, points, left_out) in found.items()
+        for each, (section, points, left_out) in fits.items()
     )
     return TrendFit(name, series, tuple(problems))
 
@@ -80,7 +77,7 @@ def _fitted(members: Sequence[Member], known: Mapping[str, Experiment], name: st
 def _section(
     member: Member, known: Mapping[str, Experiment], name: str, first: Section | None
 ) -> tuple[str, Section | None]:
-    """The method's section of a run, by the structure that the first one settled on."""
+    """Reason for no result, and a run's section; its structure is that of `first`, if any."""
     trials = tuple(
         each
         for each in member.run.trials

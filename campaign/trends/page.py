@@ -1,4 +1,4 @@
-"""Trends as a folder: page, tables, figures, JSON."""
+"""The folder of trends: page, tables, figures, JSON."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from campaign.trends.tables import (
 
 NAME = "trend"
 HEADLINES = 20
-"""Most declared numbers that are told on top, and drawn."""
+"""Most declared numbers that the page lists at the top and draws."""
 
 
 def write_trends(
@@ -49,18 +49,18 @@ def write_trends(
     templates: Path | None = None,
     formats: Sequence[Format] = (),
 ) -> Path:
-    """Write the trends into the folder `output`; the page's path. As `write_article`."""
+    """Write the trends into the folder `output`; return the page's path. As `write_article`."""
     make = partial(article_of, trends, command)
     return write_article(NAME, make, output, packaged_templates, templates, formats)
 
 
 def article_of(trends: Trends, command: str) -> Article:
-    """What the trends say."""
+    """Page of the trends."""
     making = PageParts()
     making.problems += [problem for member in trends.members for problem in member.problems]
     making.problems += [problem for fitted in trends.fitted for problem in fitted.problems]
     parts = tuple(_parts(trends, making))
-    told = [damage_text(each.name, each.damaged) for each in trends.members if each.damaged]
+    damage = [damage_text(each.name, each.damaged) for each in trends.members if each.damaged]
     first, last = trends.members[0], trends.members[-1]
     header = first.run.header
     return Article(
@@ -81,7 +81,7 @@ def article_of(trends: Trends, command: str) -> Article:
                 ),
             ),
         ),
-        parts=(*problems_part("these runs", [*told, *making.problems]), *parts),
+        parts=(*problems_part("these runs", [*damage, *making.problems]), *parts),
         folder=making.folder,
         content=content_of(trends),
     )
@@ -175,7 +175,7 @@ def _how(trends: Trends) -> Iterator[str]:
 
 
 def title_of(trends: Trends) -> str:
-    """What the page is of."""
+    """Title of the page."""
     benches = {test.bench.name for m in trends.members for test in m.tests if test.bench}
     rig = " and ".join(sorted(benches)) or "runs"
     return f"{rig}: {len(trends.members)} runs over {trends.covariate.name}"
@@ -184,19 +184,19 @@ def title_of(trends: Trends) -> str:
 def _declared(
     each: TrendSeries, trends: Trends, making: PageParts, place: int
 ) -> tuple[str, tuple[Piece, ...]]:
-    """A declared number: its headline, and what is shown of it."""
-    told = headline(each, trends)
-    drawn = making.drawn(declared_figure(each, trends, told, place))
+    """Headline of a declared number, and its pieces."""
+    sentence = headline(each, trends)
+    drawn = making.drawn(declared_figure(each, trends, sentence, place))
     notes = (f"{note[:1].upper()}{note[1:]}." for note in each.notes if note != WITHIN)
     beside = filter(None, (*notes, *(beside_the_jump(each, jump, trends) for jump in each.jumps)))
     caution = f"; {WITHIN}" if WITHIN in each.notes else ""
     pieces: list[Piece] = [] if drawn is None else [drawn]
     pieces += [Paragraph(text, "note") for text in beside]
-    return f"{told}{caution}.", tuple(pieces)
+    return f"{sentence}{caution}.", tuple(pieces)
 
 
 def content_of(trends: Trends) -> dict[str, Any]:
-    """Every number with its points and what was judged of it, for machines."""
+    """JSON tree: every number with its points and verdict."""
     covariate = trends.covariate
     return {
         "over": {"name": covariate.name, "unit": covariate.unit, "per": covariate.per},

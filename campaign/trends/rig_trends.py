@@ -43,9 +43,9 @@ from campaign.trends.series import SAME_IN_ALL, Series, series_of
 Array = NDArray[np.float64]
 
 TELLS_A_SHARE = 0.2
-"""Half-width of the mean, as a share of it, up to which an effect is told in percent."""
+"""Largest relative half-width of the mean for effects in percent."""
 GO_TOGETHER = 0.7
-"""Correlation of time and temperature from which on nobody can tell what a number follows."""
+"""Correlation of time and temperature above which their effects cannot be separated."""
 WITHIN = (
     "all of this change lies within the interval of each single run; it may be a shared error that "
     "changes with something else, as one parameter's with another's value"
@@ -57,29 +57,28 @@ TREND, JUMP = "trend", "jump"
 
 
 class Verdict(StrEnum):
-    """What a number comes to."""
+    """Verdict on a number."""
 
-    DRIFTS = "drifts"  # or follows, where it is held against something else than time
+    DRIFTS = "drifts"  # or depends on another covariate than time
     JUMPED = "jumped"
-    CHANGED = "changed"  # a drift or a jump: the points do not tell which
-    NOT_SHOWN = "no trend shown"  # which does not say that there is none
-    NOT_JUDGED = "not judged"  # and `reason` says why
+    CHANGED = "changed"  # a drift or a jump: the points do not decide
+    NOT_SHOWN = "no trend shown"  # does not exclude a trend
+    NOT_JUDGED = "not judged"  # `reason` states why
 
 
 @dataclass(frozen=True)
 class TrendSeries:
-    """One number, and what became of it.
+    """One number and its verdict.
 
     Attributes:
-        x: of its points, in the unit of the covariate.
-        change: None where it is not judged, and `reason` says why.
-        adjusted: p values adjusted for the family, by `trend` and `jump`; what was not tested is
-            missing.
-        detectable: the smallest effects that would have been declared with a probability of 80 %,
-            by the same names, in the unit of the series.
-        jumps: that were declared, in order.
-        cancelled: systematic parts that all points have in common.
-        notes: what to keep in mind of it.
+        x: values of the covariate at its points, in the unit of the covariate.
+        change: None if not judged; `reason` then states why.
+        adjusted: p values adjusted for the family, by `trend` and `jump`, of the tested ones.
+        detectable: smallest effects that are declared with a probability of 80 %, by the same
+            names, in the unit of the series.
+        jumps: declared jumps, in order.
+        cancelled: systematic parts that all points share.
+        notes: limitations.
     """
 
     series: Series
@@ -95,7 +94,7 @@ class TrendSeries:
 
     @property
     def p(self) -> dict[str, float]:
-        """As they are, by `trend` and `jump`."""
+        """Unadjusted p values, by `trend` and `jump`."""
         if self.change is None:
             return {}
         trend, jump = self.change.trend, self.change.jump
@@ -106,12 +105,12 @@ class TrendSeries:
 
     @property
     def smallest(self) -> float:
-        """Of the adjusted p values; 1 where there is none."""
+        """Smallest adjusted p value; 1 without any."""
         return min((self.adjusted or {}).values(), default=1.0)
 
     @property
     def mean(self) -> Estimate:
-        """The number in the middle of what was followed, in the unit that is shown."""
+        """Fitted value at the mean of `x`, in the display unit."""
         if self.change is None or self.change.trend is None:
             return Estimate.without_interval("mean", math.nan, self.series.display, self.reason)
         known = self.change.trend.at(float(np.mean(self.x)))
@@ -119,14 +118,14 @@ class TrendSeries:
 
     @property
     def share(self) -> float:
-        """What one unit (as shown) is of the mean's size; NaN where that says nothing."""
+        """One display unit relative to the size of the mean; NaN if the mean is too uncertain."""
         mean = self.mean
         if not mean.half_width < TELLS_A_SHARE * abs(mean.value):
             return math.nan
         return 1.0 / abs(mean.value)
 
     def estimate(self, name: str, known: Mixture, unit: str, size: float = 1.0) -> Estimate:
-        """A number of the series as it is shown, times `size`."""
+        """Estimate from a mixture in the unit of the series, times `size`, in the display unit."""
         own = size * self.series.scale
         value, ends = known.value, known.interval(LEVEL)
         low, high = sorted(end * own for end in ends)
@@ -136,14 +135,14 @@ class TrendSeries:
 
 @dataclass(frozen=True)
 class Trends:
-    """All that runs have in common, held against something.
+    """Trends of the common numbers of runs over a covariate.
 
     Attributes:
-        followed: what was declared first.
-        level: the p value at which one more would have been declared.
-        circumstances: what differs between each run and the one before.
-        fitted: by method, what was identified of each run.
-        notes: of all of it.
+        followed: declared numbers first.
+        level: p value at which one more number would be declared.
+        circumstances: differences between each run and the one before.
+        fitted: parameters of the runs by method.
+        notes: on all numbers.
     """
 
     members: tuple[Member, ...]
@@ -159,7 +158,7 @@ class Trends:
 
     @property
     def declared(self) -> tuple[TrendSeries, ...]:
-        """The surest first."""
+        """Declared numbers, smallest p value first."""
         return self.of(Verdict.DRIFTS, Verdict.JUMPED, Verdict.CHANGED)
 
     @property
@@ -169,7 +168,7 @@ class Trends:
 
     @property
     def judged(self) -> int:
-        """How many numbers have a verdict."""
+        """Count of numbers with a verdict."""
         return sum(each.change is not None for each in self.followed)
 
 
@@ -181,14 +180,14 @@ def follow(
     models: Sequence[str] = (),
     exchanged: Sequence[tuple[str, Path]] = (),
 ) -> Trends:
-    """Hold the numbers of runs of one rig against time, or something else.
+    """Estimate the trends of the numbers of one rig's runs over a covariate.
 
     Args:
-        over: `time`, `order`, `temperature`, a tag that has a number, or one of the numbers.
-        models: of `known`, those whose parameters are followed as well.
-        exchanged: what was exchanged before which run (`with_exchanged`).
+        over: `time`, `order`, `temperature`, a tag with a number, or one of the numbers.
+        models: names in `known`; their parameters are included.
+        exchanged: pieces exchanged before a run (`with_exchanged`).
 
-    Raises UsageError for runs and names that nothing can be made of.
+    Raises UsageError for unusable runs and unknown names.
     """
     members = with_exchanged(members_of(runs, experiments), exchanged)
     series = series_of(members)
@@ -199,8 +198,8 @@ def follow(
     if not series:
         raise UsageError("the runs found nothing that could be followed")
     covariate = covariate_of(over, members, series)
-    found = [_followed(each, covariate) for each in series if each is not covariate.of]
-    judged, level = _judged(found, ordered=covariate.ordered)
+    followed = [_followed(each, covariate) for each in series if each is not covariate.of]
+    judged, level = _judged(followed, ordered=covariate.ordered)
     judged.sort(key=lambda each: (list(Verdict).index(each.verdict) > 2, each.smallest))
     notes = tuple(_notes(members, covariate, series))
     return Trends(members, covariate, tuple(judged), level, changes_before(members), fitted, notes)
@@ -213,9 +212,9 @@ def _followed(series: Series, covariate: Covariate) -> TrendSeries:
     known = np.isfinite(x)
     if not known.all():
         missing = [p.member.name for p, k in zip(series.points, known, strict=True) if not k]
-        told = tuple(f"{name}: {covariate.name} is not known" for name in missing)
+        missing_texts = tuple(f"{name}: {covariate.name} is not known" for name in missing)
         points = tuple(p for p, k in zip(series.points, known, strict=True) if k)
-        series = replace(series, points=points, left_out=(*series.left_out, *told))
+        series = replace(series, points=points, left_out=(*series.left_out, *missing_texts))
         x = x[known]
         if len(points) >= LEAST and np.ptp(series.values) == 0:
             return TrendSeries(series, x, reason=SAME_IN_ALL())
@@ -225,18 +224,18 @@ def _followed(series: Series, covariate: Covariate) -> TrendSeries:
     if np.ptp(x) <= 1e-9 * np.max(np.abs(x)):
         return TrendSeries(series, x, reason=NOT_VARYING(covariate=covariate.name))
     own, cancelled, unknown = series.own()
-    told_of = (in_axis_terms(source, series.points[0].member.sides) for source in unknown)
-    notes = [f"not the same in all runs, with no stated uncertainty: {s}" for s in told_of]
+    sources = (in_axis_terms(source, series.points[0].member.sides) for source in unknown)
+    notes = [f"not the same in all runs, with no stated uncertainty: {s}" for s in sources]
     notes += [series.bare] if series.bare else []
     try:
-        found = change(x, series.values, own, jumps=covariate.ordered)
+        fit = change(x, series.values, own, jumps=covariate.ordered)
     except (ValueError, np.linalg.LinAlgError) as error:
         return TrendSeries(series, x, reason=NO_CHANGE_MODEL(error=str(error)))
-    return TrendSeries(series, x, found, cancelled=cancelled, notes=tuple(notes))
+    return TrendSeries(series, x, fit, cancelled=cancelled, notes=tuple(notes))
 
 
 def _judged(found: Sequence[TrendSeries], *, ordered: bool) -> tuple[list[TrendSeries], float]:
-    """With verdicts: all p values are one family, whichever shape they ask for."""
+    """Series with verdicts, and the level; all p values of trends and jumps are one family."""
     tested = [(i, name, p) for i, each in enumerate(found) for name, p in each.p.items()]
     ps = [p for _, _, p in tested]
     level = level_of(ps)
@@ -265,14 +264,14 @@ def _with(
         sizes[TREND] = detectable(change.trend.slope, level)
     if change.jump is not None:
         sizes[JUMP] = detectable(change.jump.clearest, level / change.jump.places)
-    found = replace(each, verdict=verdict, adjusted=adjusted, detectable=sizes, jumps=jumps)
+    with_verdict = replace(each, verdict=verdict, adjusted=adjusted, detectable=sizes, jumps=jumps)
     declared = verdict is not Verdict.NOT_SHOWN
-    notes = (WITHIN, *each.notes) if declared and _within(found) else each.notes
-    return replace(found, notes=notes)
+    notes = (WITHIN, *each.notes) if declared and _within(with_verdict) else each.notes
+    return replace(with_verdict, notes=notes)
 
 
 def _within(each: TrendSeries) -> bool:
-    """Whether all that a number changes by is less than what a single run leaves open of it."""
+    """Whether the largest change is below the median half-width of the runs' intervals."""
     if each.series.bare or each.change is None or each.change.trend is None:
         return False
     slope = each.change.trend.slope.value
@@ -282,7 +281,7 @@ def _within(each: TrendSeries) -> bool:
 
 
 def _imported(members: Sequence[Member], covariate: Covariate) -> Iterator[str]:
-    """A note where times are not those of the recordings."""
+    """Note on imported runs, whose times are not those of the recordings."""
     imported = sum(each.run.header.source == "recording" for each in members)
     if covariate.name == TIME and imported:
         yield (

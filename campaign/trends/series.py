@@ -1,9 +1,8 @@
 """One number of a rig over its runs, with its uncertainty.
 
-Findings go together as `campaign compare` pairs them. Of the errors of each point, those that all
-runs have in common shift all points alike: no trend is made or hidden by them, and they take no
-part. A constant of the bench that was determined anew between runs shifts those alike that rest on
-the same value.
+Findings are paired as in `campaign compare`. An error that all runs share shifts all points
+equally. It neither causes nor hides a trend and is left out. If a constant of the bench was
+determined again between runs, its error is common to the points with the same value.
 """
 
 from __future__ import annotations
@@ -40,11 +39,11 @@ SAME_IN_ALL = Cause("same in all runs", "it is the same in all runs, to the last
 
 @dataclass(frozen=True)
 class Point:
-    """The number as one run found it.
+    """Value of one run.
 
     Attributes:
-        member: of which run.
-        test: the test of that run; "" for all of it.
+        member: the run.
+        test: its test; "" for the whole run.
         estimate: in the unit of its series.
     """
 
@@ -55,7 +54,7 @@ class Point:
 
 @dataclass
 class _Collected:
-    """A finding of the reference and what the runs have of it."""
+    """A finding of the reference run with the points of all runs."""
 
     test: AnalysedTest
     finding: Finding
@@ -70,12 +69,12 @@ class Series:
 
     Attributes:
         test: name of the test, or of the method that identified it.
-        name: for people, with its conditions.
+        name: display name with the conditions.
         unit: SI, of all points.
-        display: what a reader is shown.
-        points: in the order of time.
-        left_out: why others are not among them.
-        reason: why it is not followed; `NONE` where it is.
+        display: unit for display.
+        points: in order of time.
+        left_out: runs without a point, with the reason.
+        reason: why no trend is estimated; `NONE` if one is.
     """
 
     test: str
@@ -91,30 +90,30 @@ class Series:
 
     @property
     def values(self) -> Array:
-        """Shape (n,), in `unit`."""
+        """Values of the points, shape (n,), in `unit`."""
         return np.array([point.estimate.value for point in self.points])
 
     @property
     def scale(self) -> float:
-        """What one `unit` is in the unit that is shown."""
+        """Factor from `unit` to `display`."""
         return float(convert(1.0, self.unit, self.display))
 
     @property
     def bare(self) -> str:
-        """Why the points are taken without errors of their own; "" where they have them."""
+        """Text on points without an interval, by which all have equal weight; "" without any."""
         without = sum(_own(point.estimate) is None for point in self.points)
         if not without:
             return ""
-        told = "none" if without == len(self.points) else f"{without} of {len(self.points)}"
+        which = "none" if without == len(self.points) else f"{without} of {len(self.points)}"
         have = "has" if without == len(self.points) else "have no"
-        return f"{told} {have} {'an ' if have == 'has' else ''}interval: weighed alike"
+        return f"{which} {have} {'an ' if have == 'has' else ''}interval: weighed alike"
 
     def own(self) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-        """Covariance of the points' own errors (n, n), and the sources that cancel, and that might.
+        """Covariance of the points' own errors (n, n), canceled sources, unknown sources.
 
-        The last are constants that are not the same in all runs, and nobody said how uncertain.
+        Unknown sources are constants that differ between runs and have no stated uncertainty.
         """
-        found = np.diag(np.square(_own_errors([point.estimate for point in self.points])))
+        covariance = np.diag(np.square(_own_errors([point.estimate for point in self.points])))
         cancelled, unknown = [], []
         for source in _sources(self.points):
             keys = [point.member.constants.get(source, "") for point in self.points]
@@ -126,34 +125,36 @@ class Series:
             else:
                 sizes = np.nan_to_num(sizes)
                 alike = np.array([[a == b and a != "" for b in keys] for a in keys])
-                found += np.where(alike | np.eye(len(keys), dtype=bool), np.outer(sizes, sizes), 0)
-        return found, tuple(cancelled), tuple(unknown)
+                covariance += np.where(
+                    alike | np.eye(len(keys), dtype=bool), np.outer(sizes, sizes), 0
+                )
+        return covariance, tuple(cancelled), tuple(unknown)
 
 
 def series_of(members: Sequence[Member]) -> list[Series]:
-    """Every finding of the run that found most, with its partners in the others."""
+    """Series of every finding of the run with the most findings."""
     reference = max(
         members, key=lambda m: (sum(len(t.result.findings) for t in m.tests), -m.number)
     )
-    found = {
+    collected = {
         (i, k): _Collected(test, finding)
         for i, test in enumerate(reference.tests)
         for k, finding in enumerate(test.result.findings)
         if not finding.recomputed
     }
-    places = {id(each.finding): each for each in found.values()}
+    places = {id(each.finding): each for each in collected.values()}
     seen: dict[tuple[str, tuple[str, ...]], Member] = {}
     for member in members:
         for pair in pair_tests(reference.tests, member.tests).tests:
             twin = _twin(seen, member, pair.other.name, pair.reference.name)
             for one, other in pair.findings:
-                mine = places[id(one)]
+                entry = places[id(one)]
                 why = f"{TWIN} {twin.name}" if twin else ""
                 test, number = pair.other.name, other.known
-                add_point(mine.points, mine.left_out, member, test, number, one.unit, why)
+                add_point(entry.points, entry.left_out, member, test, number, one.unit, why)
                 if number.origin is Origin.CONTRADICTED:
-                    mine.wrong.append(number.reason)
-    return [_series(each) for each in found.values()]
+                    entry.wrong.append(number.reason)
+    return [_series(each) for each in collected.values()]
 
 
 def add_point(
@@ -165,7 +166,7 @@ def add_point(
     unit: str,
     why: str = "",
 ) -> None:
-    """Take a number in, or say why not: not found, a bound, or what `why` says."""
+    """Append a point, or its reason to `left_out`: no finite value, a bound, given, or `why`."""
     estimate = in_unit(estimate, unit)
     if not why and not math.isfinite(estimate.value):
         why = "not found"
@@ -182,12 +183,12 @@ def add_point(
 def made(
     points: Sequence[Point], left_out: Sequence[str], reason: Reason = NONE, **more: object
 ) -> Series:
-    """A series, with the reason why it is not followed: the given one, or another."""
+    """Create a series. `reason`: why no trend is estimated; by default checked from the points."""
     values = [point.estimate.value for point in points]
     if not reason and len(points) < LEAST:
         whys = Counter(why.partition(": ")[2].partition(TWIN)[0] or TWIN for why in left_out)
-        told = "; ".join(f"{why} in {count}" for why, count in whys.items())
-        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {told}" if told else "")
+        counts = "; ".join(f"{why} in {count}" for why, count in whys.items())
+        reason = TOO_FEW_RUNS(runs=len(points), lost=f", {counts}" if counts else "")
     if not reason and max(values) - min(values) <= 1e-12 * max(map(abs, values)):
         reason = SAME_IN_ALL()
     return Series(
@@ -222,7 +223,7 @@ def _series(found: _Collected) -> Series:
 def _twin(
     seen: dict[tuple[str, tuple[str, ...]], Member], member: Member, test: str, of: str
 ) -> Member | None:
-    """An earlier run whose trials of a test are the same simulation, to the seed."""
+    """Earlier run with the same simulated trials of a test, seeds included; None without one."""
     prints = member.identical.get(test, ())
     if not prints:
         return None
@@ -231,7 +232,7 @@ def _twin(
 
 
 def _own_errors(found: Sequence[Estimate]) -> Array:
-    """Standard deviations of the points' scatter, shape (n,); zeros where any is not known."""
+    """Standard deviations of the points' scatter, shape (n,); all zero if any is unknown."""
     known = [error for each in found if (error := _own(each)) is not None]
     if len(known) < len(found):
         return np.zeros(len(found))
@@ -242,10 +243,9 @@ def _own_errors(found: Sequence[Estimate]) -> Array:
 
 
 def _own(estimate: Estimate) -> float | None:
-    """Standard deviation of a point's scatter; None where nobody knows it.
+    """Standard deviation of a point's scatter; None if unknown.
 
-    That of its interval as if it were normal: wider where few repeats are behind it, as the
-    deviation of Student's t is.
+    Half of the interval over the normal quantile: larger for few repeats, as for Student's t.
     """
     low, high = estimate.low, estimate.high
     if low is None or high is None or estimate.kind == "quantile" or estimate.level != LEVEL:
@@ -258,6 +258,6 @@ def _sources(points: Sequence[Point]) -> Iterator[str]:
 
 
 def _size(estimate: Estimate, source: str) -> float:
-    """1 sigma of a source in one number, 0 where it has none, NaN where it is unknown."""
+    """1 sigma of a source in one number; 0 without the source, NaN if unknown."""
     own = [p.standard_uncertainty for p in estimate.systematic if p.source == source]
     return math.nan if None in own else math.hypot(*(size or 0.0 for size in own))

@@ -19,13 +19,13 @@ from campaign.trends.rig_trends import JUMP, TREND, Trends, TrendSeries, Verdict
 
 MEAN_NEAR_ZERO = Cause("mean near zero", "the mean is too near 0, or too little known")
 CIRCUMSTANCES = 4
-"""Most changes beside a jump that a sentence names; the table has them all."""
+"""Most changes beside a jump that a sentence names; the table has all."""
 
 
 def followed_table(
     key: str, title: str, rows: Sequence[TrendSeries], covariate: Covariate
 ) -> Table:
-    """A row per number, in the unit of the row."""
+    """Table with one row per number, each in its own unit."""
     per = covariate.per
     columns = [
         Column("test", "Test"),
@@ -59,7 +59,7 @@ def followed_table(
 
 
 def page_table(rows: Sequence[TrendSeries], covariate: Covariate) -> Table:
-    """The same for a page, which has less room: an effect and its share in one cell."""
+    """Short table for a page: an effect and its share of the mean in one cell."""
     columns = [
         Column("test", "Test"),
         Column("quantity", "Quantity"),
@@ -102,7 +102,7 @@ def _page_row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
 
 
 def points_table(trends: Trends) -> Table:
-    """Every point of every number, as the runs found it."""
+    """Table of all points of all numbers."""
     columns = (
         Column("test", "Test"),
         Column("quantity", "Quantity"),
@@ -130,7 +130,7 @@ def points_table(trends: Trends) -> Table:
 
 
 def circumstances_table(trends: Trends) -> Table:
-    """What differs between each run and the one before it."""
+    """Table of the differences between each run and the one before it."""
     columns = (
         Column("from", "Run"),
         Column("to", "and the next"),
@@ -148,14 +148,14 @@ def circumstances_table(trends: Trends) -> Table:
             "before": change.reference,
             "after": change.other,
         }
-        for n, found in enumerate(trends.circumstances, start=1)
-        for change in found
+        for n, changes in enumerate(trends.circumstances, start=1)
+        for change in changes
     ]
     return Table("circumstances", "What differs between neighbouring runs", columns, tuple(rows))
 
 
 def runs_table(trends: Trends) -> Table:
-    """The runs, numbered in the order of time."""
+    """Table of the runs, numbered in order of time."""
     columns = (
         Column("number", "No.", exact=True),
         Column("run", "Run"),
@@ -181,7 +181,7 @@ def runs_table(trends: Trends) -> Table:
 
 
 def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate] | None:
-    """The trend per `covariate.per`, in the unit that is shown and as a share of the mean."""
+    """Trend per `covariate.per`, in the display unit and relative to the mean; None without one."""
     if each.change is None or each.change.trend is None:
         return None
     slope, size = each.change.trend.slope, covariate.step
@@ -192,7 +192,7 @@ def effect(each: TrendSeries, covariate: Covariate) -> tuple[Estimate, Estimate]
 
 
 def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
-    """A jump in the unit that is shown, and as a share of the mean."""
+    """Jump in the display unit, and relative to the mean."""
     return (
         each.estimate("jump", jump.size, each.series.display),
         _shared(each, each.estimate("jump", jump.size, "")),
@@ -200,40 +200,40 @@ def jump_of(each: TrendSeries, jump: Jump) -> tuple[Estimate, Estimate]:
 
 
 def headline(each: TrendSeries, trends: Trends) -> str:
-    """A declared number in one sentence, without a full stop."""
+    """Sentence on a declared number, without a period."""
     name = each.series.name[:1].upper() + each.series.name[1:]
-    told = [f"{name} ({each.series.test})"]
+    phrases = [f"{name} ({each.series.test})"]
     if each.verdict is not Verdict.JUMPED:
         follows = trends.covariate.name in (TIME, ORDER)
         verb = "drifts by" if follows else f"follows {trends.covariate.name}:"
         if each.verdict is Verdict.CHANGED:
             verb = "changes; as a drift, by"
-        told.append(f"{verb} {_effect_words(each, trends.covariate)}")
+        phrases.append(f"{verb} {_effect_words(each, trends.covariate)}")
     jumps = each.jumps
     if each.verdict is Verdict.CHANGED and each.change is not None and each.change.jump is not None:
         jumps = (each.change.jump,)
     for jump in jumps:
         as_ = "or as a jump" if each.verdict is Verdict.CHANGED else "jumped"
-        told.append(f"{as_} {_jump_words(each, jump, trends)}")
-    return f"{told[0]} {', '.join(told[1:])}"
+        phrases.append(f"{as_} {_jump_words(each, jump, trends)}")
+    return f"{phrases[0]} {', '.join(phrases[1:])}"
 
 
 def beside_the_jump(each: TrendSeries, jump: Jump, trends: Trends) -> str:
-    """What else changed where a number jumped; "" for nothing."""
+    """Sentence on other changes at the place of a jump; "" without any."""
     first, last = _runs_around(each, jump)
-    found = [c for gap in trends.circumstances[first - 1 : last - 1] for c in gap]
-    if not found:
+    changes = [c for gap in trends.circumstances[first - 1 : last - 1] for c in gap]
+    if not changes:
         return ""
-    told = [
+    listed = [
         f"{c.where}{f' {c.path}' if c.path else ''} from {c.reference} to {c.other}"
-        for c in found[:CIRCUMSTANCES]
+        for c in changes[:CIRCUMSTANCES]
     ]
-    more = f", and {len(found) - CIRCUMSTANCES} more" if len(found) > CIRCUMSTANCES else ""
-    return f"Between runs {first} and {last} changed, too: {'; '.join(told)}{more}."
+    more = f", and {len(changes) - CIRCUMSTANCES} more" if len(changes) > CIRCUMSTANCES else ""
+    return f"Between runs {first} and {last} changed, too: {'; '.join(listed)}{more}."
 
 
 def sentences(trends: Trends) -> Iterator[str]:
-    """What it all comes to."""
+    """Sentences that summarize the trends."""
     count, judged = len(trends.members), trends.judged
     several = judged != 1
     yield (
@@ -259,16 +259,16 @@ def sentences(trends: Trends) -> Iterator[str]:
 
 
 def not_judged(trends: Trends) -> Iterator[str]:
-    """`12: ...`: each reason once, the most frequent first."""
-    told = Counter(str(each.reason) for each in trends.of(Verdict.NOT_JUDGED))
-    for reason, count in told.most_common():
+    """Reasons for no verdict with their counts, as `12: ...`, the most frequent first."""
+    counts = Counter(str(each.reason) for each in trends.of(Verdict.NOT_JUDGED))
+    for reason, count in counts.most_common():
         yield f"{count}: {reason}"
 
 
 def detectable_words(
     each: TrendSeries, name: str, covariate: Covariate, *, per: bool = True
 ) -> str:
-    """`0.12 N·m per month (1.3 %)`: the smallest effect that would have been seen."""
+    """Smallest detectable effect: `0.12 N·m per month (1.3 %)`."""
     size = detectable(each, name, covariate)
     if size is None:
         return "–"
@@ -318,7 +318,7 @@ def _row(each: TrendSeries, covariate: Covariate) -> dict[str, Cell]:
 
 
 def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | None:
-    """The smallest effect that would have been seen, in the unit that is shown; None unknown."""
+    """Smallest detectable effect in the display unit; None if unknown."""
     size = (each.detectable or {}).get(name)
     if size is None:
         return None
@@ -326,7 +326,7 @@ def detectable(each: TrendSeries, name: str, covariate: Covariate) -> float | No
 
 
 def _shared(each: TrendSeries, estimate: Estimate) -> Estimate:
-    """As a share of the mean; without any where the mean may be 0."""
+    """Estimate relative to the mean; NaN if the mean may be 0."""
     share = each.share
     if not math.isfinite(share):
         return Estimate.without_interval(estimate.name, math.nan, "", MEAN_NEAR_ZERO())
@@ -371,7 +371,7 @@ def _before(each: TrendSeries, jumps: Sequence[Jump]) -> str:
 
 
 def _runs_around(each: TrendSeries, jump: Jump) -> tuple[int, int]:
-    """Numbers of the runs between which the number jumped, as far as the points say."""
+    """Numbers of the runs around a jump; its place is between them with 95 % of the weight."""
     points = each.series.points
     low, high = jump.between
     return points[low - 1].member.number, points[high].member.number
