@@ -31,12 +31,10 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
     points = _points(test)
     for path, values in points.items():
         yield f"{path_words(path)} (swept)", units.words(path, values)
-    covered = points.keys() | _without_effect(test)
-    covered |= {
-        units.listed_by(path) for path, values in points.items() if _lists(test, units, path)
-    }
+    skip = points.keys() | _without_effect(test)
+    skip |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
     for path, value in test.options.items():
-        if path not in covered and value is not None and value != []:
+        if path not in skip and value is not None and value != []:
             yield path_words(path), _names(value) or units.value(path, value)
 
 

@@ -39,18 +39,18 @@ ENOUGH = 4
 
 @dataclass(frozen=True)
 class Answer:
-    """Summary of one test.
+    """What one test comes to.
 
     Attributes:
-        where: conditions that all key numbers share.
-        numbers: key numbers, the most important first.
-        figure: key of the leading figure.
-        remarks: sentences on missing or incomplete intervals.
-        truth: count of intervals that contain the true value of the simulated bench, and biases;
-            "" if unknown.
-        prediction: numbers that differ from the bench file; "" if untested.
-        references: the same for each file of reference values.
-        problem: reason for missing numbers.
+        where: conditions that all of its key numbers share.
+        numbers: its key numbers, the most important first.
+        figure: the key of its most telling figure.
+        remarks: what the numbers do not say: no interval, or not all of it.
+        truth: how many intervals hold what is true of the bench that was simulated, and what is
+            off alike in all of them; "" unknown.
+        prediction: which numbers are not what its bench file states any more; "" untested.
+        references: the same of each file of reference values.
+        problem: why there is no number, or not all of them.
     """
 
     test: str
@@ -67,17 +67,17 @@ class Answer:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """Content of the first screen of the page.
+    """What stands on top of the page.
 
     Attributes:
         answers: per test, in the protocol's order.
-        telling: test and key of the leading figure; None without any.
-        wrong: sentences on problems: failed, interrupted, damaged, not analysed.
-        asked: sentence on the executed tests and their benches.
-        compared: sentence on the reproduced published values; "" without a comparison.
-        main: names of the selected tests; empty where all answers are shown.
-        intervals: explanation of ± and brackets; "" without intervals.
-        held: count of intervals of all tests that contain the true value; "" if unknown.
+        main: of many tests, those whose numbers stand on top; empty where all answers do.
+        telling: test and key of the one figure that is shown there; None without any.
+        wrong: sentences on what went wrong: failed, interrupted, damaged, not analysed.
+        asked: what was executed, on which bench, in a sentence.
+        compared: how many published values were reproduced; "" where none was compared.
+        intervals: what ± and brackets say; "" where no number has any.
+        held: how many intervals of all tests hold the true values; "" unknown.
     """
 
     answers: tuple[Answer, ...]

@@ -25,16 +25,16 @@ from campaign.units import convert
 
 @dataclass(frozen=True)
 class KeyNumber:
-    """A key number of a test, as text.
+    """A key number of a test, as a reader is shown it.
 
     Attributes:
-        quantity: name of the quantity.
-        where: its conditions, without those that all key numbers of the test share.
-        value: number with interval and unit.
-        published: published value with its unit; "" without one.
-        agrees: whether the published value is reproduced.
-        true: true value of the simulated bench with its unit, marked if it is outside of the
-            interval; "" if unknown.
+        quantity: in words.
+        where: its conditions, but for those that it shares with the others of its test.
+        value: with its interval and unit.
+        published: what is printed of it, with its unit; "" where nothing is.
+        agrees: whether that is reproduced.
+        true: what is true of the simulated bench, with its unit, and whether it lies outside of
+            the interval; "" unknown.
     """
 
     quantity: str

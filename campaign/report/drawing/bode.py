@@ -113,12 +113,10 @@ def bode_figure(bench: CompleteBench, names: Sequence[str]) -> Figure:
 
 def _range(loops: Sequence[LoopMargins]) -> tuple[float, float]:
     """Range from below every crossover to the Nyquist frequency, or above them (rad/s)."""
-    crossovers = [
-        omega for loop in loops for omega in (*loop.crossovers, loop.gain_crossing) if omega
-    ]
+    omegas = [omega for loop in loops for omega in (*loop.crossovers, loop.gain_crossing) if omega]
     periods = [loop.period for loop in loops if loop.period is not None]
-    high = math.pi / periods[0] if periods else 30.0 * max(crossovers, default=TWO_PI)
-    return max(0.1 * min(crossovers, default=TWO_PI), 1e-5 * high), high
+    high = math.pi / periods[0] if periods else 30.0 * max(omegas, default=TWO_PI)
+    return max(0.1 * min(omegas, default=TWO_PI), 1e-5 * high), high
 
 
 def _trace(name: str, omega: Array, response: Response, margins: LoopMargins) -> Trace:

@@ -91,12 +91,9 @@ def draw_bounds(ax: Axes, curve: Curve, look: Look, x: Array, y: Array) -> Array
     Returns: y of the points with an upward arrow.
     """
     up = np.zeros(len(y))
-    for end, infinite, direction in (
-        (curve.high, np.isposinf, 1.0),
-        (curve.low, np.isneginf, -1.0),
-    ):
+    for end, infinite, sign in ((curve.high, np.isposinf, 1.0), (curve.low, np.isneginf, -1.0)):
         if end is not None:
-            up[infinite(np.asarray(end, dtype=float).ravel()[: len(y)])] = direction
+            up[infinite(np.asarray(end, dtype=float).ravel()[: len(y)])] = sign
     _draw_bound(ax, x, y, up, {"color": look.light, "zorder": 2.2, "arrowstyle": "<|-"})
     return y[up > 0.0]
 

@@ -154,10 +154,7 @@ def _moved(path: str, x: float, y: float) -> str:
 
 
 def _merged(shapes: Iterable[_Shape]) -> list[_Shape]:
-    """Merge each path into the first one with its look.
-
-    The painting order changes only relative to lines and texts.
-    """
+    """Merge each path into the first one with its look, past straight lines and texts only."""
     merged: list[_Shape] = []
     open_: dict[object, _Shape] = {}
     for shape in shapes:
