@@ -1,8 +1,8 @@
 """Published values of a source document, and their file.
 
-`campaign/published/thesis.toml` holds the thesis' tables; a laboratory may hand in its own file of
-the same form (`docs/published-values.md`). A table's rows and columns each add conditions, a
-quantity, a unit; a cell is the sum of its table, its row and its column.
+`campaign/published/thesis.toml` contains the tables of the thesis; a laboratory may provide its own
+file of the same form (`docs/published-values.md`). A cell combines conditions, quantity and unit of
+its table, its row and its column.
 """
 
 from __future__ import annotations

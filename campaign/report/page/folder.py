@@ -216,7 +216,7 @@ class Folder:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (`inline` escapes texts)
         return ShownFigure(
             self.figures,
             anchor,
