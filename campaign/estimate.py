@@ -14,8 +14,8 @@ ROUNDING = 1e-9
 
 OF_ONE_TRIAL = Cause(
     "of one trial",
-    "the interval is of that one trial; what differs from trial to trial is not in it, and "
-    "three trials alike would show it",
+    "the interval is of one trial and does not include the scatter between trials; three equal "
+    "trials measure that",
 )
 Kind = Literal["number", "share", "count", "quantile", "at least", "at most"]
 

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-static const char nobody[] = "somebody who did not say who";
+static const char nobody[] = "an unnamed host";
 
 void campaign_latch_init(struct campaign_device *device, const struct campaign_latch *latch)
 {
@@ -78,7 +78,7 @@ struct campaign_refusal campaign_latch_check(struct campaign_device *device)
     if (!device->latch.latched)
         return campaign_accepted();
     strcpy(device->stopped_text, "stopped by ");
-    strcat(device->stopped_text, by[0] != '\0' ? by : "nobody that it remembers");
+    strcat(device->stopped_text, by[0] != '\0' ? by : "an unknown host");
     return campaign_refused(CAMPAIGN_LATCHED, device->stopped_text);
 }
 

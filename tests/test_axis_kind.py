@@ -304,7 +304,7 @@ def test_a_page_calls_a_source_as_its_axis_does() -> None:
         sides=DIRECT,
         experiment=None,
     )
-    remark = "Of unknown size, and in no interval: force constant."
+    remark = "Not included in the intervals (size unknown): force constant."
     units = TestUnits(test)  # type: ignore[arg-type]
     answer = _answer(test, None, References({}, {}, ()), Scoreboard(), units)  # type: ignore[arg-type]
     assert answer.remarks == (remark,)

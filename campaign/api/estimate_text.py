@@ -37,7 +37,7 @@ def remarks(estimates: Iterable[Estimate]) -> Iterator[str]:
     for reason in dict.fromkeys(str(e.reason) for e in found if e.has_interval and e.reason):
         yield f"{reason[:1].upper()}{reason[1:]}."
     if any(_is_narrow(each) for each in found):
-        yield "Where a number stands without an interval, that is narrower than its digits."
+        yield "Numbers without an interval: it is narrower than the last digit."
     yield from of_unknown_size(found)
 
 
@@ -51,7 +51,8 @@ def of_unknown_size(estimates: Iterable[Estimate]) -> Iterator[str]:
         if each.standard_uncertainty is None
     )
     if unknown:
-        yield f"Of unknown size, and in no interval: {', '.join(map(in_axis_terms, unknown))}."
+        sources = ", ".join(map(in_axis_terms, unknown))
+        yield f"Not included in the intervals (size unknown): {sources}."
 
 
 def shows_interval(estimate: Estimate) -> bool:

@@ -132,7 +132,7 @@ class Desk:
         return told + _frame(self._status()) + _frame(self._latched()) if told else b""
 
     def _safe(self, message: Safe) -> None:
-        by = printable(message.host) or "somebody who did not say who"
+        by = printable(message.host) or "an unnamed host"
         if not self._stopped or message.session != self._stopped:
             self._stopped = message.session
             self.latch.stop(by)

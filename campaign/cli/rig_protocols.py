@@ -25,7 +25,7 @@ from campaign.resources import protocols_folder
 
 WIDTH = 98
 TEMPLATES = Path(__file__).with_name("rig_protocol_templates")
-PILOT = "pilot = true    # no Stribeck curve is described: ten speeds tell which others to run\n"
+PILOT = "pilot = true    # no Stribeck curve is described: ten speeds determine the others\n"
 
 
 @unwinding()

@@ -152,8 +152,8 @@ def wanted_signature(signer: str | None, allowed: Path | None) -> ExpectedSigner
         return None
     if not signer or allowed is None:
         raise UsageError(
-            "--signer NAME and --allowed-signers FILE go together: who must have signed, and the "
-            "file that says which keys are theirs"
+            "--signer NAME and --allowed-signers FILE belong together: the expected "
+            "signer, and the file with the keys of signers"
         )
     signing.check_tool()
     return ExpectedSigner(signer, signing.AllowedSigners.read(allowed))

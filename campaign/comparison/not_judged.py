@@ -21,7 +21,7 @@ FOLLOWS = Cause(
     "follows from others",
     "it follows from other numbers of the same test, which are compared themselves",
 )
-REPEAT = "how trials scatter is not in the interval; `repeat = 3` would show it"
+REPEAT = "the interval does not include the scatter between trials; `repeat = 3` measures it"
 ONE_TRIAL_EACH = Cause("one trial each", f"one trial each: {REPEAT}")
 ONE_OF_ONE_TRIAL = Cause("one of one trial", f"{{side}} is of one trial: {REPEAT}")
 

@@ -97,8 +97,8 @@ def _facts(side: Side) -> Iterator[tuple[str, str]]:
 
 def _how(comparison: Comparison) -> Iterator[str]:
     yield (
-        "Numbers go together that are the same quantity under the same conditions, of tests of the "
-        "same kind. Their difference has the standard error of two independent numbers, with the "
+        "A pair is one quantity under the same conditions, in tests of the same "
+        "kind. Their difference has the standard error of two independent numbers, with the "
         "degrees of freedom of Welch and Satterthwaite; half-widths of lopsided intervals add in "
         "squares. The change in percent is in the interval exactly where the difference is."
     )
@@ -148,7 +148,7 @@ def _against(
         f"besides-{other}",
         f"{named}: what differs besides",
         (
-            circumstances if against.changes else Paragraph("Nothing that the archives know of."),
+            circumstances if against.changes else Paragraph("No difference is archived."),
             *([] if alone is None else [folder.shown_table(alone, (), f"{prefix}only-in-one")]),
         ),
     )

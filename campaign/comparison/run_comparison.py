@@ -165,9 +165,7 @@ def _check(runs: Sequence[RunReader]) -> None:
     if len(runs) < 2:
         raise UsageError("name two runs or more: the first is what the others are compared with")
     if len(runs) > len(LETTERS):
-        raise UsageError(
-            f"{len(runs)} runs are too many to tell apart; {len(LETTERS)} are possible"
-        )
+        raise UsageError(f"{len(runs)} runs are too many: at most {len(LETTERS)} can be compared")
     refuse_twice(runs)
 
 

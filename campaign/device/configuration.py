@@ -103,7 +103,7 @@ def _check_limits(own: CompleteBench, bench: CompleteBench, task: Task) -> None:
             raise ConfigurationRefusal(NakCode.OUT_OF_RANGE, f"limits.{name}", text)
     for margin in margins(bench, task):
         if margin.broken:
-            text = f"the {margin.called} would come to {margin.value:.6g} {margin.unit}"
+            text = f"the {margin.called} would be {margin.value:.6g} {margin.unit}"
             text += f"; the limit is {margin.bound:.6g}"
             raise ConfigurationRefusal(NakCode.LIMIT, f"limits.{margin.limit}", text)
 

@@ -218,7 +218,7 @@ class Controller:
         if not isinstance(message, Safe):
             raise TypeError("every SAFE is one")
         from_outside = latches(message.session, self._session.number)
-        by = message.host or "somebody who did not say who"
+        by = message.host or "an unnamed host"
         why = f"panic stop by {by}" if from_outside else "switched off by SAFE"
         self.machine.switch_off(Ending(Outcome.INTERRUPTED, clipped(why)))  # before anything else
         news = from_outside and self._latch.set(message.session, clipped(by))
@@ -363,7 +363,7 @@ class Controller:
 
     def _check_latch(self) -> None:
         if self._latch.latched:
-            text = f"stopped by {self._latch.stop.by or 'nobody that it remembers'}"
+            text = f"stopped by {self._latch.stop.by or 'an unknown host'}"
             raise ConfigurationRefusal(NakCode.LATCHED, "", text)
 
     def _unlatch(self, message: Unlatch) -> tuple[Message, ...]:

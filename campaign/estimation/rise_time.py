@@ -39,11 +39,11 @@ FINE = 100
 """places in a rise time at which a parabola is looked at."""
 SHORT_STANDSTILL = Cause(
     "standstill too short",
-    "the standstill before it has fewer than {samples} samples to tell its noise by",
+    "the standstill before it has fewer than {samples} samples to estimate its noise",
 )
 HIDDEN_LEVEL = Cause(
     "level hidden by noise",
-    SCATTERS + ", which hides when it comes to {level_percent:.0f} %",
+    SCATTERS + ", which hides when it reaches {level_percent:.0f} %",
 )
 
 

@@ -30,7 +30,7 @@ SAMPLES = "time between samples"
 LOST = Cause("samples lost", "samples were lost")
 PEAK_AT_END = Cause("peak at an end", "it is still rising at an end of what was looked at")
 UNRESOLVED_PEAK = Cause("peak not resolved", "the samples are too far apart to resolve it")
-ALIKE = Cause("equal parts", "its parts agree to {digits} digits, as in a simulation without noise")
+ALIKE = Cause("equal parts", "its parts agree to {digits} digits: a simulation without noise")
 _ROUNDING = 1e-12  # share of a number below which a difference is none
 
 

@@ -34,9 +34,7 @@ HARDLY = 10 * ALIKE
 """Relative standard error up to which a number beside one that does not scatter hardly does."""
 IDENTICAL = 1e-12
 """The same for two values, which may be alike by chance, and for trials of one seed."""
-NO_SCATTER = Cause(
-    "not scattering", "it repeats to the fifth digit: nothing scatters on this bench"
-)
+NO_SCATTER = Cause("not scattering", "repeats agree to the fifth digit: the bench has no scatter")
 SHORT = Cause("record too short", "less than one cycle was recorded")
 TOO_FEW_FOR_BLOCKS = Cause("too few samples for blocks", "too few samples for {blocks} blocks")
 SHORT_BLOCK = Cause(
@@ -147,7 +145,7 @@ def over_trials(found: Sequence[Estimate]) -> Estimate:
     back as it is. Raises ValueError for none.
     """
     if not found:
-        raise ValueError("no trial to tell it from")
+        raise ValueError("no trial to estimate it from")
     known = [one for one in found if math.isfinite(one.value)]
     if len(known) < 2:
         return known[0] if known else found[0]

@@ -40,7 +40,7 @@ HIDDEN_RISE = Cause(
 )
 HIDDEN_SETTLING = Cause(
     "settling hidden by noise",
-    SCATTERS + ", and its mean comes to lie {room_percent:.2g} % within the band's edge",
+    SCATTERS + ", and its final mean lies {room_percent:.2g} % within the band's edge",
 )
 HIDDEN_OVERSHOOT = Cause(
     "overshoot hidden by noise",

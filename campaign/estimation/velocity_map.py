@@ -87,7 +87,9 @@ EXPONENT_ENDED = Cause(
     "exponent at search limit", "the exponent ended at {value:.3g}, its {side} limit, and moves it"
 )
 NEGATIVE = Cause("negative by the data", "the data would have it negative")
-LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
+LIKE_VISCOUS = Cause(
+    "like viscous friction", "these points do not separate it from viscous friction"
+)
 CONTRADICTED: Mapping[Model, Cause] = {
     "2": Cause("exponent contradicted", "the points contradict the exponent of 2 (p = {p:.2g})"),
     "none": Cause("Stribeck effect shows", "the points show a Stribeck effect (p = {p:.2g})"),

@@ -10,7 +10,7 @@ from typing import Any
 from campaign.archive import PlannedTrial, RunHeader, RunReader
 from campaign.archive.layout.journal import Decision, TrialFinished, parse_journal
 from campaign.archive.writing.resume_run import RESUMABLE
-from campaign.errors import UsageError
+from campaign.errors import ArchiveError, UsageError
 from campaign.execution.provenance import shaping
 from campaign.protocol import PlannedStage
 from campaign.protocol.plan_tree import planned_stage
@@ -43,7 +43,7 @@ class Conditions:
 
 
 def check_resumable(run: RunReader) -> None:
-    """UsageError when there is nothing to go on with.
+    """UsageError when there is nothing to go on with, ArchiveError when its plan is damaged.
 
     A folder always can: if it tells of an end, the program was killed before it was sealed.
     """
@@ -56,6 +56,11 @@ def check_resumable(run: RunReader) -> None:
         raise UsageError(
             f"{run.name}: does not say its seed, without which its plan cannot be made again; "
             "start a new run"
+        )
+    if len(run.first_stage) != run.header.trials:
+        raise ArchiveError(
+            f"{run.name}: its plan has {len(run.first_stage)} of {run.header.trials} trials: it is "
+            "damaged; start a new run"
         )
 
 

@@ -20,7 +20,7 @@ from campaign.recording import Ending, Recording
 from campaign.result import Result, Value
 from campaign.trial import Tree, Trial, TrialRequest
 
-NOT_TOLD = Cause("not in the recording", "the recording does not tell it")
+NOT_TOLD = Cause("not in the recording", "the recording does not contain it")
 
 _Options = TypeVar("_Options", bound=Options)
 

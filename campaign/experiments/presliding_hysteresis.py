@@ -112,7 +112,7 @@ def strokes(options: PreslidingHysteresisOptions, amplitude: float) -> Polyline:
 
 
 NOISELESS = Cause(
-    "noiseless", "a computed loop has no noise; how nearly it closes is its systematic part"
+    "noiseless", "a computed loop has no noise; its systematic part is the gap at its end"
 )
 UNITS = {"peak": "N m", "hysteresis_energy": "J", "loss_factor": ""}
 

@@ -188,11 +188,11 @@ def _table(sets: Sequence[MapSet]) -> Table:
         columns=tuple(columns),
         rows=tuple(rows),
         thesis=("4.4",),
-        note=f"{told}. The deviation is taken over all columns, with n; δ is fitted, too. The "
-        "interval of the mean is that of the maps; that of the deviation includes how far the two "
-        "directions are apart, which maps do not change. What the bench's constants may be off by "
-        "shifts all maps alike: it is in the interval of the mean. Neither has one where a map has "
-        "its value at a bound or does not determine it.",
+        note=f"{told}. The standard deviation is over all columns, divided by n; δ is fitted, too. "
+        "The interval of the mean is that of the maps. That of the deviation includes the "
+        "difference between the directions, which is the same in all maps. Errors of the bench's "
+        "constants shift all maps equally: the interval of the mean includes them. Neither has an "
+        "interval where a map has its value at a bound or does not determine it.",
     )
 
 

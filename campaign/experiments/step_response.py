@@ -177,7 +177,7 @@ def _measure(data: TrialData) -> Sequence[Estimate]:
     )
 
 
-ONE_STEP = Cause("of one step", "it is of one step: repeats would show how it scatters")
+ONE_STEP = Cause("of one step", "it is of one step: repeats measure its scatter")
 NOT_SEEN = Cause("not seen in every step", "not every step was seen to do that")
 
 
@@ -327,8 +327,7 @@ def step_table(steps: Sequence[Step], extra: Sequence[str]) -> Table:
         ),
         rows=tuple(rows),
         note="Times count from the start of the step. Each row is one step: the interval of its "
-        "rise time is what its own noise leaves open. What repeats of it say together, with "
-        "intervals, is among the findings.",
+        "rise time is that of its own noise. The findings combine repeats, with intervals.",
     )
 
 

@@ -285,9 +285,9 @@ def _what_shows(place: ConditionGroup, found: Mapping[str, Estimate]) -> str:
         return sentence(f"{who}: it does not slip")
     top = amount(found["top_rate"].value, "rad/s")
     period = found["period"].value
-    times = f"slips {slips:g} times" if slips != 1 else "slips once"
-    every = f", every {amount(period, 's')} after the first" if math.isfinite(period) else ""
-    return sentence(f"{who}: it sticks, {times}{every}, and is then up to {top} fast")
+    times = f"{slips:g} slips" if slips != 1 else "one slip"
+    every = f", mean period {amount(period, 's')} after the first" if math.isfinite(period) else ""
+    return sentence(f"{who}: {times}{every}, largest rate {top}")
 
 
 Measured = Sequence[tuple[ConditionGroup, Mapping[str, Estimate]]]

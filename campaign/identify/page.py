@@ -110,7 +110,7 @@ def _parts(found: Identification, making: _Making) -> Iterator[Part]:
     refused = [each for each in found.sections if each.result is None]
     if refused:
         told = (f"{e.model.name} ({e.model.summary}): {e.problem.rstrip('.')}." for e in refused)
-        yield Part("refused", "What these recordings do not tell", (Items(tuple(told)),))
+        yield Part("refused", "Not determined from these recordings", (Items(tuple(told)),))
 
 
 def _found(

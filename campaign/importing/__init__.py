@@ -1,1 +1,1 @@
-"""Recordings that other programs made, as tables: what a file holds before it means anything."""
+"""Recordings of other programs: tables of files, and their mapping to channels and trials."""

@@ -1,7 +1,7 @@
 """Named arrays of a file as tables: equal lengths form a table with its clock.
 
-MAT and HDF5 files have no tables. What was recorded together has one length; a matrix is a column
-for each of its narrow side.
+MAT and HDF5 files have no tables. Series that were recorded together have one length; the shorter
+side of a matrix counts its columns.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from campaign.importing.interface import ROWS, Array, Column, Table
 
 WIDEST = 64
-"""Most columns of a matrix; what is wider on both sides is an image or a map, and no recording."""
+"""Maximum number of columns of a matrix; if both sides are longer, it is an image or a map."""
 
 OPAQUE = (
     "is an object of a MATLAB class; in MATLAB save its numbers, e.g. t = ts.Time; y = ts.Data; "
@@ -29,9 +29,9 @@ class NamedArray:
 
     Attributes:
         shape: (n,), (n, m) or (m, n).
-        part: rows [start, stop) along the longer side, shape (stop - start,) or, whichever side
-            that is, (stop - start, m).
-        by_rows: each series is a row of the matrix, as its program counts them.
+        part: samples [start, stop) along the longer side, shape (stop - start,) or, for either
+            orientation, (stop - start, m).
+        by_rows: whether each series is a row of the matrix in its program.
     """
 
     name: str
@@ -47,12 +47,12 @@ class NamedArray:
 
     @property
     def width(self) -> int:
-        """How many series it is."""
+        """Number of series."""
         return 1 if len(self.shape) == 1 else min(self.shape)
 
 
 def named(name: str, array: np.ndarray, unit: str = "") -> NamedArray | None:
-    """An array that is in memory; None where it is nothing that is recorded over time."""
+    """A named array from memory; None if it cannot be a recording over time."""
     array = np.squeeze(array)
     if array.ndim not in (1, 2) or array.dtype.kind not in "fiub" or array.size < 2:
         return None

@@ -18,7 +18,7 @@ _NO_NUMBER = (
     "1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf"
 )
 LOST = frozenset({"", *_NO_NUMBER.split()})
-"""Cells of a column of numbers that hold none, in lower case; infinity was never measured."""
+"""Cells of a numeric column without a number, in lower case; infinity is no measurement."""
 NO_UNIT = frozenset({"", "-", "–", "1", "none", "(none)", "[-]", "(-)", "unitless", "n/a"})
 UNIT_WORDS = {
     word: unit
@@ -35,12 +35,12 @@ UNIT_WORDS = {
     }.items()
     for word in words.split()
 }
-"""Units as instruments write them, in lower case, in the spelling of the program's grammar."""
+"""Unit in the program's grammar by its lower-case spelling in instruments."""
 _BRACKETED = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
 
 
 def plain(text: str) -> str:
-    """Text as people see it: no byte order mark, one form of µ and of superscripts, no edges."""
+    """Text without byte order mark and outer blanks, with one form of µ and composed letters."""
     return unicodedata.normalize("NFC", text).replace("\u00b5", "\u03bc").strip("\ufeff \t\r\n\xa0")
 
 
@@ -50,12 +50,12 @@ def is_number(cell: str, decimal: str) -> bool:
 
 
 def is_lost(cell: str) -> bool:
-    """Whether a cell says that there is no number."""
+    """Whether a cell states that it has no number."""
     return cell.lower() in LOST
 
 
 def value_of(cell: str, decimal: str) -> float:
-    """The number in a cell, NaN where it holds none; ValueError where it is something else."""
+    """The number in a cell, NaN for a lost value; ValueError for other text."""
     if is_lost(cell):
         return float("nan")
     if not is_number(cell, decimal):
@@ -64,12 +64,12 @@ def value_of(cell: str, decimal: str) -> float:
         cell = cell.replace(".", "").replace(",", ".")
     value = float(cell.replace("d", "e").replace("D", "e"))
     if value in (float("inf"), -float("inf")):
-        raise ValueError(cell)  # a number beyond all numbers
+        raise ValueError(cell)  # larger than any float
     return value
 
 
 def is_unit(cell: str) -> bool:
-    """Whether a cell may stand in a row of units, where an empty one may, too."""
+    """Whether a cell may be in a row of units; an empty cell may."""
     bare = without_brackets(cell)
     if bare.lower() in NO_UNIT or bare.lower() in UNIT_WORDS or bare == "‰":
         return True
@@ -81,18 +81,18 @@ def is_unit(cell: str) -> bool:
 
 
 def without_brackets(cell: str) -> str:
-    """A unit without the brackets around all of it."""
+    """A unit without its outer brackets."""
     cell = cell.strip()
     pair = cell[:1] + cell[-1:]
     return cell[1:-1].strip() if pair in ("()", "[]", "<>") and len(cell) > 1 else cell
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """`speed [rpm]` as `speed` and `rpm`; a heading whose brackets hold no unit is all name."""
-    found = _BRACKETED.fullmatch(heading.strip())
-    if found is None:
+    """Split `speed [rpm]` into `speed` and `rpm`; without a unit in brackets, all is the name."""
+    match = _BRACKETED.fullmatch(heading.strip())
+    if match is None:
         return heading.strip(), ""
-    unit = (found["square"] if found["square"] is not None else found["round"]).strip()
+    unit = (match["square"] if match["square"] is not None else match["round"]).strip()
     if not unit or unit.lower() in NO_UNIT:
-        return (heading.strip(), "") if unit.isdigit() else (found["name"], "")
-    return (found["name"], unit) if is_unit(unit) else (heading.strip(), "")
+        return (heading.strip(), "") if unit.isdigit() else (match["name"], "")
+    return (match["name"], unit) if is_unit(unit) else (heading.strip(), "")

@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     from campaign.physics.bench import Bench
 
 PLAIN = ("", "1", "-")
-"""How people write that a number has no unit."""
+"""Spellings of a unit for numbers without one."""
 AT_REST = "the hull is taken to be at rest, so the load's rate in space is that to the hull"
 GEARED = "divided by the ratio of the gear; without `[gear]` in the bench that is 1, a direct drive"
 
 
 @dataclass(frozen=True)
 class RigFacts:
-    """What of a rig turns one channel into another; None where it is not known.
+    """Parameters of a rig that derive one channel from another; None if unknown.
 
     Attributes:
-        axis: how the axis moves; `motor` how its motor does.
-        ratio: N, motor rate over load rate; 1 without a gear, where the motor drives directly.
+        axis, motor: kind of motion of the axis and of its motor.
+        ratio: N, motor rate over load rate; 1 without a gear (direct drive).
         torque_per_current: drive torque at the load per ampere (N m/A).
     """
 
@@ -53,7 +53,7 @@ class RigFacts:
 
     @classmethod
     def of(cls, bench: Bench) -> RigFacts:
-        """The facts of a bench, as far as it has them."""
+        """The known parameters of a bench."""
         return cls(
             bench.sides.load, bench.sides.motor, bench.ratio or 1.0, bench.torque_per_current
         )
@@ -62,12 +62,12 @@ class RigFacts:
 def made_of_column(
     name: str, entry: ChannelColumn, cells: Cells, stated: str, rig: RigFacts
 ) -> ChannelSource:
-    """The channel that a column is.
+    """The channel of a column.
 
     Args:
         stated: the unit that the file states; "" for none.
 
-    Raises ValueError with a message for the user where units do not go together.
+    Raises ValueError with a message for the user if units do not match.
     """
     written = entry.unit or stated
     if not written and _info(name, entry, rig, None).unit:
@@ -95,18 +95,18 @@ def made_of_column(
 def made_of_channel(
     name: str, entry: ChannelColumn, source: ChannelSource, rig: RigFacts
 ) -> ChannelSource:
-    """The channel that is derived from another, as the mapping says.
+    """The channel that the mapping derives from another.
 
-    Raises ValueError where nothing leads from one to the other.
+    Raises ValueError if it is no multiple, derivative or integral of the other.
     """
     what = _info(name, entry, rig, None)
     number, by = _times(entry)
-    ways: tuple[tuple[Literal["copy", "derivative", "integral"], str], ...] = (
+    candidates: tuple[tuple[Literal["copy", "derivative", "integral"], str], ...] = (
         ("copy", "1"),
         ("derivative", "1/s"),
         ("integral", "s"),
     )
-    for how, per in ways:
+    for how, per in candidates:
         unit = _unit(source.unit) * by * _unit(per)
         if unit.dimensions == _unit(what.unit).dimensions:
             shares = _relative(entry, number), source.relative_uncertainty
@@ -134,7 +134,7 @@ def _made(name: str, what: ChannelInfo, **of: Any) -> ChannelSource:
 
 
 class _Way(NamedTuple):
-    """How a channel follows from another one, where the rig is known well enough."""
+    """Derivation of a channel from another one; its factor is None if the rig is unknown."""
 
     name: str
     source: str
@@ -151,53 +151,53 @@ _WAYS = (
     _Way(GYRO_RATE, RELATIVE_RATE, "copy", lambda rig: 1.0, f"; {AT_REST}"),
     _Way(DRIVE_TORQUE, MOTOR_CURRENT, "copy", lambda rig: rig.torque_per_current),
 )
-"""What suffices for a channel that nobody recorded, the best first; what is made on the way to
-another one comes before it."""
+"""Derivations of channels that were not recorded, the best first; intermediate channels come
+before those that depend on them."""
 
 
 def _ways(have: Collection[str], rig: RigFacts) -> dict[str, _Way]:
-    """How each channel that there is not follows from those that there are."""
-    found: dict[str, _Way] = {}
-    for way in _WAYS:
-        known = {*have, *found}
-        if way.name not in known and way.source in known and way.factor(rig):
-            found[way.name] = way
-    return found
+    """Derivations of the missing channels from the available ones, by name."""
+    result: dict[str, _Way] = {}
+    for step in _WAYS:
+        known = {*have, *result}
+        if step.name not in known and step.source in known and step.factor(rig):
+            result[step.name] = step
+    return result
 
 
 def sufficient(have: Collection[str], rig: RigFacts) -> frozenset[str]:
-    """The channels that there are, and those that follow from them."""
+    """The available channels and those derived from them."""
     return frozenset((*have, *_ways(have, rig)))
 
 
 def following(
     wanted: Collection[str], have: Mapping[str, ChannelSource], rig: RigFacts
 ) -> Iterator[tuple[ChannelSource, str]]:
-    """Channels that are wanted and not there, made of others, and what to remark; in their order.
+    """The wanted channels that are missing, derived from others, each with a remark.
 
-    A channel on the way to a wanted one comes before it.
+    An intermediate channel comes before the channel that depends on it.
     """
-    ways, known = _ways(have, rig), dict(have)
+    derivations, known = _ways(have, rig), dict(have)
     for name in sorted(wanted):
         path: list[_Way] = []
-        while name not in known and name in ways:
-            path.append(ways[name])
-            name = ways[name].source
-        for way in reversed(path):
-            made = known[way.name] = _made(
-                way.name,
-                info(way.name, axis=rig.axis),
-                how=way.how,
-                source=way.source,
-                factor=way.factor(rig) or 1.0,
-                relative_uncertainty=known[way.source].relative_uncertainty,
+        while name not in known and name in derivations:
+            path.append(derivations[name])
+            name = derivations[name].source
+        for step in reversed(path):
+            made = known[step.name] = _made(
+                step.name,
+                info(step.name, axis=rig.axis),
+                how=step.how,
+                source=step.source,
+                factor=step.factor(rig) or 1.0,
+                relative_uncertainty=known[step.source].relative_uncertainty,
             )
-            verb = "the derivative of" if way.how == "derivative" else "made of"
-            yield made, f"{way.name} is {verb} {way.source}{way.remark}"
+            verb = "the derivative of" if step.how == "derivative" else "made of"
+            yield made, f"{step.name} is {verb} {step.source}{step.remark}"
 
 
 def _info(name: str, entry: ChannelColumn, rig: RigFacts, unit: Unit | None) -> ChannelInfo:
-    """What a channel is; one of the laboratory's own has the unit it is written in."""
+    """Name, unit and label of a channel; a laboratory's own channel keeps the mapping's unit."""
     if name == COMMAND and unit is not None:
         for mode in ("rate", "torque"):
             what = info(COMMAND, mode, axis=rig.axis)
@@ -232,14 +232,14 @@ def _times(entry: ChannelColumn) -> tuple[float, Unit]:
 
 
 def _relative(entry: ChannelColumn, number: float) -> float | None:
-    """The uncertainty of `times`, or of the scale, as a share of it; None where none is stated."""
+    """Relative uncertainty of `times`, or of the scale; None if not stated."""
     if not entry.uncertainty:
         return None
     error, unit = split_quantity(entry.uncertainty)
     if error < 0:
         raise ValueError(f"the uncertainty {entry.uncertainty!r} is negative")
     if unit.strip() == "%":
-        return error / 100.0  # of 'times', whatever it is in
+        return error / 100.0  # of 'times', in any unit
     if not entry.times:
         raise ValueError(
             f"the uncertainty {entry.uncertainty!r} needs a 'times' that it is of; without one "

@@ -1,7 +1,7 @@
 """The origin of an imported trial's samples, as a complete tree.
 
-It is made from a mapping when a plan is made, stands in the trial (`Trial.recording`), and is all
-that is needed to read the samples, today and when a run is resumed: nothing is looked up again.
+Planning makes it from a mapping and stores it in the trial (`Trial.recording`). It is sufficient to
+read the samples, now and when a run is resumed, without the mapping.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class ChannelSource(Options):
 
     @property
     def info(self) -> ChannelInfo:
-        """What is announced of it."""
+        """Name, unit and rate of the channel for a recording."""
         return ChannelInfo(
             self.name, self.unit, self.label, self.display_unit, own_rate=self.own_rate
         )
@@ -128,18 +128,18 @@ class RecordingDescription(Options):
 
     @property
     def label(self) -> str:
-        """Where it is, for people."""
+        """Files and first row, for messages."""
         return label(self.files, self.first)
 
 
 def label(files: Sequence[FileSnapshot], first: int = 0) -> str:
-    """Files from a row on, for people."""
+    """Names of files and the first row, for messages."""
     names = " and ".join(each.name for each in files)
     return f"{names} from row {first + 1}" if first else names
 
 
 def file_used(path: Path, name: str) -> FileSnapshot:
-    """A file with its digest. Raises RecordingError when it cannot be read."""
+    """A file with its digest. Raises RecordingError if it cannot be read."""
     with regular(path) as file:
         digest, size = hashlib.file_digest(file, "sha256"), file.tell()
     return FileSnapshot(name=name, path=str(path.resolve()), sha256=digest.hexdigest(), size=size)

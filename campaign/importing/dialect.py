@@ -1,12 +1,11 @@
 """Dialect of a text table: encoding, separator, decimal sign, first row.
 
-Nothing is taken for granted of the first line. A way of reading is tried on the end of a sample,
-where the rows are, and followed upwards; what is above is heading. The way that makes most of the
-rows into numbers is the file's, and a second one that does as well is a doubt for the reader.
+The first line proves nothing. Each dialect is tried on the end of a sample, where the rows are, and
+then upwards; the lines above the rows are the heading. The dialect that makes most of the rows
+numbers is selected; a second one that fits as well is a doubt for the user.
 
-Of what is above, rows belong to the columns: names, and units, wherever they are. Instruments have
-habits of their own: names in the row of units, channels by number, a key and its value for each
-column.
+Some rows of the heading hold names or units of the columns. Instruments differ: names in the row of
+units, channels by number, a key and its value for each column.
 """
 
 from __future__ import annotations
@@ -30,24 +29,24 @@ from campaign.importing.cells import (
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", "|": "bar", " ": "blanks"}
 ENDS = 20
-"""Rows at the end of a sample by which a way of reading is judged first."""
+"""Number of rows at the end of a sample on which a dialect is tried first."""
 MOST = 3
-"""Rows of a heading that belong to columns: names, units, and one more."""
+"""Maximum number of heading rows about columns: names, units, and one more."""
 Heading = tuple[tuple[str, ...], tuple[str, ...]]
 """Names and units."""
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a file writes its table.
+    """The notation of a text table.
 
     Attributes:
         first: line of the first row, from 1.
-        width: cells of a row as split; the last may be empty in all of them, and is then no column.
+        width: cells of a split row; if the last is empty in all rows, it is no column.
         numeric: for each column, whether its cells are numbers.
-        comments: a row may go on after its cells, with words that are no column.
-        sheet: of a workbook whose rows are read as lines.
-        doubts: other ways of reading that fit as well, in words.
+        comments: text may follow the cells of a row.
+        sheet: sheet of a workbook whose rows are read as lines.
+        doubts: other dialects that fit as well, in words.
     """
 
     separator: str
@@ -63,7 +62,7 @@ class Dialect:
 
     @classmethod
     def of_numbers(cls, separator: str, decimal: str, first: int, names: Sequence[str]) -> Dialect:
-        """Of a file that says itself how it is written: columns of numbers, then anything."""
+        """The dialect of a file that states its notation: columns of numbers, then anything."""
         count = len(names)
         some, all_ = ("",) * count, (True,) * count
         return cls(separator, decimal, first, count, tuple(names), some, all_, comments=True)
@@ -72,19 +71,19 @@ class Dialect:
         return split(line, self.separator)
 
     def place(self, column: int) -> str:
-        """Where a column is, for people."""
+        """The place of a column, for messages."""
         return f"column {_letters(column) if self.sheet else column + 1}"
 
     def problem(
         self, path: Path, row: int, message: str, line: str = "", place: int = 0
     ) -> Problem:
-        """What is wrong with a cell, where a person finds it."""
+        """A problem of a cell, with its place in the file."""
         if self.sheet:
             return Problem(path, 0, 0, f"{self.sheet}!{_letters(place)}{row}: {message}")
         if self.separator == " ":
             word = list(re.finditer(r"\S+", line))[place : place + 1]
             return Problem(path, row, word[0].start() + 1 if word else 1, message)
-        before = line.split(self.separator)[:place]  # of quoted cells about there
+        before = line.split(self.separator)[:place]  # approximate for quoted cells
         return Problem(path, row, sum(len(cell) + 1 for cell in before) + 1, message)
 
 
@@ -94,7 +93,7 @@ def _letters(place: int) -> str:
 
 
 def encoding_of(head: bytes, whole: bool) -> str:
-    """A codec that decodes a file that begins with `head`; `whole`: there is no more of it."""
+    """A codec for a file that begins with `head`; `whole`: `head` is the complete file."""
     marks = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
     for mark, codec in marks.items():
         if head.startswith(mark):
@@ -104,39 +103,39 @@ def encoding_of(head: bytes, whole: bool) -> str:
     try:
         head.decode("utf-8")
     except UnicodeDecodeError as error:
-        # A character cut by the end of the sample is no proof of anything.
+        # A character that the end of the sample cuts is no evidence.
         return "utf-8" if not whole and error.start > len(head) - 4 else "cp1252"
     return "utf-8"
 
 
 def split(line: str, separator: str) -> list[str]:
-    """The cells of a line, without the blanks around them."""
+    """The cells of a line, without surrounding blanks."""
     if separator == " ":
         return line.split()
     if '"' in line:
         line = line.strip("\r\n")
         try:
             return [plain(cell) for cell in next(csv.reader([line], delimiter=separator), [])]
-        except csv.Error:  # a quote that never ends, or no quote at all
+        except csv.Error:  # an unclosed quote, or a quotation mark as text
             return [plain(cell) for cell in line.split(separator)]
     return [plain(cell) for cell in line.rstrip("\r\n").split(separator)]
 
 
 def dialect_of(lines: Sequence[str]) -> Dialect | None:
-    """How these lines, the beginning of a file, write their table; None where they hold none."""
-    found = [
+    """The dialect of a table in the first lines of a file; None if they hold no table."""
+    fitting = [
         each
         for separator in SEPARATORS
         for decimal in ".,"
         if separator != decimal and (each := read_as(lines, separator, decimal)) is not None
     ]
-    if not found:
+    if not fitting:
         return None
-    found.sort(key=lambda each: each[0], reverse=True)
-    fit, best = found[0]
+    fitting.sort(key=lambda each: each[0], reverse=True)
+    fit, best = fitting[0]
     doubts = (
         f"{_in_words(other)} would fit as well"
-        for its, other in found[1:]
+        for its, other in fitting[1:]
         if its[:2] == fit[:2] and _differ(best, other, lines)
     )
     return replace(best, doubts=tuple(islice(doubts, 1)))
@@ -145,10 +144,10 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
 def read_as(
     lines: Sequence[str], separator: str, decimal: str
 ) -> tuple[tuple[float, int, bool, int], Dialect] | None:
-    """What the lines hold when they are read in one way, and how well that fits; None: nothing.
+    """The quality of one way to read the lines, and its dialect; None if it gives no table.
 
-    That is the share of columns that are numbers, the rows, whether there are names, and how many
-    columns are numbers; the larger the better, from first to last.
+    The quality is the share of numeric columns, the number of rows, whether there are names, and
+    the number of numeric columns; larger is better, compared from first to last.
     """
     rows = [(place, split(line, separator)) for place, line in enumerate(lines) if line.strip()]
     while rows and not _has_number(rows[-1][1], decimal):  # an end mark, such as EOF
@@ -159,7 +158,7 @@ def read_as(
     end = rows[-min(ENDS, max(1, len(rows) // 2)) :]
     tail = [cells for _, cells in end if len(cells) == width]
     numeric = [_all_numbers([cells[k] for cells in tail], decimal) for k in range(width)]
-    # The last rows may be the only ones of their kind, such as sums: they must be most of the end.
+    # The last rows may be exceptions, such as sums: rows of their width must be most of the end.
     if not any(numeric) or 2 * len(tail) < len(end):
         return None
 
@@ -171,26 +170,26 @@ def read_as(
         )
 
     fits = [is_row(cells) for _, cells in rows]
-    # The table begins at the first row that fits, of which most of what follows fits as well: a
-    # broken row in between is a broken row, and what is above it no heading.
+    # The table begins at the first fitting row after which most rows fit as well: a broken row
+    # within the table does not turn the rows above it into a heading.
     begins = (k for k, fit in enumerate(fits) if fit and 2 * sum(fits[k:]) > len(fits) - k)
     start = next(begins, None)
     if start is None:
         return None
     while start and _looks_like_row(rows[start - 1][1], width, decimal):
-        start -= 1  # a broken row that would be taken for heading
+        start -= 1  # a broken row, no heading
     body, first = rows[start:], rows[start][0]
     columns = width
     if columns > 1 and all(cells[-1] == "" for _, cells in body if len(cells) == width):
         columns -= 1  # every row ends with a separator
     names, units = heading([cells for _, cells in rows[:start]], columns)
     kept = tuple(numeric[:columns])
-    found = Dialect(separator, decimal, first + 1, width, names, units, kept)
-    return (sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), found
+    dialect = Dialect(separator, decimal, first + 1, width, names, units, kept)
+    return (sum(kept) / columns, sum(fits[start:]), bool(names), sum(kept)), dialect
 
 
 def _looks_like_row(cells: Sequence[str], width: int, decimal: str) -> bool:
-    """Whether a line above the table has so many numbers that it is a row of it, and no heading."""
+    """Whether at least half of the cells of a line are numbers: a row of the table, no heading."""
     numbers = sum(is_number(cell, decimal) for cell in cells)
     return len(cells) > 1 and 2 * numbers >= max(len(cells), width)
 
@@ -204,7 +203,7 @@ def _all_numbers(cells: Sequence[str], decimal: str) -> bool:
 
 
 def _differ(one: Dialect, other: Dialect, lines: Sequence[str]) -> bool:
-    """Whether the first row means something else when it is read the other way."""
+    """Whether the first row has another meaning in the other dialect."""
     line = lines[one.first - 1]
     return (one.split(line), one.decimal) != (other.split(line), other.decimal) and (
         one.split(line) != other.split(line) or any("." in c or "," in c for c in one.split(line))
@@ -217,13 +216,13 @@ def _in_words(dialect: Dialect) -> str:
 
 
 def heading(above: Sequence[list[str]], columns: int) -> Heading:
-    """What the rows above a table say of its columns; no names where they say none."""
+    """Names and units of columns, from the rows above a table; no names if there are none."""
     near = takewhile(lambda cells: len(cells) in (columns, columns + 1), reversed(above[-MOST:]))
     rows = [cells for cells in reversed(list(near)) if any(cells)]
     paired = _pairs(rows, columns)
     if paired is not None:
         return paired
-    # Of comments only the last can be a heading, and the one above it if that is of units; those
+    # Only the last comment can be a heading, or the last two if the last holds units; comments
     # above are sentences.
     commented = [k for k, cells in enumerate(rows) if cells[0][:1] in ("#", "%")]
     if commented:
@@ -232,8 +231,8 @@ def heading(above: Sequence[list[str]], columns: int) -> Heading:
         named = last - 1 in commented and any(bare) and _all_units(bare)
         rows = rows[last - named :]
     rows = [_unmarked(cells) for cells in rows]
-    # A mark of a comment may be a cell of its own. An index without a name is a column, and so is
-    # one without a unit; what is one cell too long then ends with a separator.
+    # A comment mark may be a separate cell. An index without a name or a unit is still a column;
+    # such a row is then one cell too long because it ends with a separator.
     marked = [not cells[0] and len(cells) > columns and cells[-1] != "" for cells in rows]
     rows = [cells[m : columns + m] for cells, m in zip(rows, map(int, marked), strict=True)]
     while rows and any(map(_is_any_number, rows[0])) and not _are_channels(rows):
@@ -246,7 +245,7 @@ def heading(above: Sequence[list[str]], columns: int) -> Heading:
 
 
 def _unmarked(cells: Sequence[str]) -> list[str]:
-    """Without the mark of a comment, which hides the quotes of the cell behind it."""
+    """A row without the comment mark, and without the quotes after that mark."""
     bare = cells[0].lstrip("#% ")
     quoted = bare != cells[0] and len(bare) > 1 and bare[0] == bare[-1] == '"'
     return [bare[1:-1] if quoted else bare, *cells[1:]]
@@ -255,7 +254,7 @@ def _unmarked(cells: Sequence[str]) -> list[str]:
 def _named(rows: Sequence[list[str]], columns: int) -> Heading:
     named = next((k for k, cells in enumerate(rows) if not _all_units(cells)), None)
     if named is None:
-        # A single row of what may all be units is a row of names: t, A, V.
+        # A single row in which all cells may be units holds names: t, A, V.
         return tuple(rows[-1]) if len(rows) == 1 else (), ("",) * columns
     split_up = [name_and_unit(cell) for cell in rows[named]]
     names, units = (tuple(each) for each in zip(*split_up, strict=True))
@@ -264,7 +263,7 @@ def _named(rows: Sequence[list[str]], columns: int) -> Heading:
             below = (without_brackets(cell) for cell in cells)
             units = tuple(own or other for own, other in zip(units, below, strict=True))
         elif cells[0] and is_unit(cells[0]) and all(cells):
-            # A unit of time, and the names of what was recorded in place of the other units.
+            # A unit of time, and names of signals in place of the other units.
             names = (names[0], *cells[1:])
             units = (units[0] or without_brackets(cells[0]), *units[1:])
     return names, units

@@ -1,6 +1,6 @@
 """Contents of an imported file: named columns on clocks.
 
-Nothing is converted here and nothing is guessed: a unit is text, a number what was written.
+Nothing is converted or guessed: units are text, numbers are as written.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from campaign.text import nearest
 
 Array = NDArray[np.float64]
 HEAD = 1 << 16
-"""Bytes by which a format is recognised, and an encoding judged."""
+"""Number of bytes from which format and encoding are recognized."""
 ROWS = 65_536
-"""Most rows of a block: memory does not grow with a recording."""
+"""Maximum number of rows of a block: memory does not grow with a recording."""
 
 LARGEST_PART = 1 << 28
-"""Bytes that what is read at once may unpack to, however small it is packed."""
+"""Maximum unpacked size (bytes) of data that is read at once."""
 MOST_UNPACKED = 1 << 33
-"""Bytes that a file may unpack to."""
+"""Maximum unpacked size (bytes) of a file."""
 
 LISTED = 5000
-"""Files of a folder among which a name that is not there is looked for."""
+"""Maximum number of files in a folder to search for a similar name."""
 
 
 class RecordingError(UsageError):
-    """A file that cannot be read as recordings: all that is wrong with it, placed."""
+    """A file that cannot be read as recordings: all its problems with their places."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -43,23 +43,23 @@ class RecordingError(UsageError):
 
     @classmethod
     def of(cls, path: Path, message: str, line: int = 0, column: int = 1) -> RecordingError:
-        """One thing that is wrong with a file, or with a line of it (from 1)."""
+        """An error with one problem of a file, or of a line of it (from 1)."""
         return cls([Problem(path, line, column if line else 0, message)])
 
 
 @contextmanager
 def read_by(package: str, path: Path, what: str, extra: str = "") -> Iterator[None]:
-    """A library reads the file; whatever a broken one leads it to becomes a RecordingError.
+    """Convert any error of a library that reads the file within the block to RecordingError.
 
     Args:
         what: kind of file, for the message.
-        extra: of this program, by which the library is installed where it is missing.
+        extra: extra of this program that installs the library.
     """
     try:
         yield
     except RecordingError:
         raise
-    except Exception as error:  # noqa: BLE001 - libraries raise all there is
+    except Exception as error:  # noqa: BLE001 - libraries raise errors of any type
         if extra and isinstance(error, ImportError):
             message = f"reading it needs {package}: pip install 'campaign[{extra}]'"
             raise RecordingError.of(path, message) from None
@@ -69,9 +69,9 @@ def read_by(package: str, path: Path, what: str, extra: str = "") -> Iterator[No
 
 @contextmanager
 def regular(path: Path) -> Iterator[BufferedReader]:
-    """A regular file, open; raises RecordingError where it cannot be read, and for any other.
+    """An open regular file; raises RecordingError for unreadable files and other kinds.
 
-    A pipe or a device is not opened: it has no end.
+    A pipe or a device is not opened: it may have no end.
     """
     try:
         mode = path.stat().st_mode
@@ -82,12 +82,12 @@ def regular(path: Path) -> Iterator[BufferedReader]:
         with path.open("rb") as file:
             yield file
     except (OSError, ValueError) as error:
-        told = getattr(error, "strerror", None) or str(error)
+        cause = getattr(error, "strerror", None) or str(error)
         names = []
         if isinstance(error, FileNotFoundError):
             with suppress(OSError):
                 names = [each.name for each in islice(path.parent.iterdir(), LISTED)]
-        message = f"it cannot be opened: {told}{nearest(path.name, names)}"
+        message = f"it cannot be opened: {cause}{nearest(path.name, names)}"
         raise RecordingError.of(path, message) from None
 
 
@@ -96,10 +96,10 @@ class Column:
     """One column of a table.
 
     Attributes:
-        name: as the file has it, nothing added; two columns may have one name.
-        unit: as the file states it; "" where it states none.
-        place: where in the file, for people: `column 3`, `rec1.Y(2)`.
-        numeric: whether its cells are numbers; others may only be looked at.
+        name: exactly as in the file; two columns may have the same name.
+        unit: as the file states it; "" if it states none.
+        place: place in the file, for messages: `column 3`, `rec1.Y(2)`.
+        numeric: whether its cells are numbers; only such columns can be read.
     """
 
     name: str
@@ -121,11 +121,11 @@ class Table:
     """Columns of one length that were sampled together.
 
     Attributes:
-        name: of the part of the file; "" where the file has only one.
-        clock: None where time is a column, or is not told.
-        doubts: how else the file could be read, in words.
+        name: of the part of the file; "" if the file has only one.
+        clock: None if time is a column or not stated.
+        doubts: other possible readings of the file, in words.
         read: blocks of at most `ROWS` rows of the columns at the given places (from 0), in order:
-            shape (k, len(places)), NaN where a cell is empty. Raises RecordingError.
+            shape (k, len(places)), NaN for an empty cell. Raises RecordingError.
     """
 
     name: str
@@ -137,12 +137,12 @@ class Table:
 
 @dataclass(frozen=True)
 class RecordingFormat:
-    """A format of recordings, as it is found by its name.
+    """A format of recordings, registered by its name.
 
     Attributes:
-        endings: of its files, lower case: `.csv`.
-        recognises: whether a file is one, from its first 64 KiB at most; never raises.
-        tables: what is in a file. Raises RecordingError where it cannot be read.
+        endings: file name extensions, lower case: `.csv`.
+        recognises: whether a file has the format, by its first 64 KiB; never raises.
+        tables: the tables of a file. Raises RecordingError if it cannot be read.
     """
 
     name: str

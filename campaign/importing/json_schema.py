@@ -18,7 +18,7 @@ TABLES: dict[str, type[BaseModel]] = {
 
 
 def mapping_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
-    """Of a mapping with these experiments."""
+    """Schema of a mapping with these experiments."""
     tree = protocol_schema(experiments)
     for name, model in TABLES.items():
         table = schema_of_model(model)

@@ -50,7 +50,7 @@ DRIFTS = (
     "it is zero where the trial begins, and what that channel reads at rest makes it drift; "
     "'offset' of its column takes that out"
 )
-"""What is to be known of a channel that adds another one up."""
+"""Remark on a channel that is the integral of another."""
 
 
 def describe(
@@ -61,19 +61,19 @@ def describe(
     rig: RigFacts,
     wanted: Collection[str],
 ) -> tuple[OpenedFiles, tuple[tuple[RecordingDescription, Stretch], ...]]:
-    """The trials that an entry's files hold; the files are left open.
+    """The trials in the files of an entry; the files stay open.
 
     Args:
-        paths, names: of the files, and as the mapping writes them.
-        wanted: channels that are made of others where no column is one.
+        paths, names: paths of the files, and their names in the mapping.
+        wanted: channels to derive from others if no column provides them.
 
-    Raises RecordingError for the files, MappingError for what does not go with them.
+    Raises RecordingError for the files, MappingError for contradictions with the mapping.
     """
     opened = OpenedFiles(paths)
     used = tuple(file_used(*both) for both in zip(paths, names, strict=True))
-    found = _Finding(opened, entry, layout, rig, frozenset(wanted), used)
+    finding = _Finding(opened, entry, layout, rig, frozenset(wanted), used)
     try:
-        return opened, tuple(found.trials())
+        return opened, tuple(finding.trials())
     except BaseException:
         opened.__exit__()
         raise
@@ -81,7 +81,7 @@ def describe(
 
 @contextmanager
 def _collected(faults: list[MappingError]) -> Iterator[None]:
-    """What goes wrong in the block is told later, with all else that does."""
+    """Collect a MappingError of the block in `faults`, to report all errors together."""
     try:
         yield
     except MappingError as error:
@@ -98,7 +98,7 @@ class _Finding:
     used: tuple[FileSnapshot, ...]
 
     def trials(self) -> list[tuple[RecordingDescription, Stretch]]:
-        """Raises MappingError with everything that is wrong."""
+        """The described trials. Raises MappingError with all errors."""
         faults: list[MappingError] = []
         remarks: list[str] = []
         cells: dict[str, Cells] = {}
@@ -127,12 +127,12 @@ class _Finding:
         main = self._main(clocks)
         if chosen is not None and chosen.rows_of != main:
             raise MappingError(f"column {chosen.name!r} has another clock than the channels")
-        found = []
+        described = []
         for stretch in self._stretches(main, clocks[main], chosen):
             with _collected(faults):
-                found.append((self._described(main, stretch, made, clocks, remarks), stretch))
+                described.append((self._described(main, stretch, made, clocks, remarks), stretch))
         MappingError.together(faults)
-        return found
+        return described
 
     def _make(
         self,
@@ -141,7 +141,7 @@ class _Finding:
         made: dict[str, ChannelSource],
         remarks: list[str],
     ) -> None:
-        """Add a channel to those that are `made`; one whose source is wrong is left out."""
+        """Add a channel to `made`; omit it if its source has an error."""
         channel = self.layout.channels[name]
         if at := cells.get(name):
             if channel.filter:
@@ -159,12 +159,12 @@ class _Finding:
             raise MappingError(message, ("columns", name, "derive"))
 
     def _wrong(self, what: object, keys: Keys = (), first: int = 0) -> MappingError:
-        """What of these files, or of them from a row on, does not go with the mapping."""
+        """The error for these files, from row `first` on."""
         return MappingError(f"{label(self.used, first)}: {what}", keys)
 
     @contextmanager
     def _told(self, keys: Keys, first: int = 0) -> Iterator[None]:
-        """A ValueError in the block is told so."""
+        """Convert a ValueError of the block to a MappingError at `keys`."""
         try:
             yield
         except MappingError:
@@ -198,7 +198,7 @@ class _Finding:
         return ClockUsed(cells=cells, factor=float(one.factor))
 
     def _main(self, clocks: dict[tuple[int, int], ClockUsed]) -> tuple[int, int]:
-        """The table with the fastest clock, of several alike the longest: the others are held."""
+        """The table with the fastest clock, or the longest of these: the others are held."""
         if len(clocks) == 1:
             return next(iter(clocks))
 
@@ -238,7 +238,7 @@ class _Finding:
 
     def _after(self, clock: ClockUsed, duration: float, stop: int, rises: np.ndarray) -> np.ndarray:
         times = self.opened.times(clock, 0, stop)
-        # Half a sample early: times are written with finite digits.
+        # Half a sample early: times have finite digits.
         half = 0.5 * float(np.median(np.diff(times)))
         ends = np.searchsorted(times, times[rises] + duration - half, side="left")
         return np.where(times[rises] + duration - 2.0 * half > times[-1], stop + 1, ends)
@@ -299,9 +299,9 @@ class _Finding:
         return self._checked(described)
 
     def _checked(self, described: RecordingDescription) -> RecordingDescription:
-        """With what its channels show remarked, and scales that begin anew made continuous.
+        """The description with remarks on defects, and with the periods of channels to unwrap.
 
-        Raises MappingError for the defects that nobody has accepted.
+        Raises MappingError for defects that the mapping does not accept.
         """
         remarks = list(described.remarks)
         periods: dict[str, float] = {}
@@ -333,13 +333,13 @@ class _Finding:
         even: EvenClock,
         remarks: list[str],
     ) -> Iterator[ChannelSource]:
-        """The channels over an even clock: late ones put back, those of slower tables held."""
+        """The channels on an even clock: delays removed, values of slower tables held."""
         for name, one in made.items():
             if one.cells is not None:
                 delay = self.layout.channels[name].delay
                 if shift := round(delay * even.rate):
-                    told = f"{shift} samples, {shift / even.rate:.6g} s"
-                    remarks.append(f"{name} is put back by {told}")
+                    amount = f"{shift} samples, {shift / even.rate:.6g} s"
+                    remarks.append(f"{name} is put back by {amount}")
                 of: dict[str, object] = {"shift": shift}
                 if (table := one.cells.rows_of) != main:
                     of |= self._slower(clocks[table], table, even)

@@ -1,8 +1,8 @@
 """The mapping file: columns to channels, files to trials.
 
-A mapping is a protocol whose tests were executed elsewhere: `[columns.NAME]` tells how columns
-become channels, `[[test.recording]]` which files a test has in place of trials. What stands there
-is as written here; `channel_plan` makes numbers of it.
+A mapping is a protocol whose tests were executed elsewhere: `[columns.NAME]` maps columns to
+channels, `[[test.recording]]` gives a test files in place of trials. Values here are as written;
+`derived_channels` converts them to numbers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from campaign.text import nearest
 from campaign.units import Frequency, Time
 
 TIME = "time"
-"""The key of `[columns.NAME]` that is no channel."""
+"""The only key of `[columns.NAME]` that is no channel."""
 
 ChannelName = Annotated[
     str,
@@ -33,12 +33,12 @@ Repair = Literal["resample", "drop repeated", "mark gaps"]
 
 
 class MappingError(ValueError):
-    """What of a mapping does not go with its files.
+    """A contradiction between a mapping and its files.
 
     Attributes:
-        keys: where it stands, in `[[test.recording]]`; in `[columns.NAME]` behind "columns".
-        defect: the kind of what was found in the samples and nobody has accepted, as `clipping`.
-        others: what is wrong besides, told together with it.
+        keys: place of the error in `[[test.recording]]`; after "columns", in `[columns.NAME]`.
+        defect: kind of a defect of the samples that is not accepted, such as `clipping`.
+        others: further errors to report together with this one.
     """
 
     def __init__(self, message: str, keys: Keys = (), *, defect: str = "") -> None:
@@ -49,12 +49,12 @@ class MappingError(ValueError):
 
     @property
     def of_columns(self) -> bool:
-        """Whether it stands in `[columns.NAME]`."""
+        """Whether its place is in `[columns.NAME]`."""
         return self.keys[:1] == ("columns",)
 
     @classmethod
     def together(cls, faults: Sequence[MappingError]) -> None:
-        """Raise the first with the others; nothing where there are none."""
+        """Raise the first error with the others; return if there are none."""
         if faults:
             later = (each for one in faults[1:] for each in (one, *one.others))
             faults[0].others = (*faults[0].others, *later)
@@ -165,7 +165,7 @@ class RecordingEntry(Options):
 
     @property
     def choosing(self) -> tuple[Keys, str | int] | None:
-        """The column that tells trials apart, and where it is named."""
+        """The keys and the column that separates trials; None if the entry has none."""
         if self.each is not None:
             return ("each",), self.each
         for key, one in (("where", self.where), ("trigger", self.trigger)):
@@ -189,8 +189,8 @@ class Layout(Options):
 def layouts(
     columns: Mapping[str, Mapping[str, Any]], origin: Origin, problems: list[Problem]
 ) -> dict[str, Layout]:
-    """The layouts that are good; everything that is wrong with the others goes to `problems`."""
-    found = {}
+    """The valid layouts by name; problems of the others are appended to `problems`."""
+    valid_layouts = {}
     for name, table in columns.items():
         valid: dict[str, TimeColumn | ChannelColumn] = {}
         wrong: list[Problem] = []
@@ -216,9 +216,9 @@ def layouts(
         if isinstance(layout, list):
             wrong += layout
         elif not wrong:
-            found[name] = layout
+            valid_layouts[name] = layout
         problems += wrong
-    return found
+    return valid_layouts
 
 
 def recordings_of(
@@ -227,11 +227,11 @@ def recordings_of(
     problems: list[Problem],
     windows: Sequence[str] = (),
 ) -> list[tuple[int, RecordingEntry]]:
-    """The entries that are good, each with its place; what is wrong goes to `problems`.
+    """The valid entries, each with its index; problems are appended to `problems`.
 
-    `windows`: those that the test's experiment looks for; any when empty.
+    `windows`: window names that the experiment uses; if empty, any name is valid.
     """
-    found = []
+    valid_entries = []
     for index, tree in enumerate(entries):
         at = Within(origin, ("recording", index))
         valid = validate(RecordingEntry, tree, at)
@@ -242,8 +242,8 @@ def recordings_of(
         )
         problems += wrong
         if not wrong and not isinstance(valid, list):
-            found.append((index, valid))
-    return found
+            valid_entries.append((index, valid))
+    return valid_entries
 
 
 def _recording_faults(entry: RecordingEntry, windows: Sequence[str]) -> Iterator[Fault]:
@@ -262,7 +262,7 @@ def _recording_faults(entry: RecordingEntry, windows: Sequence[str]) -> Iterator
     several = [k for k in ("where", "each", "trigger") if getattr(entry, k) is not None]
     several += ["restarts"] * entry.restarts
     if len(several) > 1:
-        message = f"'{several[0]}' and '{several[1]}' both tell trials apart; one may"
+        message = f"'{several[0]}' and '{several[1]}' both separate trials; use one of them"
         yield (several[1],), "key", message
     if entry.trial is not None and several:
         message = f"'trial' says which trial it is, and '{several[0]}' that it may be several"
@@ -270,7 +270,7 @@ def _recording_faults(entry: RecordingEntry, windows: Sequence[str]) -> Iterator
 
 
 def _column_faults(entry: TimeColumn | ChannelColumn, others: Sequence[str]) -> Iterator[Fault]:
-    """What of an entry does not go together; `others`: the channels besides it."""
+    """Contradictions within an entry; `others`: the other channels."""
     if isinstance(entry, TimeColumn):
         if entry.column is not None and entry.sample_rate is not None:
             message = "'sample_rate' is for files without a column of times; remove one of the two"

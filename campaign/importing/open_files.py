@@ -1,7 +1,7 @@
 """Opened files of one recording: columns by name, and their values.
 
-Whoever checks, cuts and serves a recording reads parts of it many times, and text is slow to read:
-the columns of a table are read once, and kept, in memory while they are small, else on disk.
+Parts of a recording are read many times, and text is slow to read. Thus the columns of a table are
+read once and kept: in memory if small, else on disk.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from campaign.importing.mapping import ColumnPlace
 from campaign.text import nearest
 
 NAMED = 12
-"""columns that a message lists."""
+"""Maximum number of columns in a message."""
 IN_MEMORY = 1 << 24
-"""Bytes of a column; a longer one goes to a temporary file."""
+"""Bytes of a column in memory; a longer one is in a temporary file."""
 _BYTES = 8  # of a float64
 
 
 class OpenedFiles:
-    """The tables of some files. Used as a context manager.
+    """The tables of some files, as a context manager.
 
-    Making one raises RecordingError with everything that is wrong with the files.
+    The constructor raises RecordingError with all problems of the files.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.paths = tuple(paths)
-        found: list[Sequence[Table]] = []
+        tables: list[Sequence[Table]] = []
         problems: list[Problem] = []
         for path in paths:
             try:
-                found.append(open_recordings(path)[1])
+                tables.append(open_recordings(path)[1])
             except RecordingError as error:
                 problems += error.problems
         if problems:
             raise RecordingError(problems)
-        self.tables = tuple(found)
+        self.tables = tuple(tables)
         self._closing = ExitStack()
         self._wanted: dict[tuple[int, int], dict[int, SpooledTemporaryFile[bytes]]] = {}
         self._rows: dict[tuple[int, int], int] = {}
@@ -59,20 +59,20 @@ class OpenedFiles:
         return self.tables[file][table]
 
     def find(self, wanted: ColumnPlace, table: str = "") -> Cells:
-        """The column that is meant; it is wanted then. Raises ValueError with the names there are.
+        """Find a column and register it for reading. Raises ValueError with the existing names.
 
         Args:
-            table: the one to look in where `wanted` names none.
+            table: the table to search if `wanted` names none.
         """
         table = wanted.table or table
-        among = [
+        columns = [
             Cells(file=file, table=number, column=place, name=column.name)
             for file, tables in enumerate(self.tables)
             for number, each in enumerate(tables)
             for place, column in enumerate(each.columns)
             if table in ("", each.name) and wanted.file in (None, file + 1)
         ]
-        if not among:
+        if not columns:
             names = dict.fromkeys(t.name for tables in self.tables for t in tables if t.name)
             raise ValueError(
                 f"there is no table {table!r}; there are {', '.join(map(repr, names))}"
@@ -80,36 +80,36 @@ class OpenedFiles:
                 else "there is no such table"
             )
         if isinstance(wanted.column, int):
-            found = [each for each in among if each.column == wanted.column - 1]
+            hits = [each for each in columns if each.column == wanted.column - 1]
         else:
-            found = [each for each in among if each.name == wanted.column]
+            hits = [each for each in columns if each.name == wanted.column]
             written = _plain(wanted.column or "")
-            found = found or [each for each in among if written in _spellings(self.column(each))]
-        if len(found) > 1:
-            where = "; ".join(self._told(each) for each in found[:NAMED])
+            hits = hits or [each for each in columns if written in _spellings(self.column(each))]
+        if len(hits) > 1:
+            where = "; ".join(self._told(each) for each in hits[:NAMED])
             raise ValueError(
-                f"there are {len(found)} columns {wanted.column!r}: {where}; say which by 'table', "
+                f"there are {len(hits)} columns {wanted.column!r}: {where}; say which by 'table', "
                 "'file' or its place"
             )
-        if not found:
-            raise ValueError(_no_such(wanted.column, [each.name for each in among]))
-        if not self.column(found[0]).numeric:
-            raise ValueError(f"column {found[0].name!r} holds text and no numbers")
-        self.want(found[0])
-        return found[0]
+        if not hits:
+            raise ValueError(_no_such(wanted.column, [each.name for each in columns]))
+        if not self.column(hits[0]).numeric:
+            raise ValueError(f"column {hits[0].name!r} holds text and no numbers")
+        self.want(hits[0])
+        return hits[0]
 
     def column(self, cells: Cells) -> Column:
         return self.table(*cells.rows_of).columns[cells.column]
 
     def want(self, cells: Cells) -> None:
-        """This column will be read; said before the first of its table is."""
+        """Register a column for reading, before the first column of its table is read."""
         wanted = self._wanted.setdefault(cells.rows_of, {})
         if cells.column not in wanted:
             file = self._closing.enter_context(SpooledTemporaryFile(IN_MEMORY))  # noqa: SIM115
             wanted[cells.column] = file
 
     def part(self, cells: Cells, first: int, stop: int) -> Array:
-        """Rows [first, stop) of a column. Raises RecordingError where it cannot be read."""
+        """Rows [first, stop) of a column. Raises RecordingError if it cannot be read."""
         self.rows(*cells.rows_of)
         file = self._wanted[cells.rows_of][cells.column]
         file.seek(first * _BYTES)
@@ -122,7 +122,7 @@ class OpenedFiles:
         return clock.start + (clock.step or 1.0) * np.arange(first, stop, dtype=np.float64)
 
     def rows(self, file: int, table: int) -> int:
-        """How many rows a table has; its columns that are wanted have then been read."""
+        """Number of rows of a table; the first call reads its registered columns."""
         key = file, table
         if key not in self._rows:
             files, rows = self._wanted.get(key, {}), 0
@@ -149,7 +149,7 @@ def _no_such(wanted: str | int | None, columns: Sequence[str]) -> str:
 
 
 def _spellings(column: Column) -> set[str]:
-    """How a heading may stand in the file that a reader has parted into name and unit."""
+    """Spellings of a heading in the file, before it is split into name and unit."""
     ways = (" [{}]", " ({})", "/{}", " / {}", "_{}") if column.unit else ()
     return {_plain(column.name + how.format(column.unit)) for how in ("", *ways)}
 

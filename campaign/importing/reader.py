@@ -24,13 +24,13 @@ from campaign.importing.open_files import OpenedFiles
 from campaign.recording import Channel, Recording
 
 AT_ONCE = 2_000_000
-"""samples that are looked at together: memory does not grow with a recording."""
+"""Samples that are examined at once: memory does not grow with a recording."""
 
 
 class RecordingReader:
     """Channels of a recording over the trial's own time.
 
-    Raises RecordingError where its files are no longer what they were.
+    Raises RecordingError if its files have changed.
     """
 
     def __init__(self, described: RecordingDescription, opened: OpenedFiles) -> None:
@@ -49,7 +49,7 @@ class RecordingReader:
             self._positions = self._even().positions
 
     def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array, Array]]:
-        """Time (n,), samples (channels, n) in the order described, and which rows are lost (n,)."""
+        """Time (n,), samples (channels, n) in the described order, and mask of lost rows (n,)."""
         names = [each.name for each in self.described.channels]
         for first in range(0, self.described.samples, size):
             stop = min(first + size, self.described.samples)
@@ -70,22 +70,22 @@ class RecordingReader:
         return Recording(np.arange(count) / self.described.sample_rate, channels)
 
     def defects(self, gear: float | None) -> Iterator[Defect]:
-        """Of the channels that are columns, on the trial's own even clock; each kind once.
+        """Defects of the channels from columns, on the trial's even clock; each kind once.
 
-        A long recording is looked at part by part; rows are those of the trial.
+        A long recording is examined in parts; rows are those of the trial.
         """
-        told = self.described
-        names = [each.name for each in told.channels if each.how == "column"]
-        found = set()
-        for first in range(0, told.samples, AT_ONCE):
-            stop = min(first + AT_ONCE, told.samples)
+        recording = self.described
+        names = [each.name for each in recording.channels if each.how == "column"]
+        reported = set()
+        for first in range(0, recording.samples, AT_ONCE):
+            stop = min(first + AT_ONCE, recording.samples)
             if stop - first < 2 and first:
                 return
             samples = self.samples(names, first, stop)
-            time = np.arange(first, stop) / told.sample_rate
+            time = np.arange(first, stop) / recording.sample_rate
             for each in find(time, dict(zip(names, samples, strict=True)), gear=gear):
-                if (each.kind, each.channels) not in found:
-                    found.add((each.kind, each.channels))
+                if (each.kind, each.channels) not in reported:
+                    reported.add((each.kind, each.channels))
                     yield replace(each, rows=(each.rows[0] + first, each.rows[1] + first))
 
     def _channel(self, made: ChannelSource, first: int, stop: int) -> Array:
@@ -103,10 +103,9 @@ class RecordingReader:
         return made.factor * self.described.sample_rate * cut
 
     def _all_of(self, made: ChannelSource) -> Array:
-        """All of a channel of which no part stands alone; it is kept.
+        """All samples of an unwrapped or integrated channel, cached: they need all samples before.
 
-        One whose scale begins anew; or an integral, by trapezoids: behind a lost sample nothing of
-        it is known.
+        The integral uses trapezoids; after a lost sample it is unknown.
         """
         if made.name not in self._whole:
             plain = made.model_copy(update={"period": None})
@@ -129,18 +128,18 @@ class RecordingReader:
             low = begin + int(places[0])
             return self._opened.part(cells, low, low + stop - first)
         at = self._positions[places]
-        there = np.isfinite(at)
+        known = np.isfinite(at)
         values = np.full(len(at), np.nan)
-        if there.any():
-            low, high = int(np.floor(at[there].min())), int(np.ceil(at[there].max()))
+        if known.any():
+            low, high = int(np.floor(at[known].min())), int(np.ceil(at[known].max()))
             rows = self._opened.part(cells, begin + low, begin + high + 1)
-            values[there] = np.interp(at[there] - low, np.arange(len(rows)), rows)
+            values[known] = np.interp(at[known] - low, np.arange(len(rows)), rows)
         return values
 
     def _held(
         self, made: ChannelSource, cells: Cells, clock: ClockUsed, first: int, stop: int
     ) -> Array:
-        """Of another clock: the last value that was known at each time."""
+        """Samples of a channel on another clock: the last known value at each time."""
         count = self._opened.rows(*cells.rows_of)
         times = self._opened.times(clock, 0, count)
         values = self._opened.part(cells, 0, count)
@@ -151,7 +150,7 @@ class RecordingReader:
         # Half a millionth of a sample: both clocks are written with finite digits.
         slack = 5e-7 / self.described.sample_rate
         index = np.searchsorted(times, at + slack, side="right") - 1
-        # Before its first value and a step behind its last one nothing is known.
+        # Unknown before the first value and later than a step after the last one.
         step = (times[-1] - times[0]) / max(count - 1, 1)
         known = (index >= 0) & (at <= times[-1] + step + slack)
         return np.where(known, values[np.maximum(index, 0)], np.nan)
@@ -164,17 +163,17 @@ class RecordingReader:
         return lost
 
     def _even(self) -> EvenClock:
-        told = self.described
+        recording = self.described
         try:
-            times = partial(self._opened.times, told.clock)
-            return even_clock(times, told.first, told.rows, told.repairs)
-        except ValueError as error:  # it was even when the plan was made
-            path = self._opened.paths[told.table[0]]
+            times = partial(self._opened.times, recording.clock)
+            return even_clock(times, recording.first, recording.rows, recording.repairs)
+        except ValueError as error:  # the file changed: the plan had an even clock
+            path = self._opened.paths[recording.table[0]]
             raise RecordingError.of(path, str(error)) from None
 
 
 def paths_unchanged(described: RecordingDescription) -> Sequence[Path]:
-    """The files of a recording. Raises RecordingError where one is not what it was."""
+    """The files of a recording. Raises RecordingError if one has changed."""
     paths = []
     for used in described.files:
         path = Path(used.path)

@@ -33,7 +33,7 @@ from campaign.units import to_si
 
 ROUNDING = 1e-9
 _FILE = re.compile(r"^.*?(?=(:\d+:\d+)?: )")
-"""What a message says first of which file it is about; rows are not part of it."""
+"""The file at the start of a message, without row and column."""
 NO_RECORDING = (
     "it has no recordings; add [[test.recording]] for each, or `campaign run` executes it"
 )
@@ -45,10 +45,10 @@ OUTSIDE = (
 
 @contextmanager
 def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
-    """The protocol with the trials of its recordings; their files are open until it is planned.
+    """The protocol with the trials of its recordings; the files stay open within the block.
 
-    Raises ProtocolError at the end of the block, with everything that is wrong with mapping and
-    files, and with the plan of the recordings that are good.
+    Raises ProtocolError at the end of the block, with all problems of the mapping, of the files
+    and of the plan of the valid recordings.
     """
     problems: list[Problem] = []
     origin = protocol.origin
@@ -65,19 +65,19 @@ def with_recordings(protocol: Protocol) -> Iterator[Protocol]:
 
 
 def _once(problems: Sequence[Problem]) -> list[Problem]:
-    """By place; what is wrong at one with many files alike is told of the first of them."""
-    alike: dict[tuple[Path, int, int, str], list[Problem]] = {}
+    """Problems sorted by place; those that differ only in the file are reported once."""
+    groups: dict[tuple[Path, int, int, str], list[Problem]] = {}
     for each in sorted(problems, key=lambda each: (str(each.file), each.line, each.column)):
         tail = _FILE.sub("", each.message)
-        alike.setdefault((each.file, each.line, each.column, tail), []).append(each)
+        groups.setdefault((each.file, each.line, each.column, tail), []).append(each)
     return [
         first if not more else replace(first, message=f"{first.message} ({len(more)} more alike)")
-        for first, *more in alike.values()
+        for first, *more in groups.values()
     ]
 
 
 def _of_file(what: Problem, at: Origin, paths: Sequence[Path], entry: RecordingEntry) -> Problem:
-    """What is wrong with a file, at its name in the mapping."""
+    """A problem of a file, placed at the file's name in the mapping."""
     several = not isinstance(entry.file, str) and what.file in paths
     keys = ("file", paths.index(what.file)) if several else ("file",)
     return at.problem(keys, "value", str(what))
@@ -85,7 +85,7 @@ def _of_file(what: Problem, at: Origin, paths: Sequence[Path], entry: RecordingE
 
 @dataclass(frozen=True)
 class TestRecording:
-    """One recording of a test: what its entry says, and what its files hold."""
+    """One recording of a test: its entry in the mapping, its description and its open files."""
 
     entry: RecordingEntry
     described: RecordingDescription
@@ -95,7 +95,7 @@ class TestRecording:
 
 @dataclass
 class _Loader:
-    """Problems go to `problems`, open files to `stack`."""
+    """Loader of recordings; appends to `problems`, registers open files with `stack`."""
 
     protocol: Protocol
     layouts: Mapping[str, Layout]
@@ -107,31 +107,31 @@ class _Loader:
         if not test.entry.recording:
             message = f"{shown(test.entry.name)}: {NO_RECORDING}"
             self.problems.append(origin.problem((), "key", message))
-        there = {"matrix": test.axes, "repeat": test.entry.repeat > 1, "truth": test.truth}
-        for key in (key for key, value in there.items() if value):
+        options = {"matrix": test.axes, "repeat": test.entry.repeat > 1, "truth": test.truth}
+        for key in (key for key, value in options.items() if value):
             message = f"a test with recordings has no {key!r}: each recording says what it is"
             self.problems.append(origin.problem((key,), "key", message))
         entries = recordings_of(
             test.entry.recording, origin, self.problems, test.experiment.windows
         )
         rig = RigFacts.of(Bench.model_validate(test.bench))
-        found = [
+        recordings = [
             each
             for index, entry in entries
             for each in self._found(test, Within(origin, ("recording", index)), entry, rig)
         ]
-        return replace(test, experiment=_kind(test.experiment, found))
+        return replace(test, experiment=_kind(test.experiment, recordings))
 
     def _found(
         self, test: Test, at: Origin, entry: RecordingEntry, rig: RigFacts
     ) -> list[TestRecording]:
         layout, folder = self._layout(at, entry), self.protocol.path.parent
         wanted = {*test.experiment.requires, *test.experiment.can_use}
-        found: list[TestRecording] = []
+        recordings: list[TestRecording] = []
         for written in self._files(at, entry):
             paths = [folder / each for each in written]
             try:
-                if layout is None:  # what can be said of its files is said all the same
+                if layout is None:  # report the problems of its files without a layout, too
                     OpenedFiles(paths)
                     continue
                 opened, trials = describe(entry, layout, paths, written, rig, wanted)
@@ -143,8 +143,8 @@ class _Loader:
                 self.problems += (self._placed(at, entry, each) for each in every)
                 continue
             self.stack.enter_context(opened)
-            found += (TestRecording(entry, *both, opened) for both in trials)
-        return found
+            recordings += (TestRecording(entry, *both, opened) for both in trials)
+        return recordings
 
     def _placed(self, at: Origin, entry: RecordingEntry, error: MappingError) -> Problem:
         if not error.of_columns:
@@ -179,38 +179,38 @@ class _Loader:
 
 
 def _matching(folder: Path, pattern: str) -> list[str]:
-    """Files below `folder` that the pattern matches; nothing outside is looked at.
+    """Files below `folder` that match the pattern, sorted; never searches outside it.
 
-    Raises ValueError where it leads out of the folder, or matches nothing.
+    Raises ValueError if the pattern leads out of the folder or matches no file.
     """
     parts = Path(pattern).parts
     if Path(pattern).anchor or ".." in parts:
         raise ValueError(f"a pattern {OUTSIDE}")
-    root, found = folder.resolve(), [""]
+    root, matches = folder.resolve(), [""]
     for part in parts:
-        found = [
+        matches = [
             os.path.join(base, name)  # noqa: PTH118 - as written, with no dot before it
-            for base in found
+            for base in matches
             for name in glob.glob(part, root_dir=folder / base)  # noqa: PTH207 - names alone
         ]
-        for each in found:
+        for each in matches:
             if not Path(os.path.realpath(folder / each)).is_relative_to(root):
                 raise ValueError(f"the link {shown(each)} {OUTSIDE}")
-    if not found:
+    if not matches:
         raise ValueError(f"no file of that name (looked in {folder})")
-    return sorted(found)
+    return sorted(matches)
 
 
 def _kind(experiment: ExperimentKind, found: Sequence[TestRecording]) -> ExperimentKind:
     planned = any(each.entry.trial is not None for each in found)
 
     def trials(options: Any, bench: Bench) -> Iterator[TrialRequest]:
-        asked = list(experiment.trials(options, bench)) if planned else []
+        requests = list(experiment.trials(options, bench)) if planned else []
         wrong = []
         for each in found:
             try:
                 if each.entry.trial is not None:
-                    yield _planned(each, asked)
+                    yield _planned(each, requests)
                 else:
                     yield from _offered(each, experiment, options, bench)
             except ValueError as error:
@@ -218,7 +218,7 @@ def _kind(experiment: ExperimentKind, found: Sequence[TestRecording]) -> Experim
         if wrong:
             raise ValueError("; ".join(wrong))
 
-    # Of what has been executed nothing is fitted, followed up or warned of.
+    # Executed trials have no stages and no warnings; only planned ones need fitted options.
     return replace(
         experiment,
         trials=trials,
@@ -232,33 +232,33 @@ def _kind(experiment: ExperimentKind, found: Sequence[TestRecording]) -> Experim
 
 
 def _planned(found: TestRecording, asked: Sequence[TrialRequest]) -> TrialRequest:
-    """The planned trial that a recording answers. Raises ValueError where it is none."""
-    number, told = found.entry.trial or 0, found.described
+    """The planned trial of a recording. Raises ValueError for a wrong number or a short file."""
+    number, record = found.entry.trial or 0, found.described
     if number > len(asked):
-        raise ValueError(f"{told.label}: there is no trial {number}; {len(asked)} are planned")
+        raise ValueError(f"{record.label}: there is no trial {number}; {len(asked)} are planned")
     request = asked[number - 1]
-    task, duration = request.task, told.samples / told.sample_rate
-    short = duration < task.duration * (1.0 - ROUNDING) - 1.5 / told.sample_rate
+    task, duration = request.task, record.samples / record.sample_rate
+    short = duration < task.duration * (1.0 - ROUNDING) - 1.5 / record.sample_rate
     if short and task.stop_rate is None:
         raise ValueError(
-            f"{told.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
+            f"{record.label}: it lasts {duration:.6g} s, and trial {number} {task.duration:.6g} s"
         )
-    count = min(told.samples, round(task.duration * told.sample_rate))
-    told = told.model_copy(update={"samples": count})
-    return _served(found, request, told, {**request.point, **_conditions(found)})
+    count = min(record.samples, round(task.duration * record.sample_rate))
+    record = record.model_copy(update={"samples": count})
+    return _served(found, request, record, {**request.point, **_conditions(found)})
 
 
 def _offered(
     found: TestRecording, experiment: ExperimentKind, options: Any, bench: Bench
 ) -> Iterator[TrialRequest]:
-    """The trials that a recording holds which nobody planned. Raises ValueError for none."""
-    told = found.described
-    duration = told.samples / told.sample_rate
+    """The trials in a recording without a planned trial; ValueError for a window outside it."""
+    record = found.described
+    duration = record.samples / record.sample_rate
     windows = tuple(Window(name, *ends) for name, ends in found.entry.windows.items())
     for window in windows:
         if not 0 <= window.start < window.stop <= duration * (1.0 + ROUNDING):
             raise ValueError(
-                f"{told.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
+                f"{record.label}: the window {window.name!r}, {window.start:g} to {window.stop:g} "
                 f"s, is no part of its {duration:.6g} s"
             )
     conditions = _conditions(found)
@@ -267,21 +267,21 @@ def _offered(
             mode="recorded",
             duration=duration,
             window=(windows[0].start, windows[0].stop) if windows else (0.0, duration),
-            sample_rate=told.sample_rate,
+            sample_rate=record.sample_rate,
         ),
         windows=windows,
     )
     requests: Iterable[TrialRequest] = [whole]
     if experiment.recorded is not None:
-        can = sufficient([each.name for each in told.channels], RigFacts.of(bench))
-        read = RecordingReader(told, found.opened).recording
-        offered = OfferedRecording(duration, told.sample_rate, can, conditions, windows, read)
+        usable = sufficient([each.name for each in record.channels], RigFacts.of(bench))
+        read = RecordingReader(record, found.opened).recording
+        offered = OfferedRecording(duration, record.sample_rate, usable, conditions, windows, read)
         try:
             requests = list(experiment.recorded(options, bench, offered))
         except ValueError as error:
-            raise ValueError(f"{told.label}: {error}") from None
+            raise ValueError(f"{record.label}: {error}") from None
     for request in requests:
-        part, point = _part(told, request.part), {**conditions, **request.point}
+        part, point = _part(record, request.part), {**conditions, **request.point}
         yield replace(_served(found, request, part, point), planned=False)
 
 
@@ -291,7 +291,7 @@ def _served(
     told: RecordingDescription,
     point: Mapping[str, JsonValue],
 ) -> TrialRequest:
-    """The trial that is served from what is told of a recording."""
+    """The request with the rate, duration and description of its recording."""
     rate = told.sample_rate
     return replace(
         request,
@@ -313,11 +313,11 @@ def _part(told: RecordingDescription, part: tuple[float, float] | None) -> Recor
 
 
 def _conditions(found: TestRecording) -> dict[str, JsonValue]:
-    """What was set for a recording, SI where it has a unit; and what tells its stretch apart."""
-    told: dict[str, JsonValue] = dict(found.stretch.conditions)
+    """Conditions of a recording and of its stretch; SI if the value has a unit."""
+    conditions: dict[str, JsonValue] = dict(found.stretch.conditions)
     for name, value in found.entry.conditions.items():
-        told[name] = value
+        conditions[name] = value
         if isinstance(value, str):
-            with suppress(ValueError):  # a word
-                told[name] = to_si(value)
-    return told
+            with suppress(ValueError):  # a word has no unit
+                conditions[name] = to_si(value)
+    return conditions

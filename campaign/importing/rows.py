@@ -1,7 +1,7 @@
 """Rows of a text table as numbers: a fast path, and cell by cell.
 
-A row that is not like the others is refused by line and column; it is never padded, and never moves
-the cells of the others. Memory holds one block, however long the file is.
+A row unlike the others is refused with its line and column; it is never padded, and never shifts
+cells. Memory holds one block, however long the file is.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from campaign.importing.dialect import Dialect, encoding_of
 from campaign.importing.interface import HEAD, ROWS, Array, Column, RecordingError
 
 LONGEST = 1 << 20
-"""Most characters of a line; what is longer is no table."""
+"""Maximum number of characters of a line; a longer line is no table."""
 WHOLE = 1 << 23
-"""Characters of a block, after which it ends: the lines of wide tables are long."""
+"""Number of characters after which a block ends: the lines of wide tables are long."""
 SAMPLE = 1 << 21
-"""Most characters by which a file is judged."""
+"""Maximum number of characters in the sample of a file."""
 FEW = 10
-"""Most problems that are told of a file."""
+"""Maximum number of reported problems of a file."""
 
 
 def encoding_of_file(path: Path) -> str:
-    """A codec that decodes a text file, by its beginning."""
+    """A codec for a text file, by its first bytes."""
     with path.open("rb") as raw:
         head = raw.read(HEAD)
         return encoding_of(head, whole=not raw.read(1))
 
 
 def lines_of(path: Path) -> Iterator[str]:
-    """Lines of a bounded length. Raises RecordingError for others, and for what is no text."""
+    """Lines of a file. Raises RecordingError for too long lines and for files that are no text."""
     number = 0
     with path.open(encoding=encoding_of_file(path)) as file:
         try:
@@ -54,28 +54,28 @@ def lines_of(path: Path) -> Iterator[str]:
 
 
 def beginning(path: Path, count: int) -> list[str]:
-    """The first lines of a file, fewer where they are long. Raises RecordingError as `lines_of`."""
+    """The first lines of a file, fewer if they are long. Raises RecordingError as `lines_of`."""
     return _up_to(lines_of(path), count, SAMPLE)
 
 
 def _up_to(lines: Iterator[str], count: int, size: int) -> list[str]:
-    """The next lines, `count` of them at most, and no further one once they have that size."""
-    found: list[str] = []
+    """The next lines: at most `count`, and none after they have `size` characters."""
+    block: list[str] = []
     for line in islice(lines, count):
-        found.append(line)
+        block.append(line)
         size -= len(line)
         if size <= 0:
             break
-    return found
+    return block
 
 
 def columns_of(dialect: Dialect) -> tuple[Column, ...]:
-    """The columns of a table of text; those without a name are called by their place."""
+    """The columns of a text table; a column without a name is named by its place."""
     names = dialect.names or [""] * len(dialect.numeric)
-    told = zip(names, dialect.units, dialect.numeric, strict=True)
+    headings = zip(names, dialect.units, dialect.numeric, strict=True)
     return tuple(
         Column(name or dialect.place(k), unit, dialect.place(k), numeric)
-        for k, (name, unit, numeric) in enumerate(told)
+        for k, (name, unit, numeric) in enumerate(headings)
     )
 
 
@@ -89,8 +89,8 @@ def blocks(
     """The columns at `places` of a table, shape (k, len(places)).
 
     Args:
-        rows: no further than these.
-        among: columns of the file that the table has; absent: all.
+        rows: maximum number of rows.
+        among: columns of the file in the table; None: all.
     """
     places = places if among is None else [among[place] for place in places]
     last = None if rows is None else dialect.first - 1 + rows
@@ -101,7 +101,7 @@ def blocks(
 def blocks_of(
     lines: Iterator[str], path: Path, dialect: Dialect, places: Sequence[int]
 ) -> Iterator[Array]:
-    """The same of lines, from the first row of the table on."""
+    """Blocks from lines that begin with the first row of the table."""
     number = dialect.first
     while block := _up_to(lines, ROWS, WHOLE):
         values = _quickly(block, dialect, places)
@@ -113,16 +113,16 @@ def blocks_of(
 
 
 def _quickly(lines: Sequence[str], dialect: Dialect, places: Sequence[int]) -> Array | None:
-    """Through numpy; None where any row is not exactly what is expected of it."""
+    """Values by numpy; None if any row differs from the expected form."""
     text = "".join(lines)
     separator = None if dialect.separator == " " else dialect.separator
     if separator is None:
         cells = [len(line.split()) for line in lines]
     else:
         cells = [line.count(separator) + 1 for line in lines]
-    # Cells that are too many would be dropped, and lacking ones not be missed.
+    # numpy would drop extra cells and would not notice missing ones.
     odd = min(cells) < dialect.width or (max(cells) > dialect.width and not dialect.comments)
-    # Points beside decimal commas may group thousands.
+    # Points may group thousands if the decimal sign is a comma.
     if odd or '"' in text or (dialect.decimal == "," and "." in text):
         return None
     try:
@@ -146,7 +146,7 @@ def _row_by_row(
     places: Sequence[int],
     further: Iterator[str],
 ) -> Array:
-    """What `_quickly` did not take: cells that hold no number, and whatever is wrong, placed."""
+    """Values of rows that `_quickly` refuses: cells without a number. Problems have their place."""
     values: list[list[float]] = []
     problems = []
     for offset, line in enumerate(lines):

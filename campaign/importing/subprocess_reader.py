@@ -1,7 +1,7 @@
-"""Reading in a process of its own, for libraries that broken files crash.
+"""Reading in a separate process, for libraries that crash on broken files.
 
-One process says which tables a file has; each reading of one is another, which pours its blocks
-into a pipe. Nothing is kept: memory does not grow with a file, and no copy of it is made.
+One process lists the tables of a file. Each reading of a table is another process, which writes
+its blocks to a pipe. Memory does not grow with the file, and no copy of it is made.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ import numpy as np
 from campaign.importing.interface import Array, Clock, Column, RecordingError, Table
 
 REFUSED = 3
-"""How the process ends that has said what is wrong; any other end is the library's."""
+"""Exit code of a process that reported the error; any other nonzero code is a crash."""
 PATIENCE = 600.0
-"""s; a file that is silent for longer has sent its library round in circles."""
+"""Longest wait for output (s); after that the library is in an endless loop."""
 _LENGTH = 8
-"""Bytes before a block that say how many rows it has; after the last there are none."""
+"""Bytes of the row count before each block; the count 0 ends the data."""
 
 
 def tables_streamed(module: str, path: Path) -> list[Table]:
-    """What `module.tables` finds in a file, asked in other processes. Raises RecordingError."""
+    """The tables of a file by `module.tables`, read in other processes. Raises RecordingError."""
     with _process(module, path, "tell") as read:
-        told = read()
-    found = []
-    for number, each in enumerate(json.loads(told)):
+        listing = read()
+    tables = []
+    for number, each in enumerate(json.loads(listing)):
         each["columns"] = tuple(Column(**column) for column in each["columns"])
         each["clock"] = each["clock"] and Clock(**each["clock"])
         each["doubts"] = tuple(each["doubts"])
-        found.append(Table(**{**each, "read": partial(_read, module, path, number)}))
-    return found
+        tables.append(Table(**{**each, "read": partial(_read, module, path, number)}))
+    return tables
 
 
 def _read(module: str, path: Path, number: int, places: Sequence[int]) -> Iterator[Array]:
@@ -50,25 +50,25 @@ def _read(module: str, path: Path, number: int, places: Sequence[int]) -> Iterat
 
 
 class _EndedEarlyError(Exception):
-    """The process says no more; how it ended tells why."""
+    """The output of the process ended early; its exit code gives the cause."""
 
 
 @contextmanager
 def _process(module: str, path: Path, *task: object) -> Iterator[Callable[..., bytes]]:
-    """A process that answers about a file; it ends with the block, and is ended when it is silent.
+    """A process that reads a file; it ends with the block, or after `PATIENCE` without output.
 
-    What is handed on reads so many bytes of what it says, or all; it raises _EndedEarlyError for
-    fewer.
+    Yields a function that reads the given number of bytes of its output, or all; it raises
+    _EndedEarlyError if there are fewer.
 
-    Raises RecordingError where it says what is wrong, falls, or is silent for too long.
+    Raises RecordingError if the process reports an error, crashes, or has no output for too long.
     """
     code = f"from {module} import tables; from {__name__} import answer; answer(tables)"
-    # -P: what lies in the folder where somebody happens to be is not imported.
+    # -P: modules in the current folder are not imported.
     command = [sys.executable, "-P", "-c", code, str(path), *map(str, task)]
     with (
-        tempfile.TemporaryFile() as said,
+        tempfile.TemporaryFile() as errors,
         subprocess.Popen(  # noqa: S603 - this interpreter, and paths as arguments
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors
         ) as process,
     ):
         late = threading.Event()
@@ -78,49 +78,49 @@ def _process(module: str, path: Path, *task: object) -> Iterator[Callable[..., b
             process.kill()
 
         def read(size: int = -1) -> bytes:
-            # Only while somebody waits: what becomes of a block may take its time.
+            # Only during a read: the caller may take any time to process a block.
             watch = threading.Timer(PATIENCE, end_it)
             watch.daemon = True
             watch.start()
             try:
-                found = process.stdout.read(size) if process.stdout else b""
+                data = process.stdout.read(size) if process.stdout else b""
             finally:
                 watch.cancel()
-            if len(found) < size:
+            if len(data) < size:
                 raise _EndedEarlyError
-            return found
+            return data
 
         try:
             yield read
         except _EndedEarlyError:
             pass
         except BaseException:
-            process.kill()  # nobody wants the rest
+            process.kill()  # the caller does not need the rest
             raise
         end = process.wait()
         if late.is_set():
             message = f"reading it did not go on for {PATIENCE:g} s"
             raise RecordingError.of(path, message)
         if end == REFUSED:
-            said.seek(0)
-            raise RecordingError.of(path, said.read().decode("utf-8", "replace"))
+            errors.seek(0)
+            raise RecordingError.of(path, errors.read().decode("utf-8", "replace"))
         if end:
             message = "it is so broken that the library that reads such files fell over it"
             raise RecordingError.of(path, message)
 
 
 def answer(tables: Callable[[Path], Sequence[Table]]) -> None:
-    """In the process: say what tables a file has, or pour some columns of one."""
+    """In the process: list the tables of a file, or write some columns of one to the pipe."""
     path, task, *numbers = sys.argv[1:]
     output = sys.stdout.buffer
     try:
-        found = tables(Path(path))
+        all_tables = tables(Path(path))
         if task == "tell":
-            told = [{**vars(table), "read": None} for table in found]
-            output.write(json.dumps(told, default=vars).encode())
+            listing = [{**vars(table), "read": None} for table in all_tables]
+            output.write(json.dumps(listing, default=vars).encode())
         else:
             number, *places = map(int, numbers)
-            for block in found[number].read(places):
+            for block in all_tables[number].read(places):
                 if len(block):
                     output.write(len(block).to_bytes(_LENGTH, "little"))
                     output.write(np.ascontiguousarray(block, dtype="<f8").tobytes())

@@ -17,7 +17,7 @@ NEEDED = f"a recording needs {SHORTEST}"
 
 @dataclass(frozen=True)
 class Stretch:
-    """Rows of a table that are one trial, what tells it from others, and what to remark."""
+    """Rows of a table that are one trial, its distinguishing conditions, and its remarks."""
 
     first: int
     rows: int
@@ -26,37 +26,37 @@ class Stretch:
 
 
 def by_value(values: Array, first: int, name: str, wanted: float | None = None) -> list[Stretch]:
-    """A trial for each stretch in which a column does not change; raises ValueError for none.
+    """A trial for each stretch in which a column is constant; raises ValueError for none.
 
-    Stretches that are too short for a trial are left out, and the first trial says so.
+    Stretches that are too short for a trial are omitted, with a remark in the first trial.
 
     Args:
-        values: of the column, shape (n,); `first` is the row of the first.
+        values: of the column, shape (n,); `first` is the row of the first value.
         wanted: only stretches of this value.
     """
-    there = np.isfinite(values)
-    same = (values[1:] == values[:-1]) | ~(there[1:] | there[:-1])
+    known = np.isfinite(values)
+    same = (values[1:] == values[:-1]) | ~(known[1:] | known[:-1])
     edges = np.flatnonzero(~same) + 1
     bounds = [0, *edges.tolist(), len(values)]
-    found = [(a, b) for a, b in pairwise(bounds) if there[a]]
+    stretches = [(a, b) for a, b in pairwise(bounds) if known[a]]
     if wanted is not None:
-        found = [(a, b) for a, b in found if values[a] == wanted]
-        if not found:
+        stretches = [(a, b) for a, b in stretches if values[a] == wanted]
+        if not stretches:
             raise ValueError(f"column {name!r} is never {wanted:g}")
-    empty = int(len(values) - there.sum())
+    empty = int(len(values) - known.sum())
     blank = f"column {name!r} has no value in {counted(empty, 'row')}" if empty else ""
-    if not found:
+    if not stretches:
         raise ValueError(blank)
-    long, remarks = _long(found, f"column {name!r}", blank)
+    long, remarks = _long(stretches, f"column {name!r}", blank)
     if blank:
         remarks.append(f"{blank}, which {'is' if empty == 1 else 'are'} in no trial")
     word = "".join(c if c.isalnum() else "_" for c in name.lower()).strip("_") or "value"
-    cut = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
-    return _numbered(cut, remarks)
+    trials = [Stretch(first + a, b - a, {word: float(values[a])}) for a, b in long]
+    return _numbered(trials, remarks)
 
 
 def by_restart(times: Array, first: int) -> list[Stretch]:
-    """A trial for each stretch in which time (s), shape (n,), goes on. ValueError for one."""
+    """A trial for each stretch of increasing time (s), shape (n,). ValueError without a restart."""
     bounds = [0, *restarts(times), len(times)]
     if len(bounds) < 3:
         raise ValueError("its time begins once")
@@ -67,9 +67,9 @@ def by_restart(times: Array, first: int) -> list[Stretch]:
 def _long(
     found: Sequence[tuple[int, int]], what: str, blank: str = ""
 ) -> tuple[list[tuple[int, int]], list[str]]:
-    """The stretches that are long enough for a trial, and a remark if others are not.
+    """The stretches that are long enough for a trial, and a remark on the others.
 
-    Raises ValueError for none, which also tells of the rows without a value.
+    Raises ValueError if there are none; its message includes `blank`, rows without a value.
     """
     long = [(a, b) for a, b in found if b - a >= SHORTEST]
     short = len(found) - len(long)
@@ -81,8 +81,8 @@ def _long(
             f"{NEEDED}{f'. {blank[0].upper()}{blank[1:]}' if blank else ''}"
         )
     are = "is no trial" if short == 1 else "are no trials"
-    told = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
-    return long, [told] if short else []
+    remark = f"{counted(short, 'stretch')} of {what} with fewer than {SHORTEST} rows {are}"
+    return long, [remark] if short else []
 
 
 def by_trigger(
@@ -96,11 +96,11 @@ def by_trigger(
     """A trial from each row in which a column has risen through a level.
 
     Args:
-        values: of the column, shape (n,); `first` is the row of the first.
-        ends_of: from the rows in which trials begin to those after their ends, shape (k,) each.
-        stop: row after the last; what would end later is left out.
+        values: of the column, shape (n,); `first` is the row of the first value.
+        ends_of: maps the first rows of trials to the rows after their ends, shape (k,) each.
+        stop: row after the last; trials that end later are omitted.
 
-    Raises ValueError for none, and where two trials would have rows in common.
+    Raises ValueError if there are none, if two trials overlap, or if they are too short.
     """
     known = np.flatnonzero(np.isfinite(values))  # a lost value is no fall
     above = values[known] > level
@@ -124,16 +124,16 @@ def by_trigger(
 
 
 def _numbered(stretches: list[Stretch], remarks: Sequence[str] = ()) -> list[Stretch]:
-    """The same, with what the first remarks.
+    """The stretches, with the remarks on the first.
 
-    Where two are told apart by nothing, each is also by its number, from 1.
+    If two have the same conditions, a number from 1 is added to the conditions of each.
     """
     first, *others = stretches
-    cut = [replace(first, remarks=tuple(remarks)), *others]
-    if len({tuple(each.conditions.items()) for each in cut}) == len(cut):
-        return cut
+    result = [replace(first, remarks=tuple(remarks)), *others]
+    if len({tuple(each.conditions.items()) for each in result}) == len(result):
+        return result
     key = "stretch" if "part" in first.conditions else "part"
     return [
         replace(each, conditions={**each.conditions, key: number})
-        for number, each in enumerate(cut, 1)
+        for number, each in enumerate(result, 1)
     ]

@@ -7,8 +7,8 @@ from campaign.recording import PanicStop
 from campaign.wire.codes import LatchCause
 from campaign.wire.messages import Latch
 
-NOBODY = "somebody who did not say who"
-FORGETFUL = "nobody: the controller has started anew and remembers no stops"
+NOBODY = "an unnamed host"
+FORGETFUL = "unknown: the controller restarted and has no record of stops"
 
 
 def panic_stop_of(latch: Latch) -> PanicStop | None:

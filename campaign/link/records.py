@@ -74,7 +74,7 @@ class RecordOrder:
         Raises ViolationError for a number that no device can have come to.
         """
         if beyond - self.next > FARTHEST:
-            raise ViolationError(f"the controller speaks of record {beyond - 1} after {self.next}")
+            raise ViolationError(f"the controller announces record {beyond - 1} after {self.next}")
         if self._end is not None:
             beyond = min(beyond, self._end + 1)
         for number in range(max(self._beyond, self.next), beyond):

@@ -399,7 +399,7 @@ class Session:
 
     def _stop_behind(self, why: str) -> PanicStop:
         """The stop for which a command was refused, told in full where that can be had."""
-        return self.panic_stop() or PanicStop(0, f"somebody; the controller says: {why}")
+        return self.panic_stop() or PanicStop(0, f"an unknown host; the controller says: {why}")
 
     def _hold(self, *, held: bool) -> None:
         try:

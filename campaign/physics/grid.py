@@ -81,8 +81,8 @@ def _choice(bench: CompleteBench, task: Task) -> StepChoice:
     choice = step_choice.longest_step(bench, task)
     if choice.refused is not None:
         raise ValueError(
-            f"{choice.refused}; [backend] longest_step simulates it all the same, with an error "
-            "that nobody knows"
+            f"{choice.refused}; [backend] longest_step simulates it all the same, with an "
+            "unknown error"
         )
     return choice
 

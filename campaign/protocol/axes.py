@@ -44,11 +44,11 @@ def make_axis(
 
 
 def value_problems(test: Test) -> Iterator[Problem]:
-    """What is wrong with swept values: each is put in its place, the others as they come first.
+    """Problems of swept values: each with the first value of every other axis.
 
-    Of a range only the ends, which bound the values between them. A fault elsewhere in a bench is
-    the value's doing too, because the bench is valid without it; among options it may be a matter
-    of the whole point, which the plan validates.
+    Only the ends of a range are checked; they bound the values between them. A fault elsewhere in a
+    bench is also due to the value, because the bench is valid without it. A fault elsewhere in the
+    options may depend on the whole point, which the plan validates.
     """
     options, bench = first_point(test)
     for axis in test.axes:
@@ -68,7 +68,7 @@ def value_problems(test: Test) -> Iterator[Problem]:
 
 
 def _repeated(axis: Axis) -> Iterator[Problem]:
-    """Equal values would make trials that nothing tells apart, not even their seed."""
+    """Problems of equal values: their trials would be identical, even in their seed."""
     seen: set[str] = set()
     for index in range(len(axis)) if axis.listed else ():
         value = repr(axis.value(index))
@@ -90,12 +90,12 @@ def first_point(test: Test) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def is_large(axes: Sequence[Axis], repeat: int) -> bool:
-    """Whether a matrix alone makes a plan too large; the values are then not looked at."""
+    """Whether a matrix alone makes a plan too large; its values are then not checked."""
     return count_points(axes) * repeat > LARGEST_PLAN
 
 
 def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> str:
-    """Why nothing can be swept at `keys`, or "" when something can."""
+    """Reason for which `keys` cannot be swept; "" if they can."""
     if not keys:
         return "a bench as a whole cannot be swept; write one [[test]] for each bench"
     if not prefix and keys[0] in TestEntry.model_fields:
@@ -103,15 +103,15 @@ def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> s
     shape: Shape | None = Shape((model,))
     for depth, key in enumerate(keys):
         around = shape.narrowed(tree) if shape is not None else Shape(())
-        # A number may be short for a table, but has no parts while it stands there.
+        # A number may abbreviate a table, but then it has no parts.
         names = () if isinstance(tree, int | float) else around.names()
         names = tuple(dict.fromkeys((*names, *(tree if isinstance(tree, Mapping) else ()))))
         shape = around.child(key) if key in names else None
         if shape is None:
             if not names:
                 whole = ".".join(str(part) for part in keys[:depth])
-                told = shown(f"{prefix}{whole}.{key}")
-                return f"nothing to sweep at {told}: {shown(whole)} has no parts"
+                target = shown(f"{prefix}{whole}.{key}")
+                return f"nothing to sweep at {target}: {shown(whole)} has no parts"
             before = prefix + "".join(f"{part}." for part in keys[:depth])
             paths = [f"{before}{name}" for name in names] + ([] if prefix else ["bench.…"])
             slip = nearest(f"{before}{key}", paths)
@@ -121,7 +121,7 @@ def _wrong_path(model: type[BaseModel], tree: Any, keys: Keys, prefix: str) -> s
 
 
 def _values(written: Any, origin: Origin) -> Sequence[Any] | Range:
-    """The values of an axis; a list that begins with a Problem when there are none."""
+    """The values of an axis; a list that begins with a Problem if they are invalid."""
     if isinstance(written, list):
         if not written:
             return [origin.problem((), "value", "an empty list; name at least one value")]

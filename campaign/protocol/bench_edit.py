@@ -14,17 +14,17 @@ from campaign.protocol.positions import Positions
 from campaign.protocol.problems import find_faults
 
 _HEADER = re.compile(r"^[ \t]*\[[ \t]*known[ \t]*[\].]", re.M)
-"""Of the table `known`, or of one within it."""
+"""Header of the table `known`, or of a table within it."""
 
 
 def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
-    """The text of a bench with `entries` in its table `known`, and the fingerprint it then has.
+    """The text of a bench with `entries` and the resulting fingerprint in its table `known`.
 
     Args:
-        entries: plain values, tables and lists; a table is merged into the one that is there.
+        entries: plain values, tables and lists; a table is merged into the existing one.
         name: of the file, for messages.
 
-    Raises UsageError when the keys of the file are written in a form that cannot be edited.
+    Raises UsageError if the keys of the file have a form that cannot be edited.
     """
     from tomlkit.exceptions import TOMLKitError
 
@@ -48,15 +48,15 @@ def with_known(text: str, entries: Mapping[str, Any], name: str) -> str:
 
 
 def _bench(text: str) -> Bench | str:
-    """The bench that a text says, or what is wrong with it; ValueError where it is no TOML."""
+    """The bench in a text, or its problems; ValueError for invalid TOML."""
     tree = tomllib.loads(text)
-    tree.pop("schema", None)  # of the file, and nothing of the bench
-    found = find_faults(Bench, tree)
-    return "; ".join(message for _, _, message in found) if isinstance(found, list) else found
+    tree.pop("schema", None)  # a key of the file, not of the bench
+    valid = find_faults(Bench, tree)
+    return "; ".join(message for _, _, message in valid) if isinstance(valid, list) else valid
 
 
 def _edited(text: str, entries: Mapping[str, Any]) -> str:
-    """`text` with entries of `known`, each where it is written already, or else in its table."""
+    """`text` with entries of `known`, each at its existing place, else in the table."""
     import tomlkit
 
     newline = "\r\n" if "\r\n" in text else "\n"
@@ -68,7 +68,7 @@ def _edited(text: str, entries: Mapping[str, Any]) -> str:
 
 
 def _put(known: Any, entries: Mapping[str, Any], *, in_line: bool = False) -> None:
-    """`in_line`: the table has no header of its own, and tables within it can have none."""
+    """Set entries of `known`; `in_line`: it has no header, and nor can the tables in it."""
     import tomlkit
 
     for key, value in entries.items():
@@ -87,7 +87,7 @@ def _put(known: Any, entries: Mapping[str, Any], *, in_line: bool = False) -> No
 
 
 def _inline(value: Any) -> Any:
-    """A table as TOML keeps it on one line; anything else as it is."""
+    """A table as an inline table; other values unchanged."""
     import tomlkit
 
     if not isinstance(value, Mapping):
@@ -99,7 +99,7 @@ def _inline(value: Any) -> Any:
 
 
 def _with_table(text: str, entries: Mapping[str, Any]) -> str:
-    """`text` with a table `known` before its first one and the comment above that."""
+    """`text` with a table `known` before its first table and the comment above that."""
     import tomlkit
 
     document = tomlkit.document()

@@ -1,4 +1,4 @@
-"""A bench by itself, from its TOML file or a shipped name."""
+"""A bench without a protocol, from its TOML file or a shipped name."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from campaign.resources import protocols_folder
 def load_bench(written: str) -> Bench:
     """The bench in the file `written`, or the shipped one of that name.
 
-    Raises UsageError when there is none, ProtocolError with everything that is wrong with it.
+    Raises UsageError if there is none, ProtocolError with all its problems.
     """
     return checked(bench_source(written))
 
 
 def simulable(written: str) -> CompleteBench:
-    """The same, of a bench that can be simulated. Raises UsageError naming all that it lacks."""
+    """The same for simulation. Raises UsageError with all values that the bench lacks."""
     try:
         return complete(load_bench(written))
     except IncompleteBenchError as error:
@@ -31,7 +31,7 @@ def simulable(written: str) -> CompleteBench:
 
 
 def bench_source(written: str) -> Source:
-    """The text of that bench. Raises UsageError when there is none, ProtocolError when no TOML."""
+    """The source of that bench. Raises UsageError if missing, ProtocolError for invalid TOML."""
     file = _find(written)
     try:
         source = read_source(file, written, "bench")
@@ -43,7 +43,7 @@ def bench_source(written: str) -> Source:
 
 
 def checked(source: Source) -> Bench:
-    """The bench in a file. Raises ProtocolError with everything that is wrong with it."""
+    """The bench in a file. Raises ProtocolError with all its problems."""
     bench = validate(Bench, source.tree, Within(source))
     if not isinstance(bench, Bench):
         raise ProtocolError(bench)

@@ -12,7 +12,7 @@ from campaign.protocol.files import Origin, Source
 from campaign.units import Time
 
 Number = StrictStr | StrictFloat | StrictInt
-"""Text with a unit, or a bare number for what has none."""
+"""Text with a unit, or a bare number for a value without a unit."""
 
 
 class CalibrationParameter(Options):
@@ -91,8 +91,8 @@ class Calibration:
     """The `[calibration]` of a loaded protocol.
 
     Attributes:
-        bench: the source of the bench that is fitted.
-        origin: of the protocol's top level, for problems found later.
+        bench: the source of the fitted bench.
+        origin: of the protocol's top level, for later problems.
     """
 
     options: CalibrationOptions

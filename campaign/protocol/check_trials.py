@@ -16,11 +16,11 @@ from campaign.trial import Role, Trial
 def with_checks(
     tests: Sequence[ExpandedTest], named: int, check: Check, seed: int
 ) -> list[ExpandedTest]:
-    """The same tests with the checks among them, all numbered in the order of execution.
+    """The tests with the checks inserted, all numbered in the order of execution.
 
-    After every `check.every` measurements of the whole plan comes the first measurement of the test
-    at the index `named` again, with role `check`, counted by `repeat`, and with a seed that follows
-    from that test's `seed`. Checks are trials of that test; no other trial changes but in number.
+    After every `check.every` measurements of the plan, the first measurement of the test with the
+    index `named` is repeated: role `check`, counted by `repeat`, with a seed that depends on that
+    test's `seed`. Checks are trials of that test; only the numbers of other trials change.
     """
     original, bench = _first(tests[named])
     pairs: list[list[tuple[Trial, Bench]]] = [[] for _ in tests]
@@ -50,7 +50,7 @@ def with_checks(
 
 
 def nothing_to_check(check: Check) -> Problem:
-    """The problem of a `[check]` whose test only warms up or moves."""
+    """The problem of a `[check]` whose test has no measurement."""
     message = f"the test '{check.test}' has no measurement that could be repeated"
     return check.origin.problem(("check", "test"), "value", message)
 
@@ -58,11 +58,11 @@ def nothing_to_check(check: Check) -> Problem:
 def _first(test: ExpandedTest) -> tuple[Trial, Bench]:
     index = test.first_measurement
     if index is None:
-        raise ValueError("no measurement to repeat")  # the plan has looked before
+        raise ValueError("no measurement to repeat")  # excluded by a check of the plan
     return test.trials[index], test.benches[index]
 
 
 def _changed(trial: Trial, **changes: Any) -> Trial:
-    """A copy without what the trial has worked out of itself, such as its fingerprint."""
+    """A changed copy without cached values such as the fingerprint."""
     fields = {name: getattr(trial, name) for name in Trial.model_fields}
     return Trial.model_construct(**{**fields, **changes})

@@ -31,17 +31,17 @@ DEEPEST_INCLUDE = 16
 MOST_FILES = 256
 SETTABLE = frozenset(ProtocolFile.model_fields) - {"include", "test", "calibration", "columns"}
 TABLES = frozenset({"faults", "rest", "check"})
-"""Top-level tables, whose keys can be set one by one."""
+"""Top-level tables whose keys can be set individually."""
 
 
 @dataclass
 class Draft:
-    """A `[[test]]` as written, with what the command line changed.
+    """A `[[test]]` as written, with the changes of the command line.
 
     Attributes:
         tree: its keys, without the matrix.
         axes: dotted path to value and place of each swept path.
-        patches, bench_patches: what `--set` changed in it and in its bench.
+        patches, bench_patches: changes by `--set` in the test and in its bench.
     """
 
     source: Source
@@ -60,7 +60,7 @@ class Draft:
         return PatchedTree(Within(self.source, ("test", self.index)), self.patches)
 
     def apply(self, override: Override) -> None:
-        """Change what `--set name.…` says; setting a swept path ends its sweep."""
+        """Apply `--set name.…`; setting a swept path ends its sweep."""
         keys = override.keys[1:]
         if keys[0] == "matrix" and isinstance(override.value, dict) and len(keys) == 1:
             self.axes = {p: (v, override.origin) for p, _, v in flatten(override.value)}
@@ -78,7 +78,7 @@ class Draft:
 
 @dataclass
 class Collection:
-    """Everything read so far, and everything wrong with it."""
+    """All data read so far, and all their problems."""
 
     drafts: list[Draft] = field(default_factory=list)
     sources: dict[str, Source] = field(default_factory=dict)
@@ -97,7 +97,7 @@ def collect(path: Path, collected: Collection) -> Source | None:
 
 
 def apply_overrides(overrides: list[Override], collected: Collection) -> None:
-    """Change the drafts as `--set` says; top-level keys are the caller's."""
+    """Apply `--set` to the drafts; the caller applies it to top-level keys."""
     names = [draft.name for draft in collected.drafts if draft.name]
     for override in overrides:
         first = str(override.keys[0])
@@ -115,7 +115,7 @@ def apply_overrides(overrides: list[Override], collected: Collection) -> None:
 
 
 def top_level(source: Source, overrides: list[Override]) -> tuple[dict[str, Any], Origin]:
-    """The main file's tree with `--set` applied, and where its values stand."""
+    """The main file's tree with `--set` applied, and the origin of its values."""
     tests = source.tree.get("test")
     tables = [t for t in tests if isinstance(t, dict)] if isinstance(tests, list) else []
     named = [table.get("name") for table in tables]
@@ -130,7 +130,7 @@ def top_level(source: Source, overrides: list[Override]) -> tuple[dict[str, Any]
 
 
 def sibling(source: Source, written: str) -> tuple[Path, str]:
-    """File and name of what `source` calls `written`."""
+    """Path and name of the file that `source` names `written`."""
     name = PurePosixPath(source.name).parent / written.replace("\\", "/")
     parts: list[str] = []
     for part in name.parts:

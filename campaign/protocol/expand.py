@@ -23,23 +23,23 @@ from campaign.protocol.swept_value_text import point_text
 from campaign.trial import Role, Task, Tree, Trial, TrialRequest, canonical_json
 
 CHANNELS = 11
-"""A backend records, besides the time; for the estimate of what would be written."""
+"""Recorded channels besides the time, to estimate the archive size."""
 LARGEST_RECORDING = 200_000_000
-"""samples of one trial; more is a slip of units. They are recorded in flat memory, and an analysis
-holds the channels that it reads."""
+"""Maximum number of samples of one trial; more is an error of units. Recording needs constant
+memory, but an analysis holds the channels that it reads."""
 
 _ALL_GIVEN = set(Trial.model_fields)
-"""Shared by all trials: a set of its own has 2 kB."""
+"""Shared by all trials: a set for each trial would take 2 kB."""
 
 
 @dataclass(frozen=True)
 class ExpandedTest:
     """The trials of one test in order of execution, each with its bench as an object.
 
-    `first_measurement` is the index of the first as written, whatever the order; None without one.
-    `stages` are those that may follow, by point in the order of the matrix. `memory` is what all of
-    it takes (bytes), the trials that follow included. `truths` are the plants that its trials name.
-    `warnings` are what its experiment says of the plan, each once.
+    `first_measurement`: index of the first as written, whatever the order; None without one.
+    `stages`: stages that may follow, by point in the order of the matrix. `memory`: total (bytes),
+    with the trials that follow. `truths`: plants of its trials by digest. `warnings`: warnings of
+    its experiment about the plan, each once.
     """
 
     trials: tuple[Trial, ...]
@@ -53,7 +53,7 @@ class ExpandedTest:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """One trial before it is numbered."""
+    """One trial without its number."""
 
     point: Point
     request: TrialRequest
@@ -81,24 +81,24 @@ def expand(
     truths = _Truths(test)
     benches = memory.BENCH * len({id(point.bench) for point in points})
     repeats = test.entry.repeat
-    whole, asked = len(points) * repeats, 0
+    whole, needed = len(points) * repeats, 0
     for done, point in enumerate(points, start=1):
         requests = _requests(test, point, own_benches, truths)
         for index, (request, bench, tree, truth) in enumerate(requests):
             places.append(_Place(point, request, index, 1, bench, tree, truth))
-            asked += memory.of_task(request.task)
+            needed += memory.of_task(request.task)
             if len(places) + before > LARGEST_PLAN and not allow_large:
                 raise PointError([size_problem(test, "the plan has")])
-            if asked + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH > left:
-                raise PointError([memory_problem(test, asked * whole // done + benches)])
-        if asked * whole // done > memory.SURELY * left:
-            raise PointError([memory_problem(test, asked * whole // done + benches)])
+            if needed + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH > left:
+                raise PointError([memory_problem(test, needed * whole // done + benches)])
+        if needed * whole // done > memory.SURELY * left:
+            raise PointError([memory_problem(test, needed * whole // done + benches)])
     if len(places) * repeats + before > LARGEST_PLAN and not allow_large:
         raise PointError([size_problem(test, "the plan has")])
-    spent = asked * repeats + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH
+    spent = needed * repeats + benches + (len(own_benches) + len(truths.plants)) * memory.BENCH
     if spent > left:
         raise PointError([memory_problem(test, spent)])
-    # What an experiment asks for at a point is the same in each repetition, which share it.
+    # The requests of a point are the same in each repetition and are shared.
     places = [replace(place, repeat=n) for n in range(1, repeats + 1) for place in places]
     if stages and (reason := _no_stages(places)):
         message = f"a test whose trials {reason} can have no stages"
@@ -116,12 +116,12 @@ def expand(
     first = next(measured, None)
     at = next((i for i, place in enumerate(ordered) if place is first), None)
     of_places = tuple(place.bench for place in ordered)
-    told = tuple(dict.fromkeys(line for point in points for line in _warnings(test, point)))
-    return ExpandedTest(trials, of_places, at, tuple(stages), spent + later, truths.plants, told)
+    notes = tuple(dict.fromkeys(line for point in points for line in _warnings(test, point)))
+    return ExpandedTest(trials, of_places, at, tuple(stages), spent + later, truths.plants, notes)
 
 
 def _setup(test: Test, point: Point) -> tuple[str, ...]:
-    """What a person does for a point, which may lack what a placeholder of the first one names."""
+    """Operator steps for a point; PointError if it has no value for a placeholder."""
     try:
         return setup_at(test, point)
     except PlaceholderError as error:
@@ -130,7 +130,7 @@ def _setup(test: Test, point: Point) -> tuple[str, ...]:
 
 
 def _no_stages(places: Sequence[_Place]) -> str:
-    """Why nobody could tell to which point of the matrix, or to which bench, a trial belongs."""
+    """Reason for which the point or the bench of a trial would be ambiguous; "" if none."""
     for place in places:
         if place.request.bench is not None:
             return "have benches of their own"
@@ -149,7 +149,7 @@ def _stages(test: Test, point: Point, seed: int) -> list[PlannedStage]:
 
 
 def _warnings(test: Test, point: Point) -> list[str]:
-    """What the experiment warns of at a point. Raises PointError."""
+    """Warnings of the experiment at a point. Raises PointError."""
     if test.experiment.warnings is None:
         return []
     try:
@@ -166,10 +166,10 @@ def _at(point: Point) -> str:
 def _requests(
     test: Test, point: Point, own_benches: dict[str, tuple[Bench, Tree]], truths: _Truths
 ) -> Iterator[tuple[TrialRequest, Bench, Tree, str]]:
-    """What the experiment asks for at a point, with bench and truth, checked as only a plan can."""
+    """The experiment's requests at a point with bench and truth, after the checks of a plan."""
     try:
-        asked = test.experiment.trials(point.options, point.bench)
-        for request in each_in_axis_terms(point.bench.sides, asked):
+        requests = test.experiment.trials(point.options, point.bench)
+        for request in each_in_axis_terms(point.bench.sides, requests):
             bench, tree = _bench_for(request, point, own_benches)
             name, names = request.task.compensation, ["none", *bench.compensation]
             if name not in names:
@@ -183,7 +183,7 @@ def _requests(
 def _bench_for(
     request: TrialRequest, point: Point, own_benches: dict[str, tuple[Bench, Tree]]
 ) -> tuple[Bench, Tree]:
-    """The point's bench, or the request's own, validated once for each that is different."""
+    """The point's bench, or the request's own; each different bench is validated once."""
     if request.bench is None:
         return point.bench, point.bench_tree
     key = canonical_json(request.bench)
@@ -195,10 +195,10 @@ def _bench_for(
 
 @dataclass
 class _Truths:
-    """The plants that a test's trials are simulated with, by their digest.
+    """The plants that simulate a test's trials, by their digest; unknown to the experiment.
 
-    The experiment is not told of them. What a matrix or an experiment changes of the bench is
-    turned at the rig, and so at the truth, too: to the same value.
+    A setting of the bench that a matrix or an experiment changes is changed at the rig, and thus
+    in the truth, to the same value.
     """
 
     test: Test
@@ -206,7 +206,7 @@ class _Truths:
     known: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def of(self, point: Point, bench: Bench, tree: Tree) -> str:
-        """Digest of the truth of a trial on `bench`; empty when the bench is what is simulated."""
+        """Digest of the truth of a trial on `bench`; empty if the bench itself is simulated."""
         if self.test.truth is None:
             return ""
         key = (id(point.bench_tree), id(tree))  # both are kept with the points and requests
@@ -215,7 +215,7 @@ class _Truths:
             turned = {keys: value_at(tree, keys) for keys in axes if is_setting(keys)}
             turned |= settings(point.bench_tree, tree)
             plant = with_settings(self.test.truth, turned)
-            simulated(plant, bench)  # or it is said here that it cannot be
+            simulated(plant, bench)  # raises if it cannot be simulated
             self.known[key] = name = digest(plant)
             self.plants.setdefault(name, plant)
         return self.known[key]
@@ -224,7 +224,7 @@ class _Truths:
 def _shuffled(places: Sequence[_Place], seed: int) -> list[_Place]:
     """Each repetition is a block: its warm-ups first, then its measurements in random order.
 
-    The order is that of hashes, which no version of a library can change.
+    The order is that of hashes, which does not depend on versions of libraries.
     """
 
     def hashed(place: _Place) -> int:
@@ -248,17 +248,17 @@ def _trial(
     set_by_hand: tuple[str, ...],
     known: dict[tuple[int, int], Mapping[str, Any]],
 ) -> Trial:
-    # All parts are validated; constructing without validation shares one bench tree among the
-    # trials of a point, where validation would copy it for each of up to 100 000. `known` are the
-    # fields that the repetitions of a place share.
+    # All parts are validated. Construction without validation shares one bench tree among the
+    # trials of a point; validation would copy it for each of up to 100 000. `known` holds the
+    # shared fields of the repetitions of a place.
     request, key = place.request, (id(place.point), place.index)
     if key not in known:
         options = place.point.options_tree if request.planned else place.point.written
-        asked = fields_of(test.experiment, request, place.bench_tree, test.options)
+        fields = fields_of(test.experiment, request, place.bench_tree, test.options)
         known[key] = {
-            **asked,
+            **fields,
             "point": {**place.point.values, **request.point},
-            "told": {**place.point.told, **asked["told"]},
+            "told": {**place.point.told, **fields["told"]},
             "options": {**options, **request.options} if request.options else options,
         }
     return Trial.model_construct(
@@ -280,9 +280,9 @@ def _trial(
 def fields_of(
     experiment: ExperimentKind, request: TrialRequest, bench: Tree, written: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What a trial has of its request alone; `written`: the test's options as in the protocol.
+    """Fields of a trial from its request; `written`: the test's options as in the protocol.
 
-    Names of the channels that it requires and of those that it can use are sorted.
+    The names of required and of usable channels are sorted.
     """
     declared = request.role is Role.MEASUREMENT
     requires, can_use = request.requires, request.can_use
@@ -303,12 +303,12 @@ def fields_of(
 
 
 def memory_problem(test: Test, needed: int) -> Problem:
-    """The problem of a plan that takes `needed` bytes, at what multiplies its trials in `test`."""
+    """The problem of a plan that needs `needed` bytes, at the matrix or the repeats of `test`."""
     return _at_the_multiplier(test, memory.refusal(test, needed))
 
 
 def size_problem(test: Test, what: str) -> Problem:
-    """The problem of a plan with too many trials, at what multiplies them in `test`."""
+    """The problem of a plan with too many trials, at the matrix or the repeats of `test`."""
     message = f"{what} over {LARGEST_PLAN} trials; sweep less, or allow large plans explicitly"
     return _at_the_multiplier(test, message)
 
@@ -319,13 +319,13 @@ def _at_the_multiplier(test: Test, message: str) -> Problem:
 
 
 def seed_of(test: Test, master: int) -> int:
-    """The test's own seed, or one drawn from the plan's that no other test changes."""
+    """The test's own seed, or one from the plan's seed that is independent of other tests."""
     given = test.entry.seed
     return given if given is not None else place_hash(master, test.entry.name)
 
 
 def place_hash(*place: Any) -> int:
-    """63 bits that depend on nothing but `place`, e.g. a trial's place in its test."""
+    """63 bits that depend only on `place`, such as a trial's place in its test."""
     digest = hashlib.sha256(canonical_json(place).encode()).digest()
     return int.from_bytes(digest[:8], "big") >> 1
 
@@ -336,7 +336,7 @@ def samples_of(task: Task) -> int:
 
 
 def check_recording(task: Task) -> None:
-    """ValueError for a recording that must be a slip of units."""
+    """Raise ValueError for a recording so long that it must be an error of units."""
     if samples_of(task) > LARGEST_RECORDING:
         raise ValueError(
             f"a trial of {samples_of(task):.3g} samples; at most {LARGEST_RECORDING:.3g} are "

@@ -14,32 +14,32 @@ from campaign.errors import Problem
 from campaign.protocol.positions import Aim, Keys, Position, Positions
 
 LARGEST_FILE = 4 * 1024 * 1024
-"""bytes; a protocol of hand-written tests has some kilobytes."""
+"""Maximum file size (bytes); a protocol of handwritten tests has some kilobytes."""
 MOST_VALUES = 200_000
-"""of a protocol with its includes, of a bench; 100 000 trials have fewer."""
+"""Maximum values of a protocol with its includes, or of a bench; 100 000 trials have fewer."""
 DEEPEST_NESTING = 32
-"""levels of tables and lists; deeper text only serves to exhaust a parser."""
+"""Maximum levels of tables and lists; deeper text only serves to exhaust a parser."""
 
 Kind = Literal["protocol", "bench"]
 SCHEMA: Mapping[Kind, int] = {"protocol": 2, "bench": 3}
-"""The present one, which alone is read; raised when a key is renamed, removed or means something
-else."""
+"""The current version, the only readable one; incremented if a key is renamed or removed, or
+changes its meaning."""
 MARKS: Mapping[Kind, frozenset[str]] = {
     "protocol": frozenset({"test", "include"}),
     "bench": frozenset({"axis", "motor", "limits", "friction"}),
 }
-"""Keys that one kind of file has and the other has not."""
+"""Keys that only one kind of file has."""
 _TAKEN_BY: Mapping[Kind, str] = {
     "protocol": "`campaign plan` takes protocols",
     "bench": "`campaign check` takes benches",
 }
 
 LONGEST_PATH = 400
-"""letters of a path that are shown."""
+"""Maximum number of characters of a path in a message."""
 
 
 class UnreadableError(Exception):
-    """Why a file cannot be read as text, for the user."""
+    """A file that cannot be read as text, with the reason for the user."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Source:
 
     Attributes:
         file: as the user named it, for messages.
-        name: among the sources of a protocol, as written there.
+        name: key among the sources of a protocol, as written there.
         text: verbatim.
         tree: its values.
     """
@@ -63,12 +63,12 @@ class Source:
         return Positions(self.text)
 
     def problem(self, keys: Keys, aim: Aim, message: str) -> Problem:
-        """A problem with what stands at `keys`."""
+        """A problem at `keys`."""
         return Problem(self.file, *self.positions.find(keys, aim), message)
 
 
 class Origin(Protocol):
-    """Where a tree of values comes from: a place for each of its problems."""
+    """The source of a tree of values, which gives each problem its place."""
 
     def problem(self, keys: Keys, aim: Aim, message: str) -> Problem: ...
 
@@ -86,7 +86,7 @@ class Within:
 
 @dataclass(frozen=True)
 class At:
-    """One place that stands for whatever is wrong with a value put there, e.g. a swept one."""
+    """One place for all problems of a value that is inserted there, e.g. a swept one."""
 
     source: Source
     keys: Keys
@@ -108,7 +108,7 @@ class Typed:
 
 @dataclass(frozen=True)
 class PatchedTree:
-    """A tree of which some values come from elsewhere; the latest patch wins."""
+    """A tree with some values from other places; the latest patch has precedence."""
 
     base: Origin
     patches: Sequence[tuple[Keys, Origin]]
@@ -121,9 +121,9 @@ class PatchedTree:
 
 
 def read_source(file: Path, name: str, kind: Kind | None = None) -> Source | list[Problem]:
-    """The TOML file, or what is wrong with its text; UnreadableError when there is no text.
+    """The TOML file, or the problems of its text. Raises UnreadableError if it has no text.
 
-    `kind`: what the file must be; it may say which schema it has.
+    `kind`: the required kind of file; the file may state its schema.
     """
     text = read_text(file)
     try:
@@ -132,7 +132,7 @@ def read_source(file: Path, name: str, kind: Kind | None = None) -> Source | lis
         return [_syntax_problem(file, text, error)]
     except RecursionError:
         return [Problem(file, 0, 0, f"nested deeper than {DEEPEST_NESTING} levels")]
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # a number with thousands of digits
         return [Problem(file, 0, 0, f"not readable as TOML: {error}")]
     if count_values(tree) > MOST_VALUES:
         return [Problem(file, 0, 0, TOO_MANY)]
@@ -150,16 +150,16 @@ def read_source(file: Path, name: str, kind: Kind | None = None) -> Source | lis
 
 
 def _other_kind(source: Source, kind: Kind) -> Problem | None:
-    """The problem of a bench in place of a protocol, or the other way round."""
+    """The problem of a bench in place of a protocol, or of the reverse."""
     other: Kind = "bench" if kind == "protocol" else "protocol"
     if source.tree.keys() & MARKS[kind] or not source.tree.keys() & MARKS[other]:
         return None
-    told = f"this is a {other}, and a {kind} is asked for; {_TAKEN_BY[other]}"
-    return Problem(source.file, 0, 0, told)
+    message = f"this is a {other}, and a {kind} is asked for; {_TAKEN_BY[other]}"
+    return Problem(source.file, 0, 0, message)
 
 
 def _other_schema(source: Source, kind: Kind) -> Problem | None:
-    """Take `schema` out of the tree; the problem of one that is not the present one."""
+    """Remove `schema` from the tree; return the problem if it is not the current one."""
     given = source.tree.pop("schema", SCHEMA[kind])
     if type(given) is int and given == SCHEMA[kind]:
         return None
@@ -177,7 +177,7 @@ TOO_MANY = (
 
 
 def count_values(tree: Any) -> int:
-    """Values and tables of a document; as many as make it too many, where there are more."""
+    """Number of values and tables of a document; counting stops above `MOST_VALUES`."""
     count, stack = 0, [tree]
     while stack and count <= MOST_VALUES:
         value = stack.pop()
@@ -212,7 +212,7 @@ def read_text(file: Path) -> str:
 
 
 def looked_for(file: Path) -> str:
-    """Where a file was looked for, in a line: a name in a protocol may be of any length."""
+    """The path of a missing file for a message, shortened: names may have any length."""
     text = str(file)
     return f"(looked for {text if len(text) <= LONGEST_PATH else f'{text[:LONGEST_PATH]}...'})"
 

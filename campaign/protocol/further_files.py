@@ -23,27 +23,27 @@ from campaign.protocol.problems import allowed, shown
 from campaign.text import nearest
 
 Read = Callable[[Path, str], Source | list[Problem]]
-"""A file under a name, or what is wrong with it. Raises UnreadableError."""
+"""Reads a file under a name; returns it or its problems. Raises UnreadableError."""
 read_bench: Read = partial(read_source, kind="bench")
 
 
 def read_any_text(file: Path, name: str) -> Source:
-    """A file without values, whatever its text is."""
+    """A file with any text, without values."""
     return Source(file, name, read_text(file), {})
 
 
 def names_file(written: str) -> bool:
-    """Whether it is the path of a bench, and no shipped bench's name."""
+    """Whether the text is a path, not the name of a shipped bench."""
     return "/" in written or "\\" in written or written.endswith(".toml")
 
 
 def benches_in(shipped: Path) -> dict[str, Path]:
-    """The benches of a folder of protocols, by the bare name that they go by."""
+    """The benches of a folder of protocols, by their bare names."""
     return {file.stem: file for file in sorted((shipped / "benches").glob("*.toml"))}
 
 
 def no_bench(written: str, known: Collection[str], beside: Collection[str] = ()) -> str:
-    """What to say of a name that no bench has; `beside`: files that may be meant."""
+    """Message for an unknown name of a bench; `beside`: files with similar names."""
     slip = nearest(written, known) or nearest(f"{written}.toml", beside)
     message = f"no shipped bench is called {shown(written)}; {allowed(known)}"
     return f"{message}, or the path of a .toml file{slip}"
@@ -51,11 +51,11 @@ def no_bench(written: str, known: Collection[str], beside: Collection[str] = ())
 
 @dataclass
 class FurtherFiles:
-    """Files of one kind of use, each read once; what is wrong is added to `problems`.
+    """Files for one kind of use, each read once; problems are appended to `problems`.
 
     Attributes:
-        shipped: folder whose `benches/` holds the benches that go by a bare name.
-        sources: by the name that the file is written with.
+        shipped: folder whose `benches/` holds the benches with a bare name.
+        sources: by the written name of the file.
         protocols: files that were read as protocols, and are no benches.
     """
 
@@ -69,7 +69,7 @@ class FurtherFiles:
     ) -> Source | None:
         """A bench by its path, from `beside` or the current folder, or a shipped one by its name.
 
-        `origin`, `keys`: where it is written.
+        `origin`, `keys`: place of the name.
         """
         if not isinstance(written, str):
             return None
@@ -86,11 +86,11 @@ class FurtherFiles:
     def read(
         self, read: Read, file: Path, name: str, origin: Origin, keys: Keys, written: str
     ) -> Source | None:
-        """A further file; a missing one is a problem of the text that names it."""
+        """Read a further file; a missing one is a problem of the text that names it."""
         known = self.sources.get(name)
         if known is not None and known.file == file:
             return known
-        if known is not None:  # a protocol file that is called like a shipped bench
+        if known is not None:  # another file has this name, such as a shipped bench
             name = str(file)
         try:
             source = read(file, name)
@@ -106,7 +106,7 @@ class FurtherFiles:
         return source
 
     def _toml_files(self, folder: Path) -> list[str]:
-        """Those there that may be benches."""
+        """Names of TOML files in a folder that may be benches."""
         protocols = {file.name for file in self.protocols}
         try:
             names = sorted(file.name for file in folder.glob("*.toml"))[:1000]

@@ -1,8 +1,8 @@
 """JSON Schema (draft 7) of protocols and benches, so that editors complete and check TOML.
 
-It says what a file may contain: tables, keys, words, and that a quantity is text of a number and a
-unit. Which units those are depends on the axis, and whether values suit each other on the whole
-file: `campaign plan` and `campaign check` say that.
+It defines tables, keys and words, and that a quantity is text with a number and a unit. Permitted
+units depend on the axis, and the consistency of values on the whole file: `campaign plan` and
+`campaign check` check these.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 QUANTITY = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?(/[1-9]\d*)?(\s+\S|[^\s\d.]).*$"
 """A number, or a fraction, and a unit."""
 BOUNDS = ("gt", "ge", "lt", "le", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
-"""Of a quantity: SI, which no text is held against."""
+"""Bounds of a quantity: in SI, and thus not applicable to text."""
 Tree = dict[str, Any]
 
 
 class _Generator(GenerateJsonSchema):
-    """Knows quantities, choices between tables, and docstrings of fields."""
+    """Generator with quantities, choices between tables, and docstrings of fields."""
 
     def function_before_schema(self, schema: Any) -> Tree:
         """See `GenerateJsonSchema`."""
@@ -46,11 +46,11 @@ class _Generator(GenerateJsonSchema):
         return {}
 
     def default_schema(self, schema: Any) -> Tree:
-        """Without defaults, which are SI: the description says what matters."""
+        """Without defaults, which are in SI: the description states the essential."""
         return self._inner(schema["schema"])
 
     def nullable_schema(self, schema: Any) -> Tree:
-        """TOML has no null: what is not there is absent."""
+        """Without null, which TOML lacks: a missing value is absent."""
         return self._inner(schema["schema"])
 
     def model_schema(self, schema: Any) -> Tree:
@@ -59,8 +59,8 @@ class _Generator(GenerateJsonSchema):
         model = schema["cls"]
         for name, each in tree.get("properties", {}).items():
             each.pop("title", None)
-            if name in model.model_fields and (told := meaning_of(model, name)):
-                tree["properties"][name] = _described(each, told)
+            if name in model.model_fields and (meaning := meaning_of(model, name)):
+                tree["properties"][name] = _described(each, meaning)
         return tree
 
     def _choice(self, choice: Choice) -> Tree:
@@ -90,12 +90,12 @@ def _core(model: type[BaseModel] | None) -> Any:
 
 def _quantity(quantity: Quantity) -> Tree:
     units = quantity.accepts + (quantity.linear.accepts if quantity.linear else ())
-    told = f"A {quantity.name}, such as {quantity.example}; units: {', '.join(units)}."
-    return {"type": "string", "pattern": QUANTITY, "description": told}
+    text = f"A {quantity.name}, such as {quantity.example}; units: {', '.join(units)}."
+    return {"type": "string", "pattern": QUANTITY, "description": text}
 
 
 def _described(schema: Tree, text: str) -> Tree:
-    """With the words of the field before those of its quantity; a mere reference beside them."""
+    """A schema with the field's text before that of its quantity, or beside a reference."""
     if "$ref" in schema:
         return {"allOf": [schema], "description": text}
     own = schema.get("description", "")
@@ -103,7 +103,7 @@ def _described(schema: Tree, text: str) -> Tree:
 
 
 def _cleaned(tree: Any) -> Any:
-    """Without bounds on text, and without titles, which repeat names."""
+    """A schema without bounds on text, and without titles, which repeat names."""
     if isinstance(tree, list):
         return [_cleaned(each) for each in tree]
     if not isinstance(tree, dict):
@@ -119,7 +119,7 @@ def _cleaned(tree: Any) -> Any:
 
 
 def schema_of_model(model: type[BaseModel]) -> Tree:
-    """Of a table by itself; what it refers to is under `definitions`."""
+    """Schema of one table; referenced tables are under `definitions`."""
     tree: Tree = model.model_json_schema(
         schema_generator=_Generator, ref_template="#/definitions/{model}"
     )
@@ -129,7 +129,7 @@ def schema_of_model(model: type[BaseModel]) -> Tree:
 
 
 def bench_schema() -> Tree:
-    """Of a bench file."""
+    """Schema of a bench file."""
     tree = schema_of_model(Bench)
     definitions = tree["definitions"]
     definitions["Scatter"] = {"anyOf": [{"type": "number"}, definitions["Scatter"]]}
@@ -141,7 +141,7 @@ def bench_schema() -> Tree:
 
 
 def _named_by_key(table: Tree, definitions: Mapping[str, Tree]) -> None:
-    """An entry called like a kind needs no word that says so: `[compensation.observer]`."""
+    """Make the tag optional in entries with the name of a kind: `[compensation.observer]`."""
     choice = table["additionalProperties"]
     (tag,) = choice["required"]
     table["properties"] = {}
@@ -153,7 +153,7 @@ def _named_by_key(table: Tree, definitions: Mapping[str, Tree]) -> None:
 
 
 def protocol_schema(experiments: Mapping[str, ExperimentKind]) -> Tree:
-    """Of a protocol with these experiments; a test's keys follow from its kind."""
+    """Schema of a protocol with these experiments; a test's keys depend on its kind."""
     top, entry = schema_of_model(ProtocolFile), schema_of_model(TestEntry)
     definitions = {**top.pop("definitions"), **entry.pop("definitions")}
     cases = []

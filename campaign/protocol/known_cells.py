@@ -23,12 +23,12 @@ def cell_problems(
 ) -> Iterator[Problem]:
     """A problem for each pattern that covers no cell of the document that the bench names.
 
-    Nothing is wrong with one that names no document: then nobody can tell. Nor, to whoever only
-    uses the bench, where its file is not at hand: a bench travels without it.
+    Patterns of a bench without a document cannot be checked: no problem. A missing document is no
+    problem either if the bench is only used: a bench may be copied without it.
 
     Args:
         folder: of the bench's file.
-        must_be_there: whether a document that is not is a problem, too.
+        must_be_there: whether a missing document is a problem, too.
     """
     if not known.document:
         return
@@ -54,10 +54,10 @@ def cell_problems(
 
 
 def _published(document: str, folder: Path) -> Published:
-    """The cells that a comparison with the document has.
+    """The cells for a comparison with the document.
 
-    A laboratory's own file stands beside the thesis, as in a report. Raises UsageError when it is
-    wrong, UnreadableError when it is not there.
+    A laboratory's own file is added to the thesis, as in a report. Raises UsageError if it is
+    invalid, UnreadableError if it is missing.
     """
     if document == THESIS:
         return thesis()

@@ -15,7 +15,7 @@ from campaign.protocol.plan import LimitUse, Plan, PlannedTest
 from campaign.units import DISPLAY, convert
 
 NAMED_TRIALS = 3
-"""of each test and limit; the rest is counted."""
+"""Trials that a message names for each test and limit; the rest is counted."""
 
 
 REMEDIES = {
@@ -24,15 +24,15 @@ REMEDIES = {
         "controller.relative_rate_filter, raise sample_rate to the controller's, or refine "
         "sensors.encoder"
     ),
-    "angle": "the limit is narrower than the sensor can tell",
-    "torque": "the limit is narrower than the sensor can tell",
-    "current": "the limit is narrower than the sensor can tell",
+    "angle": "the limit is narrower than the sensor's resolution",
+    "torque": "the limit is narrower than the sensor's resolution",
+    "current": "the limit is narrower than the sensor's resolution",
 }
-"""What to do about a limit that the resolution of a sensor alone would break."""
+"""Remedy for a limit that the resolution of a sensor alone would break."""
 
 
 def check_limits(plan: Plan) -> None:
-    """Raise LimitError when a trial would break a limit: each test, limit, value and bound."""
+    """Raise LimitError if trials would break limits, with test, limit, value and bound of each."""
     groups: dict[tuple[str, str, str], list[LimitUse]] = {}
     for use in plan.breaches:
         test = plan.trials[use.trial - 1].test
@@ -46,7 +46,7 @@ def check_limits(plan: Plan) -> None:
 
 
 def in_display_units(margin: Margin) -> tuple[str, str]:
-    """Value and bound as a reader sees them, e.g. ("41 N·m", "40 N·m")."""
+    """Value and bound in display units, e.g. ("41 N·m", "40 N·m")."""
     unit = DISPLAY.get(margin.unit, margin.unit)
     value, bound = (convert(x, margin.unit, unit) for x in (margin.value, margin.bound))
     shown = "infinite (the rate command jumps)" if math.isinf(value) else f"{value:.4g} {unit}"
@@ -54,7 +54,7 @@ def in_display_units(margin: Margin) -> tuple[str, str]:
 
 
 def one_count(margin: Margin) -> str:
-    """What a single count of a sensor reads as, in words."""
+    """The value of a single count of a sensor, in words."""
     value, _ = in_display_units(margin)
     a = "an" if margin.called == "angle" else "a"
     return f"one count of the {margin.sensor} reads as {a} {margin.called} of {value}"
@@ -81,11 +81,11 @@ def _label(plan: Plan, use: LimitUse, test: str) -> str:
 
 TWO_PI = 2.0 * math.pi
 PER_RADIAN = 180.0 / math.pi
-"""How many times too large a gain in A s/deg is when it was typed as A s/rad."""
+"""Factor by which a gain in A s/deg is too large if it is entered as A s/rad."""
 
 
 def check_loops(plan: Plan) -> None:
-    """Raise LimitError when a test that does not seek it has an unstable loop."""
+    """Raise LimitError if a test has an unstable loop and does not seek instability."""
     lines = []
     hints: dict[str, None] = {}
     for test in plan.tests:
@@ -116,7 +116,7 @@ def low_margins(plan: Plan) -> Iterator[str]:
 
 
 def sought_instability(tests: Sequence[PlannedTest]) -> Iterator[str]:
-    """A sentence for each test that means to go where a loop is unstable."""
+    """A sentence for each test that seeks the instability of a loop."""
     for test in tests:
         if test.seeks_instability:
             loop = f" (worst: {in_words(test.loops[0])})" if test.loops else ""
@@ -130,7 +130,7 @@ def in_words(use: LoopUse) -> str:
 
 
 def margins_in_words(margins: LoopMargins) -> str:
-    """E.g. `7.1 Hz crossover, 62 deg, 24 dB`; `UNSTABLE ...` where there is no margin."""
+    """E.g. `7.1 Hz crossover, 62 deg, 24 dB`; `UNSTABLE ...` for an unstable loop."""
     if not margins.stable:
         pole = margins.poles[0]
         turning = f" at {abs(pole.imag) / TWO_PI:.3g} Hz" if abs(pole.imag) > 0 else ""
@@ -152,21 +152,21 @@ def _use(plan: Plan, test: PlannedTest, use: LoopUse) -> str:
 
 
 def _hints(plan: Plan, use: LoopUse) -> Iterator[str]:
-    """Whether the rate controller's gain looks like one in A s/deg."""
-    # A loop that is known is that of a bench of which all is known.
+    """A hint if the loop would be stable with a rate gain in A s/deg instead of A s/rad."""
+    # Only a complete bench has loops.
     bench = complete(Bench.model_validate(plan.trials[use.trial - 1].bench, context={"si": True}))
     rate = bench.controller.rate
     if bench.is_linear:
-        return  # nobody measures travel in radians
+        return  # a linear axis has no radians
     lower = rate.model_copy(update={"proportional": rate.proportional / PER_RADIAN})
     controller = bench.controller.model_copy(update={"rate": lower})
     changed = bench.model_copy(update={"controller": controller})
     loops = dict(loops_of(changed, use.compensation, use.mode))
-    found = loops[use.regime]
-    if use.mode == "rate" and isinstance(found, LoopMargins) and found.stable:
+    lowered = loops[use.regime]
+    if use.mode == "rate" and isinstance(lowered, LoopMargins) and lowered.stable:
         yield (
             f"  with controller.rate.proportional 57.3 times smaller it is stable: is "
-            f"{rate.proportional:.4g} A s/rad meant, or A s/deg given as A s/rad?"
+            f"{rate.proportional:.4g} A s/rad intended, or A s/deg given as A s/rad?"
         )
 
 

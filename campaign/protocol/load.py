@@ -65,12 +65,12 @@ def load_protocol(
     """The protocol at `path` with everything it includes and every bench it names.
 
     Args:
-        experiments: the kinds of test there are, by name.
+        experiments: the available kinds of test, by name.
         overrides: `dotted.path=value` as given to `--set`.
-        shipped: folder whose `benches/` holds the benches that go by a bare name.
-        truth: a bench that is simulated in place of each test's, as given to `--truth`.
+        shipped: folder whose `benches/` holds the benches with a bare name.
+        truth: a bench to simulate in place of each test's, as given to `--truth`.
 
-    Raises ProtocolError with every mistake found in any of the files.
+    Raises ProtocolError with all problems of all files.
     """
     collected = Collection()
     settings, collected.problems = parse_overrides(overrides)
@@ -121,7 +121,7 @@ def _failed(collected: Collection) -> ProtocolError:
 
 @dataclass
 class _Loader:
-    """Validates what was collected; problems go to `collected.problems`."""
+    """Validator of the collected tests; appends problems to `collected.problems`."""
 
     collected: Collection
     experiments: Mapping[str, ExperimentKind]
@@ -135,8 +135,8 @@ class _Loader:
             earlier = first.setdefault(draft.name, draft)
             if draft.name and earlier is not draft:
                 at = earlier.source.positions.find(("test", earlier.index, "name"))
-                there = f"{earlier.source.file}:{at.line}:{at.column}"
-                message = f"a second test called '{draft.name}'; the first is at {there}"
+                place = f"{earlier.source.file}:{at.line}:{at.column}"
+                message = f"a second test called '{draft.name}'; the first is at {place}"
                 self._report(draft.origin.problem(("name",), "value", message))
             test = self._test(draft)
             if test is not None:
@@ -144,12 +144,12 @@ class _Loader:
         return tests
 
     def published(self, source: Source, written: str, origin: Origin) -> str:
-        """Name of the published values: "thesis", "none", or of a source that is read here."""
+        """Name of the published values: "thesis", "none", or the source that this reads."""
         if written in ("thesis", "none"):
             return written
         file = sibling(source, written)
-        found = self.files.read(read_source, *file, origin, ("published",), written)
-        return found.name if found is not None else written
+        values = self.files.read(read_source, *file, origin, ("published",), written)
+        return values.name if values is not None else written
 
     def calibration(
         self, source: Source, options: CalibrationOptions | None, origin: Origin
@@ -168,7 +168,7 @@ class _Loader:
         return Calibration(options, bench, origin)
 
     def check(self, entry: CheckEntry | None, origin: Origin) -> Check | None:
-        """The repeated trial; its test may stand in an included protocol."""
+        """The repeated trial; its test may be in an included protocol."""
         if entry is None:
             return None
         names = [draft.name for draft in self.collected.drafts]
@@ -234,7 +234,7 @@ class _Loader:
         return None
 
     def _bench(self, draft: Draft) -> Source | None:
-        """Its bench; the result of a calibration that is beside that is kept among the sources."""
+        """The test's bench; the result of a calibration beside it is added to the sources."""
         bench = self.files.bench(draft.tree.get("bench"), draft.source, draft.origin, ("bench",))
         if bench is None:
             return None
@@ -246,17 +246,17 @@ class _Loader:
     def _attached(
         self, draft: Draft, experiment: ExperimentKind, options: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """The options with the files that they name."""
+        """The options with the content of the files that they name."""
         return attach(experiment.options, options, self._reader(draft, draft.origin))
 
     def _reader(self, draft: Draft, origin: Origin) -> Read:
-        """Reads a file beside the draft's protocol and keeps its text among the sources."""
+        """A function that reads a file beside the draft's protocol and adds it to the sources."""
 
         def read(keys: Keys, written: str) -> TextFile:
-            found = self.files.read(
+            source = self.files.read(
                 read_any_text, *sibling(draft.source, written), origin, keys, written
             )
-            return TextFile(written) if found is None else TextFile(found.name, found.text)
+            return TextFile(written) if source is None else TextFile(source.name, source.text)
 
         return read
 
@@ -266,7 +266,7 @@ class _Loader:
         axes = []
         for path, (written, origin) in draft.axes.items():
             if path.split(".")[0] == "bench" and bench is None:
-                continue  # the bench must be right before its fields can be swept
+                continue  # only fields of a valid bench can be swept
             trees = {"options": options, "bench": bench}
             read = self._reader(draft, origin)
             keys = tuple(path.split("."))
@@ -284,7 +284,7 @@ class _Loader:
     def _options(
         self, draft: Draft, experiment: ExperimentKind, options: Any, axes: tuple[Axis, ...]
     ) -> None:
-        """Validate the options with the first value of every axis in its place."""
+        """Validate the options with the first value of every axis."""
         tree, patches = dict(options), []
         for axis in axes:
             if not axis.of_bench:
@@ -296,17 +296,17 @@ class _Loader:
             self._report(*valid)
 
     def _operator(self, test: Test) -> None:
-        """What a person is asked to do, tried at the first point of the matrix."""
+        """Check the operator steps at the first point of the matrix."""
         if not test.entry.operator or any(len(axis) == 0 for axis in test.axes):
             return
         try:
             point = first_point(test)
         except PointError:
-            return  # reported where the value stands
+            return  # reported at the value
         self._report(*operator_problems(test, point))
 
     def _compensation(self, test: Test, bench: Mapping[str, Any]) -> None:
-        """An option called `compensation` names a method that the bench has parameters for."""
+        """Check that the bench has parameters for each method of the option `compensation`."""
         names = ["none", *bench["compensation"]]
         given: list[tuple[Any, Origin, Keys]]
         given = [(test.options.get("compensation"), test.origin, ("compensation",))]
@@ -319,7 +319,7 @@ class _Loader:
 
 
 def unknown_compensation(name: str, names: Sequence[str], test: Test) -> str:
-    """What to say of a compensation that a test's bench has no parameters for."""
+    """Message for a compensation without parameters in the test's bench."""
     where = f"the bench '{test.bench_name}'"
     return f"{shown(name)} is no compensation of {where}; {allowed(names)}{nearest(name, names)}"
 

@@ -16,9 +16,9 @@ from campaign.protocol.positions import Keys
 from campaign.units import split_quantity
 
 LARGEST_PLAN = 100_000
-"""trials; more must be asked for."""
+"""Maximum number of trials without explicit permission."""
 LARGEST_AXIS = 10_000_000
-"""values of one range; nobody means more."""
+"""Maximum number of values of one range; more is an error of the user."""
 
 RANGE_KEYS = frozenset({"start", "stop", "num", "step", "spacing"})
 
@@ -40,9 +40,9 @@ class RangeEntry(Options):
 
 @dataclass(frozen=True)
 class Range:
-    """Numbers from `start` on, and the unit that follows each ("" for bare numbers).
+    """Numbers from `start` on with their unit ("" for bare numbers).
 
-    Either `step` is set or `spacing` counts.
+    `spacing` applies only without `step`.
     """
 
     start: float
@@ -74,7 +74,7 @@ class Range:
                 if self.spacing == "log"
                 else self.start + share * (self.stop - self.start)
             )
-        # 0.1 + 2 * 0.1 is meant to be 0.3, in the plan, in file names and on the page.
+        # 0.1 + 2 * 0.1 must be 0.3 in the plan, in file names and on the page.
         return float(f"{number:.12g}")
 
 
@@ -85,10 +85,10 @@ class Axis:
     Attributes:
         path: as written, e.g. "bench.axis.inertia".
         keys: the path in the options or, without "bench", in the bench.
-        of_bench: which of the two.
+        of_bench: whether `keys` is a path in the bench.
         values: a list as written, or a range.
         origin: of the axis.
-        listed: whether each value has a place of its own.
+        listed: whether each value has its own place in the file.
     """
 
     path: str
@@ -106,13 +106,13 @@ class Axis:
         return self.values.value(index) if isinstance(self.values, Range) else self.values[index]
 
     def describe(self) -> Any:
-        """What is swept as plain data, a range unexpanded: for comparing protocols."""
+        """The values as plain data, a range unexpanded, to compare protocols."""
         if isinstance(self.values, Range):
             return {key: getattr(self.values, key) for key in Range.__dataclass_fields__}
         return [str(v) if isinstance(v, TextFile) else v for v in self.values]
 
     def value_origin(self, index: int) -> Origin:
-        """Where that value stands; all values of a range stand at the range."""
+        """The place of a value in the file; for a range, the place of the range."""
         return _Element(self.origin, index) if self.listed else self.origin
 
 
@@ -133,7 +133,7 @@ def points(axes: Sequence[Axis]) -> Iterator[tuple[int, ...]]:
 
 
 def count_points(axes: Sequence[Axis]) -> int:
-    """How many points, without making any."""
+    """Number of points, without expansion."""
     return math.prod(len(axis) for axis in axes)
 
 
@@ -152,7 +152,7 @@ def flatten(matrix: Mapping[str, Any], prefix: Keys = ()) -> Iterator[tuple[str,
 
 
 def make_range(entry: RangeEntry) -> Range:
-    """The range, or ValueError with a message for the user. Nothing is expanded."""
+    """The unexpanded range. Raises ValueError with a message for the user."""
     start, unit = _number(entry.start, "start")
     stop, stop_unit = _number(entry.stop, "stop")
     if unit != stop_unit:
@@ -179,7 +179,7 @@ def _stepped(
     steps = (stop - start) / step
     if not steps < LARGEST_AXIS:
         raise ValueError(f"over {LARGEST_AXIS} steps from 'start' to 'stop'")
-    # The stop belongs to the range although 0.1 is no binary fraction.
+    # Tolerance: the stop belongs to the range although 0.1 is no binary fraction.
     return Range(start, stop, math.floor(steps * (1 + 1e-9) + 1e-9) + 1, unit, step)
 
 

@@ -1,8 +1,8 @@
 """Memory of a plan, estimated before it is made.
 
 The bytes are measured (trial, margins, seed, place; a bench with its tree and its loops) and
-rounded up. What a protocol asks for beyond the bound is refused, whatever `--allow-large` says: a
-slip of a digit must not take the machine that moves a bench.
+rounded up. A plan above the bound is refused, even with `--allow-large`: a wrong digit must not
+exhaust the memory of the machine that moves a bench.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from campaign.signals import MultiSine, Polyline, Signal
 from campaign.trial import Task
 
 MOST = 10**9
-"""bytes of a plan."""
+"""Maximum bytes of a plan."""
 SURELY = 10
-"""times what is left: so far beyond it need no further point be looked at."""
+"""Factor above the remaining memory at which the expansion stops without further points."""
 TRIAL = 7_000
-"""bytes of a trial that shares bench and options with others."""
+"""Bytes of a trial that shares bench and options with others."""
 BENCH = 50_000
-"""bytes of a bench of its own."""
+"""Bytes of each different bench."""
 KNOT = 64
-"""bytes of a point of a command."""
+"""Bytes of a point of a command."""
 
 
 def least(test: Test) -> int:
-    """Bytes that the plan of `test` takes at least; an experiment may ask for more trials."""
+    """Minimum bytes of the plan of `test`; an experiment may request more trials."""
     benches = math.prod(len(axis) for axis in test.axes if axis.of_bench)
     points = math.prod(len(axis) for axis in test.axes)
     return points * test.entry.repeat * TRIAL + benches * BENCH
@@ -48,7 +48,7 @@ def _knots(signal: Signal) -> int:
 
 
 def refusal(test: Test, bytes_needed: int) -> str:
-    """What to say of a test whose plan would take too much."""
+    """Message for a test whose plan would need too much memory."""
     points = math.prod(len(axis) for axis in test.axes)
     repeated = f", {test.entry.repeat} times" if test.entry.repeat > 1 else ""
     whole = f"{points} point{'s' if points != 1 else ''} of its matrix{repeated}"

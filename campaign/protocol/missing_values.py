@@ -1,7 +1,7 @@
 """Missing values of benches, and their effect on a plan.
 
-A bench is facts. Who executes a plan may need more than was written, and says so before anything is
-planned; of what a plan itself cannot predict, it warns.
+A bench states facts. A backend may need more values than the file states: this is an error before
+planning. Quantities that a plan cannot predict result in warnings.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from campaign.protocol.schema import Protocol, Test
 def check_benches(
     protocol: Protocol, needs: Sequence[str], who: str, only: Sequence[str] = ()
 ) -> None:
-    """Raise ProtocolError, at the bench's file, with all that `who` needs of it and it lacks.
+    """Raise ProtocolError, at the bench's file, with all missing values that `who` needs.
 
     Args:
         needs: dotted paths of a bench.
-        only: names of the tests that are asked about; all when empty.
+        only: names of the tests to check; all if empty.
     """
     problems: list[Problem] = []
     for test in protocol.tests:
@@ -44,8 +44,8 @@ def _problems(test: Test, needs: Sequence[str], who: str) -> Iterator[Problem]:
 
 
 def not_predicted(expanded: ExpandedTest) -> tuple[str, ...]:
-    """What a plan cannot tell of a test's trials for what their benches do not say; sentences."""
-    told: dict[str, None] = {}
+    """Warnings about quantities that a plan cannot predict for lack of values of the benches."""
+    gaps: dict[str, None] = {}
     seen: set[tuple[int, str]] = set()
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
         mode = trial.task.mode
@@ -54,10 +54,10 @@ def not_predicted(expanded: ExpandedTest) -> tuple[str, ...]:
         seen.add((id(bench), mode))
         if unknown := unpredicted(bench, trial.task):
             paths = tuple(dict.fromkeys(path for each in unknown.values() for path in each))
-            told[_sentence(f"its {' and '.join(unknown)} cannot be predicted", bench, paths)] = None
+            gaps[_sentence(f"its {' and '.join(unknown)} cannot be predicted", bench, paths)] = None
         if paths := lacking(bench):
-            told[_sentence("the margins of its loops are not known", bench, paths)] = None
-    return tuple(told)
+            gaps[_sentence("the margins of its loops are not known", bench, paths)] = None
+    return tuple(gaps)
 
 
 def _sentence(what: str, bench: Bench, paths: Sequence[str]) -> str:

@@ -22,21 +22,21 @@ from campaign.units import convert
 
 
 class PlaceholderError(ValueError):
-    """What is wrong with the text of a step, for the user."""
+    """An invalid text of a step, with a message for the user."""
 
 
 def setup_at(test: Test, point: Point) -> tuple[str, ...]:
-    """What a person must have done before the trials of `point`, in order."""
+    """The operator steps before the trials of `point`, in order."""
     return tuple(_rendered(entry, test.experiment.options, point) for entry in test.entry.operator)
 
 
 def set_by_operator(test: Test) -> tuple[str, ...]:
-    """The swept paths that a person sets, each once."""
+    """The swept paths that the operator sets, each once."""
     return tuple(dict.fromkeys(path for entry in test.entry.operator for path in entry.sets))
 
 
 def operator_problems(test: Test, point: Point) -> Iterator[Problem]:
-    """What is wrong with the steps of `test`: looked for at one `point`."""
+    """Problems of the steps of `test`, checked at one `point`."""
     swept = [axis.path for axis in test.axes]
     for index, entry in enumerate(test.entry.operator):
         try:
@@ -51,8 +51,8 @@ def operator_problems(test: Test, point: Point) -> Iterator[Problem]:
 
 
 def _rendered(entry: OperatorEntry, options: type[Options], point: Point) -> str:
-    """The text with its placeholders filled; a value set without being told is added to it."""
-    text, told = "", set()
+    """The text with its placeholders filled; set values without a placeholder are appended."""
+    text, placeholders = "", set()
     try:
         parts = list(Formatter().parse(entry.text))
     except ValueError as error:
@@ -63,10 +63,10 @@ def _rendered(entry: OperatorEntry, options: type[Options], point: Point) -> str
             continue
         if form or conversion:
             raise PlaceholderError(f"'{{{path}…}}': a placeholder is a path in braces, no more")
-        told.add(path)
+        placeholders.add(path)
         text += _value_text(path, options, point)
-    untold = [path for path in entry.sets if path not in told]
-    values = [f"{p} = {_value_text(p, options, point)}" for p in untold if p in point.values]
+    others = [path for path in entry.sets if path not in placeholders]
+    values = [f"{p} = {_value_text(p, options, point)}" for p in others if p in point.values]
     return f"{text} ({', '.join(values)})" if values else text
 
 

@@ -16,7 +16,7 @@ EXAMPLE = 'write --set test.option=value, such as --set stabilization.frequency=
 
 @dataclass(frozen=True)
 class Override:
-    """One `--set`: where, and the value as TOML would give it."""
+    """One `--set`: path, and the value as TOML would give it."""
 
     text: str
     keys: Keys
@@ -28,7 +28,7 @@ class Override:
 
 
 def parse_overrides(texts: Sequence[str]) -> tuple[list[Override], list[Problem]]:
-    """The overrides that make sense, and what is wrong with the others."""
+    """The valid overrides, and the problems of the others."""
     overrides, problems = [], []
     for text in texts:
         path, equals, value = text.partition("=")
@@ -42,7 +42,7 @@ def parse_overrides(texts: Sequence[str]) -> tuple[list[Override], list[Problem]
 
 
 def _keys(path: str) -> Keys:
-    """The parts of a dotted key, quoted ones included; empty when it is none."""
+    """The parts of a dotted key, including quoted ones; empty for other text."""
     try:
         tree: Any = tomllib.loads(f"{path.strip()} = 0")
     except (ValueError, RecursionError):
@@ -57,7 +57,7 @@ def _keys(path: str) -> Keys:
 
 
 def _value(text: str) -> Any:
-    """TOML when it is TOML, else text: quotes may be left out."""
+    """The value of valid TOML, else the text: quotes are optional."""
     try:
         tree = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

@@ -36,18 +36,18 @@ from campaign.text import nearest
 from campaign.trial import Most, Task, Tree, Trial, canonical_json
 
 STRUCTURE = 32_000
-"""Bytes that a trial's archive takes at most besides its samples, preview and description."""
+"""Maximum bytes of a trial's archive without its samples, preview and description."""
 
 BYTES = 8 * (CHANNELS + 1)
-"""of a sample of every channel and its time."""
+"""Bytes of one sample of every channel and its time."""
 
 PREVIEW = 20_000
-"""Samples beyond which a recording has a preview, of at most so many points."""
+"""Number of samples above which a recording has a preview; maximum points of a preview."""
 
 
 @dataclass(frozen=True)
 class LimitUse:
-    """A trial and how close it comes to one limit."""
+    """A trial and its margin to one limit."""
 
     trial: int
     margin: Margin
@@ -59,20 +59,20 @@ class PlannedTest:
 
     Attributes:
         bench: name of the bench's source.
-        options: normalised (SI), with the first value of whatever is swept; those that no trial
-            has, such as defaults beside recordings that nobody planned, are not among them.
-        matrix: swept path to its values, normalised (SI).
+        options: normalized (SI), with the first value of each swept option; without options that
+            no trial has, such as defaults beside unplanned recordings.
+        matrix: swept path to its values, normalized (SI).
         numbers: of its trials, in the order of execution.
         closest: for each limit the trial that uses most of it.
-        loops: of each compensation, mode and regime the loop with the least margin, the worst
-            first; none where nothing closes one.
-        seeks_instability: whether its experiment goes to where a loop is unstable.
+        loops: for each compensation, mode and regime the loop with the least margin, the worst
+            first; empty without closed loops.
+        seeks_instability: whether its experiment seeks the instability of a loop.
         coarse: for each limit of which one count of a sensor is a large part, such a trial.
         duration: bench time (s).
-        chosen: options that the test does not write and its experiment chose for the bench, with
-            the reason; as they are at the first point of the matrix.
-        stages: trials that follow from what these find, by point; they are not among `numbers`.
-        warnings: what its experiment says of the plan, with what to do about it.
+        chosen: reason for each unwritten option that the experiment chose for the bench, at the
+            first point of the matrix.
+        stages: stages that depend on these trials, by point; their trials are not in `numbers`.
+        warnings: warnings about the plan, with remedies.
     """
 
     name: str
@@ -101,19 +101,19 @@ class PlannedTest:
 
 @dataclass(frozen=True)
 class Plan:
-    """The ordered trials of a protocol, and everything needed to make the same plan again.
+    """The ordered trials of a protocol, with all data to make the same plan again.
 
-    Its trials are those of the first stage; what may follow them is in `stages`.
+    Its trials are those of the first stage; later ones are in `stages`.
 
     Attributes:
-        protocol: as it was loaded; its policy is not part of `normalised`.
-        only: the tests it was restricted to; empty for all.
-        normalised: what determines the trials, SI, of all tests: compared at a resume.
+        protocol: as loaded; its policy is not part of `normalised`.
+        only: names of the planned tests; empty for all.
+        normalised: data that determine the trials of all tests (SI); compared at a resume.
         fingerprint: SHA-256 of `normalised`.
-        seed: from which tests without a seed of their own got theirs.
+        seed: source of the seeds of tests without their own.
         breaches: every limit that a trial would break.
-        truths: plants that `sim` simulates in place of the benches, by the digest that trials
-            have. Nothing but `sim` and the archive takes them.
+        truths: plants that `sim` simulates in place of the benches, by the digest in the trials.
+            Only `sim` and the archive use them.
     """
 
     protocol: Protocol
@@ -133,12 +133,12 @@ class Plan:
 
     @property
     def stages(self) -> tuple[PlannedStage, ...]:
-        """What may follow from the trials of all tests."""
+        """The later stages of all tests."""
         return tuple(stage for test in self.tests for stage in test.stages)
 
     @property
     def following(self) -> Most:
-        """What the trials of later stages take at most."""
+        """Upper bounds for the trials of later stages."""
         return most_of(self.stages)
 
     @property
@@ -148,8 +148,8 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Bytes of all recordings before compression, an upper estimate of what is written; those
-        of later stages included.
+        """Bytes of all recordings before compression, with those of later stages: an upper
+        estimate of the archive size.
         """
         texts = sum(len(text) for text in self.protocol.sources.values())
         planned = sum(map(_size, self.trials)) + texts
@@ -167,12 +167,12 @@ def make_plan(
 
     Args:
         only: names of the tests to plan; all when empty. A trial's seed does not depend on it.
-        allow_large: plan more than 100 000 trials, too.
-        seed: for tests without their own; drawn when None, and recorded either way.
+        allow_large: permit more than 100 000 trials.
+        seed: for tests without their own; drawn if None, and recorded in any case.
 
-    Raises UsageError for unknown names in `only`, and ProtocolError when options and bench do not
-    go together at some point of a matrix, or when the plan is too large. Limits are only measured:
-    see `check_limits`.
+    Raises UsageError for unknown names in `only`, and ProtocolError if options and bench contradict
+    each other at a point of a matrix, or if the plan is too large. Margins to limits are computed,
+    not enforced: see `check_limits`.
     """
     chosen = _chosen(protocol, only)
     problems = [problem for test in chosen for problem in _too_large(test, allow_large)]
@@ -195,7 +195,7 @@ def make_plan(
     if problems:
         raise ProtocolError(list(dict.fromkeys(problems)))
     trials = [trial for expanded in expansions for trial in expanded.trials]
-    trials.sort(key=lambda trial: trial.number)  # checks stand among the trials of other tests
+    trials.sort(key=lambda trial: trial.number)  # checks are between trials of other tests
     normalised: Tree = {"tests": [_normalised(t, master) for t in protocol.tests]}
     if protocol.check is not None:
         normalised["check"] = {"test": protocol.check.test, "every": protocol.check.every}
@@ -232,7 +232,7 @@ def _expanded(
         raise ProtocolError(list(dict.fromkeys(problems)))
     check, names = protocol.check, [test.entry.name for test in chosen]
     if check is None or check.test not in names:
-        return expansions  # --only left out the test that would be repeated
+        return expansions  # --only excludes the test to repeat
     named = names.index(check.test)
     if expansions[named].first_measurement is None:
         raise ProtocolError([nothing_to_check(check)])
@@ -258,7 +258,7 @@ def _size(trial: Trial) -> int:
 
 
 def _size_of_stages(plan: Plan) -> int:
-    """Bytes of the trials that may follow, each described like the longest planned one."""
+    """Bytes of the trials that may follow, each with the longest description of a planned one."""
     most = plan.following
     if not most.trials:
         return 0
@@ -268,10 +268,10 @@ def _size_of_stages(plan: Plan) -> int:
 
 
 def _limit_uses(expanded: ExpandedTest) -> Iterator[LimitUse]:
-    """Of trials with one bench and task the first one's, and of each all that break a limit."""
+    """Margins of the first trial with each bench and task, and each broken limit of all trials."""
     known: dict[tuple[int, Task], tuple[Margin, ...]] = {}
     for trial, bench in zip(expanded.trials, expanded.benches, strict=True):
-        if trial.recording:  # it has been executed, and broke what it broke
+        if trial.recording:  # it was executed already
             continue
         key = (id(bench), trial.task)
         first = key not in known
@@ -329,16 +329,16 @@ def _planned(
 
 def _worst(uses: Iterable[LimitUse]) -> tuple[LimitUse, ...]:
     """For each limit the trial that uses most of it."""
-    found: dict[str, LimitUse] = {}
+    worst: dict[str, LimitUse] = {}
     for use in uses:
-        best = found.get(use.margin.limit)
+        best = worst.get(use.margin.limit)
         if best is None or use.margin.fraction > best.margin.fraction:
-            found[use.margin.limit] = use
-    return tuple(found.values())
+            worst[use.margin.limit] = use
+    return tuple(worst.values())
 
 
 def _normalised(test: Test, master: int) -> Tree:
-    """What determines the trials of a test; prose is left out, so that it may be corrected."""
+    """Data that determine the trials of a test; prose is excluded and may be corrected."""
     first = first_point(test)
     swept: dict[str, Any] = {axis.path: axis.describe() for axis in test.axes}
     by_hand: list[Any] = [entry.model_dump(mode="json") for entry in test.entry.operator]
@@ -376,4 +376,4 @@ def _too_large(test: Test, allow_large: bool) -> list[Problem]:
         return [size_problem(test, f"test '{test.entry.name}' alone has {trials}, the plan")]
     if memory.least(test) > memory.MOST:
         return [memory_problem(test, memory.least(test))]
-    return list(value_problems(test))  # loading left them out
+    return list(value_problems(test))  # loading did not check them

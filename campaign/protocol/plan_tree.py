@@ -16,26 +16,26 @@ from campaign.protocol.stages import PlannedStage
 from campaign.trial import Most, Trial
 
 POLES = 8
-"""of each loop that are told, the fastest growing first."""
+"""Reported poles of each loop, the fastest growing first."""
 
 
 def as_tree(plan: Plan) -> dict[str, Any]:
-    """Everything about a plan but the files it came from; JSON-able, SI, stable names."""
-    asked = plan.protocol
+    """A plan without the text of its files, as JSON-compatible data: SI, stable names."""
+    protocol = plan.protocol
     return {
-        "protocol": asked.path.name,
-        "title": asked.title,
-        "description": asked.description,
-        "operator": asked.operator,
-        "notes": asked.notes,
-        "tags": list(asked.tags),
-        "published": asked.published,
+        "protocol": protocol.path.name,
+        "title": protocol.title,
+        "description": protocol.description,
+        "operator": protocol.operator,
+        "notes": protocol.notes,
+        "tags": list(protocol.tags),
+        "published": protocol.published,
         "fingerprint": plan.fingerprint,
         "seed": plan.seed,
-        "overrides": list(asked.overrides),
+        "overrides": list(protocol.overrides),
         "only": list(plan.only),
-        "sources": sorted(asked.sources),
-        "policy": asked.policy.model_dump(mode="json"),
+        "sources": sorted(protocol.sources),
+        "policy": protocol.policy.model_dump(mode="json"),
         "duration_s": plan.duration,
         "following": _most(plan.following),
         "samples": plan.samples,
@@ -74,7 +74,7 @@ def _test(test: PlannedTest) -> dict[str, Any]:
 
 
 def stage_tree(stage: PlannedStage) -> dict[str, Any]:
-    """A stage as `planned_stage` reads it back."""
+    """A stage as plain data, readable by `planned_stage`."""
     return {
         "number": stage.number,
         "name": stage.name,
@@ -139,7 +139,7 @@ def _use(use: LimitUse) -> dict[str, JsonValue]:
 
 
 def loop_tree(use: LoopUse) -> dict[str, JsonValue]:
-    """A loop with its margins; null where there is no such crossing."""
+    """A loop with its margins; a margin without a crossing is null."""
     return {
         "compensation": use.compensation,
         "mode": use.mode,
@@ -168,5 +168,5 @@ def margins_tree(margins: LoopMargins) -> dict[str, JsonValue]:
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no infinity; the acceleration of a command that jumps becomes null."""
+    """None for infinity, which JSON lacks: the acceleration of a command that jumps."""
     return value if math.isfinite(value) else None

@@ -31,34 +31,34 @@ class PointError(Exception):
 
 
 def incomplete(test: Test, error: IncompleteBenchError) -> PointError:
-    """What a test needs of its bench and the bench does not say."""
+    """The error for values that a test needs and its bench does not state."""
     message = f"test '{test.entry.name}' ({test.entry.kind}): {error}"
     return PointError([test.origin.problem(("bench",), "value", message)])
 
 
 def first_line(error: Exception) -> str:
-    """What went wrong, in a line."""
+    """The message of an error in one line."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
-    # pydantic's messages have a headline, a field and a sentence; all three are needed.
+    # A pydantic message has a headline, a field and a sentence; all three are necessary.
     return " ".join(line.strip() for line in lines[:3])
 
 
 def refused(test: Test, bench: Bench, error: Exception, where: str = "") -> PointError:
-    """An experiment's word against options and bench of a point."""
+    """The error if an experiment refuses options and bench of a point."""
     if isinstance(error, IncompleteBenchError):
         return incomplete(test, error)
-    told = in_axis_terms(first_line(error), bench.sides)
-    message = f"test '{test.entry.name}'{where}: {told}"
+    reason = in_axis_terms(first_line(error), bench.sides)
+    message = f"test '{test.entry.name}'{where}: {reason}"
     return PointError([test.origin.problem((), "value", message)])
 
 
 @dataclass(frozen=True)
 class Point:
-    """One point: swept path to SI value, and what a trial there has; objects beside their trees.
+    """A point of the matrix: swept path to SI value; options and bench as objects and as trees.
 
     Attributes:
-        chosen: why the experiment took its value, for each option that the test does not write.
-        told: swept values that have a unit, as the protocol writes them.
+        chosen: reason for each option value that the experiment chose for an unwritten option.
+        told: swept values with a unit, as written in the protocol.
     """
 
     values: Mapping[str, JsonValue]
@@ -71,17 +71,17 @@ class Point:
 
     @property
     def written(self) -> Tree:
-        """The options that the test writes, without any default."""
+        """The options that the test writes, without defaults."""
         return self.options.model_dump(mode="json", exclude_unset=True)
 
     @property
     def label(self) -> str:
-        told = {path: self.told.get(path, value) for path, value in self.values.items()}
-        return ", ".join(f"{path} = {value}" for path, value in told.items())
+        texts = {path: self.told.get(path, value) for path, value in self.values.items()}
+        return ", ".join(f"{path} = {value}" for path, value in texts.items())
 
 
 def points_of(test: Test) -> Iterator[Point]:
-    """Every point of the matrix, first axis slowest. Raises PointError at one that is invalid."""
+    """Every point of the matrix, first axis slowest. Raises PointError for an invalid point."""
     cache = _Cache(test)
     for indices in points(test.axes):
         bench, bench_tree = cache.bench(indices)
@@ -92,8 +92,8 @@ def points_of(test: Test) -> Iterator[Point]:
         }
         pairs = zip(test.axes, indices, strict=True)
         texts = {axis.path: as_written(axis.value(index)) for axis, index in pairs}
-        told = {path: text for path, text in texts.items() if text}
-        yield Point(values, options, options_tree, bench, bench_tree, chosen, told)
+        with_units = {path: text for path, text in texts.items() if text}
+        yield Point(values, options, options_tree, bench, bench_tree, chosen, with_units)
 
 
 def first_point(test: Test) -> Point:
@@ -106,7 +106,7 @@ def first_point(test: Test) -> Point:
 
 @dataclass
 class _Cache:
-    """Options and benches already validated: a sweep of one leaves the other as it is."""
+    """Cache of validated options and benches: a sweep of one does not change the other."""
 
     test: Test
     known_options: dict[tuple[int, ...], tuple[Options, Tree]] = field(default_factory=dict)
@@ -133,7 +133,7 @@ class _Cache:
         return self.known_options[key]
 
     def fitted(self, indices: tuple[int, ...]) -> tuple[Options, Tree, Mapping[str, str]]:
-        """Options with what the experiment chooses for this bench, and why; `options` without."""
+        """Options with the experiment's choices for this bench, and their reasons."""
         options, tree = self.options(indices)
         fit = self.test.experiment.fit
         if fit is None:
@@ -150,7 +150,7 @@ class _Cache:
         if key not in self.known_fits:
             values = {name: choice.value for name, choice in chosen.items()}
             fitted = options.model_copy(update=values)
-            # Who asks later which options were written must not be told of these.
+            # These fields must not count as written options.
             fitted.__pydantic_fields_set__.difference_update(values)
             reasons = {
                 name: in_axis_terms(choice.reason, bench.sides) for name, choice in chosen.items()
@@ -174,7 +174,7 @@ class _Cache:
         for axis, index in swept:
             tree = replaced(tree, axis.keys, axis.value(index))
         try:
-            # Reading the normalised bench back is twenty times quicker than reading its text.
+            # Validation of the normalized bench is 20 times faster than of its text.
             return Bench.model_validate(tree, context={"si": True})
         except ValidationError:
             patches = [(axis.keys, axis.value_origin(index)) for axis, index in swept]
@@ -194,5 +194,5 @@ class _Cache:
 def _at(tree: Any, keys: Keys) -> JsonValue:
     for key in keys:
         tree = tree[key]
-    found: JsonValue = tree
-    return found
+    value: JsonValue = tree
+    return value

@@ -1,7 +1,7 @@
 """Positions of keys and values in a TOML text.
 
-`tomllib` gives values without positions, so the text is parsed once more, by tree-sitter, and only
-when there is an error to point at.
+`tomllib` gives values without positions. If an error needs a position, tree-sitter parses the text
+again.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Keys = tuple[str | int, ...]
 """A path into a TOML document, e.g. ("test", 0, "matrix", "bench.axis.inertia", 1)."""
 
 Aim = Literal["key", "value"]
-"""What to point at; the value of a table is its header, or the brace of an inline one."""
+"""The part to report; the value of a table is its header, or the brace of an inline table."""
 
 
 class Position(NamedTuple):
@@ -26,7 +26,7 @@ class Position(NamedTuple):
 
 
 class _Point(NamedTuple):
-    """Line and byte of it, both from 0: what tree-sitter tells."""
+    """Line and byte in the line, both from 0, as in tree-sitter."""
 
     row: int
     byte: int
@@ -52,7 +52,7 @@ class Positions:
         self._read_document(_parse(encoded))
 
     def find(self, keys: Keys, aim: Aim = "value") -> Position:
-        """Position of what stands at `keys`, or of the nearest thing around it."""
+        """Position of the entry at `keys`, or of the innermost entry around it."""
         for length in range(len(keys), 0, -1):
             entry = self._entries.get(keys[:length])
             if entry is not None:
@@ -61,7 +61,7 @@ class Positions:
         return Position(1, 1)
 
     def span(self, keys: Keys) -> tuple[int, int] | None:
-        """First byte of the value written at `keys`, and the first after it, in UTF-8."""
+        """First byte of the value at `keys`, and the first byte after it, in UTF-8."""
         return self._spans.get(keys)
 
     def _read_document(self, root: Any) -> None:
@@ -80,7 +80,7 @@ class Positions:
         here = _point(node)
         name = next((child for child in node.children if child.type in _KEYS), node)
         last = list(_key_parts(name))[-1][1] if name is not node else node
-        # An element of an array of tables is named by nothing but its own header.
+        # Only its own header names an element of an array of tables.
         key = here if keys and isinstance(keys[-1], int) else _point(last)
         self._entries[keys] = _Entry(key, here)
         for child in node.children:
@@ -89,7 +89,7 @@ class Positions:
 
     def _read_pair(self, node: Any, keys: Keys) -> None:
         key_node = node.children[0]
-        # A comment behind the value is a child of the pair as well.
+        # A comment after the value is a child of the pair, too.
         value_node = next((c for c in node.children[1:] if c.type in _VALUES), node.children[-1])
         for part, part_node in _key_parts(key_node):
             keys = (*keys, part)
@@ -136,7 +136,7 @@ class Positions:
         return (*keys, index)
 
     def _position(self, point: _Point) -> Position:
-        # tree-sitter counts bytes, people count characters. Only what is asked for is counted: a
+        # tree-sitter counts bytes, editors count characters. Convert only requested positions: a
         # line may be as long as the file.
         before = self._lines[point.row][: point.byte].decode(errors="replace")
         return Position(point.row + 1, len(before) + 1)

@@ -1,6 +1,6 @@
 """From pydantic errors to messages for a user.
 
-A message says what stands there, what is allowed, and the nearest valid name for a typo.
+A message states the value, the permitted values, and the nearest valid name for a typo.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from campaign.text import nearest
 
 Model = TypeVar("Model", bound=BaseModel)
 Fault = tuple[Keys, Aim, str]
-"""A mistake in a tree of values: where, what to point at, and the message."""
+"""A problem in a tree of values: keys, aim and message."""
 
 
 def validate(
     model: type[Model], tree: Mapping[str, Any], origin: Origin, also: Collection[str] = ()
 ) -> Model | list[Problem]:
-    """`tree` as a `model`, or everything wrong with it. `also`: further names to suggest."""
+    """`tree` as a `model`, or all its problems. `also`: further names to suggest."""
     valid = find_faults(model, tree, also)
     return [origin.problem(*fault) for fault in valid] if isinstance(valid, list) else valid
 
@@ -36,8 +36,8 @@ def validate(
 def find_faults(
     model: type[Model], tree: Mapping[str, Any], also: Collection[str] = ()
 ) -> Model | list[Fault]:
-    """`tree` as a `model`, or where it is wrong, before anybody knows where it came from."""
-    # A bench says itself how it moves; options are read with the one of their test in mind.
+    """`tree` as a `model`, or its faults, without their place in a file."""
+    # A bench states its kind of axis; options use that of the bench of their test.
     sides = sides_in(tree) if "axis" in model.model_fields else current_sides()
     with axis_terms(sides):
         faults = list(_loose_values(model, tree))
@@ -59,7 +59,7 @@ def allowed(names: Iterable[str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as it would stand in TOML, short."""
+    """A value in TOML notation, shortened."""
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, list | tuple):
@@ -78,10 +78,10 @@ def _a(noun: str) -> str:
 
 def _fault(model: type[BaseModel], tree: Any, detail: ErrorDetails, also: Collection[str]) -> Fault:
     keys, shape = from_location(model, detail["loc"])
-    if keys[-1:] == ("[key]",):  # pydantic's name for a key that may not stand in a table
+    if keys[-1:] == ("[key]",):  # pydantic's name for a key that a table does not permit
         return keys[:-1], "key", _wrong_value(None, detail)
     while keys and not isinstance(_value_at(tree, keys[:-1]), Mapping | list):
-        keys = keys[:-1]  # within a value that is short for a table
+        keys = keys[:-1]  # within a value that abbreviates a table
     match detail["type"]:
         case "extra_forbidden":
             around = shape_at(model, tree, keys[:-1]) if len(keys) > 1 else Shape((model,))
@@ -117,7 +117,7 @@ def _wrong_tag(keys: Keys, shape: Shape | None, tree: Any, context: Mapping[str,
 
 
 def _place_of_tag(keys: Keys, tree: Any, field: str) -> tuple[Keys, Aim]:
-    """Where a table says what it is: in `field`, or by its own name."""
+    """The place of a table's tag: `field`, or the table's own name."""
     value = _value_at(tree, keys)
     if isinstance(value, Mapping) and field not in value:
         return keys, "key"
@@ -148,7 +148,7 @@ _COMPARED = {
 
 
 def _wrong_value(shape: Shape | None, detail: ErrorDetails, written: Any = None) -> str:
-    """The message; `written` is the value before its unit was converted, where that is known."""
+    """The message; `written` is the value before the conversion of its unit, if known."""
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     here = shown(value)
     if isinstance(value, float) and not math.isfinite(value):
@@ -187,12 +187,12 @@ def _expected(shape: Shape | None) -> str:
 
 
 def _literals(expected: str) -> list[str]:
-    """As pydantic writes `'a', 'b' or 'c'`."""
+    """The names in pydantic's text `'a', 'b' or 'c'`."""
     return [part.strip().strip("'") for part in expected.replace(" or ", ", ").split(",")]
 
 
 def _loose_values(model: type[BaseModel], tree: Any) -> Iterator[Fault]:
-    """Values that pydantic would quietly convert: text or true where a number stands."""
+    """Faults of values that pydantic would convert silently: text or true for a number."""
     stack: list[tuple[Keys, Shape | None, Any]] = [((), Shape((model,)), tree)]
     while stack:
         keys, shape, value = stack.pop()
@@ -222,10 +222,10 @@ def _value_at(tree: Any, keys: Keys) -> Any:
 
 
 def _once_per_place(faults: Iterable[Fault]) -> list[Fault]:
-    """One message per place, in the order found; the members of a union complain one by one."""
+    """One message per place, in the given order: each member of a union reports its own."""
     first: dict[tuple[Keys, Aim, str], Fault] = {}
     for keys, aim, message in faults:
-        # Two fields missing in one table are two problems at one place.
+        # Two missing fields of one table are two problems at one place.
         distinct = message if " is missing" in message else ""
         first.setdefault((keys, aim, distinct), (keys, aim, message))
     return list(first.values())

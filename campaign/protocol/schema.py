@@ -1,7 +1,7 @@
 """The schema of a protocol file, and a loaded protocol.
 
-The options of a test depend on its kind, so they are validated by the experiment and only named
-here by exclusion: every key of a test that is not a field of `TestEntry`.
+The options of a test depend on its kind, so the experiment validates them. Here they are every key
+of a test that is not a field of `TestEntry`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Slug = Annotated[
 
 @dataclass(frozen=True)
 class ChosenValue:
-    """A value (SI) that an experiment chose for an option that a test does not write, and why."""
+    """A value (SI) that an experiment chose for an unwritten option of a test, and the reason."""
 
     value: Any
     reason: str
@@ -41,7 +41,7 @@ class ChosenValue:
 
 @dataclass(frozen=True)
 class StageKind:
-    """What a plan needs of a stage; see `campaign.experiments.interface.Stage`."""
+    """Data of a stage for a plan; see `campaign.experiments.interface.Stage`."""
 
     name: str
     why: str
@@ -50,7 +50,7 @@ class StageKind:
 
 @dataclass(frozen=True)
 class ExperimentKind:
-    """What a plan needs of an experiment; see `campaign.experiments.interface.Experiment`."""
+    """Data of an experiment for a plan; see `campaign.experiments.interface.Experiment`."""
 
     name: str
     summary: str
@@ -161,15 +161,14 @@ class Test:
     """A validated test; its values are still as written, so that a sweep can replace them.
 
     Attributes:
-        entry: the keys every test has.
+        entry: the keys that every test has.
         options: the options of its kind as written, unswept.
         bench: the bench as written, unswept.
         bench_name: of its source.
         axes: the matrix, first key slowest.
-        origin, bench_origin: where they stand, for problems found later.
-        truth: what is simulated in place of the bench, see `physics.truth.plant_of`; None: nothing
-            else.
-        first: the first point of the matrix, once `points.first_point` was asked for it.
+        origin, bench_origin: places of options and bench, for later problems.
+        truth: simulated in place of the bench, see `physics.truth.plant_of`; None: the bench.
+        first: cache of `points.first_point`.
     """
 
     __test__ = False
@@ -191,9 +190,9 @@ class Check:
     """The `[check]` of a loaded protocol.
 
     Attributes:
-        test: whose first measurement is repeated.
-        every: after how many measurements.
-        origin: of the protocol's top level, for problems found later.
+        test: name of the test whose first measurement is repeated.
+        every: number of measurements between checks.
+        origin: of the protocol's top level, for later problems.
     """
 
     test: str
@@ -203,17 +202,17 @@ class Check:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A validated protocol with all it includes.
+    """A validated protocol with its includes.
 
     Attributes:
         path: of the file, as the user named it.
         published: "thesis", "none", or the name of a source.
         sources: verbatim text of every protocol, bench and published file, by its name as written.
-        overrides: what `--set` was given.
-        calibration: what may be fitted, None when the protocol does not say.
+        overrides: texts of `--set`.
+        calibration: None if the protocol has none.
         policy, check: of this file; those of included protocols do not apply.
         truth_sources: verbatim text of every truth, by its name as written; not among `sources`.
-        columns: of files from elsewhere, as written in this file; `origin` is where that stands.
+        columns: columns of imported files, as written in this file; `origin` is their place.
     """
 
     path: Path
@@ -242,7 +241,7 @@ def split_entry(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]
 
 
 def replaced(tree: Mapping[str, Any], keys: Keys, value: Any) -> dict[str, Any]:
-    """A copy of nested tables with `value` at `keys`; absent tables on the way are made."""
+    """A copy of nested tables with `value` at `keys`; absent tables on the path are created."""
     copy = dict(tree)
     key = str(keys[0])
     if len(keys) == 1:

@@ -1,7 +1,7 @@
 """Walking pydantic models along a path of keys.
 
-pydantic's error locations contain tags of unions that no file contains, and name no alternatives;
-both follow from the declared types.
+Error locations of pydantic contain tags of unions, which are not in the file, and no alternatives;
+both are derived from the declared types.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class Shape:
     """The type declared for a value.
 
     Attributes:
-        members: the types it may have, None left out.
-        discriminator: the field that tells models apart, or "".
-        quantity: the physical quantity it is, if it is one.
-        owner: model and name of the field, where it is one.
-        choice: the tables among which the discriminator chooses, in place of members.
+        members: the permitted types, without None.
+        discriminator: the field that distinguishes models, or "".
+        quantity: the physical quantity, if any.
+        owner: model and name, if it is a field.
+        choice: the tables that the discriminator selects, in place of members.
     """
 
     members: tuple[Any, ...]
@@ -40,7 +40,7 @@ class Shape:
 
     @property
     def meaning(self) -> str:
-        """What the field's documentation says."""
+        """The documentation of the field."""
         return meaning_of(*self.owner) if self.owner else ""
 
     @property
@@ -70,13 +70,13 @@ class Shape:
         return Shape(tuple(chosen))
 
     def narrowed(self, value: Any) -> Shape:
-        """This shape with a discriminated union narrowed by what `value` says."""
+        """This shape with a discriminated union narrowed by the discriminator in `value`."""
         if self.is_union and self.discriminator and isinstance(value, Mapping):
             return self.tagged(value.get(self.discriminator))
         return self
 
     def child(self, key: str | int) -> Shape | None:
-        """The shape of the value under `key`, or None when nothing is declared for it."""
+        """The shape of the value under `key`, or None if none is declared."""
         for member in self.members:
             if isinstance(member, type) and issubclass(member, BaseModel):
                 if str(key) in member.model_fields:
@@ -90,7 +90,7 @@ class Shape:
         return None
 
     def names(self) -> tuple[str, ...]:
-        """The fields that may stand here, in the order they were declared."""
+        """The permitted fields, in the order of declaration."""
         return tuple(dict.fromkeys(name for model in self.models() for name in model.model_fields))
 
 
@@ -125,7 +125,7 @@ def shape_of(annotation: Any) -> Shape:
 
 
 def _untagged(member: Any) -> Any:
-    """A member of a union that is told apart by a function, without its label."""
+    """A member of a union without the label of a discriminator function."""
     if get_origin(member) is Annotated and any(isinstance(m, Tag) for m in get_args(member)[1:]):
         return get_args(member)[0]
     return member
@@ -134,7 +134,7 @@ def _untagged(member: Any) -> Any:
 def from_location(
     root: type[BaseModel], location: Sequence[str | int]
 ) -> tuple[Keys, Shape | None]:
-    """The path in the file that a pydantic location means, and what is declared there."""
+    """The path in the file of a pydantic location, and the shape declared there."""
     keys: Keys = ()
     shape: Shape | None = Shape((root,))
     for part in location:
@@ -147,7 +147,7 @@ def from_location(
 
 
 def shape_at(root: type[BaseModel], tree: Any, keys: Keys) -> Shape | None:
-    """What is declared at `keys` of a tree of values; unions are told apart by the values."""
+    """The shape at `keys` of a tree of values, which narrow its unions."""
     shape: Shape | None = Shape((root,))
     for key in keys:
         if shape is None:
@@ -179,7 +179,7 @@ def _tags(model: type[BaseModel], discriminator: str) -> tuple[Any, ...]:
 
 
 Read = Callable[[Keys, str], TextFile]
-"""The file that is written at some keys; when it cannot be read, one without text."""
+"""Reads the file that is named at some keys; an unreadable file has no text."""
 
 
 def attach(options: type[BaseModel], tree: Mapping[str, Any], read: Read) -> dict[str, Any]:
@@ -191,7 +191,7 @@ def attach(options: type[BaseModel], tree: Mapping[str, Any], read: Read) -> dic
 def attach_values(
     options: type[BaseModel], tree: Mapping[str, Any], keys: Keys, values: Any, read: Read
 ) -> Any:
-    """The same for the listed values of an option that is swept; `keys` lead to it."""
+    """The same for the listed values of a swept option at `keys`."""
     shape = shape_at(options, tree, keys)
     if shape is None or not isinstance(values, list):
         return values

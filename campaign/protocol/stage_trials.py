@@ -23,14 +23,14 @@ from campaign.protocol.stages import PlannedStage
 from campaign.trial import Most, Trial, TrialRequest, canonical_json
 
 ROUNDING = 1e-9
-"""of a stage's duration that is no more than was said."""
+"""Relative tolerance of a stage's duration above its bound."""
 
 Refusal = Callable[[Trial], str]
-"""Why a trial cannot be executed; empty when it can."""
+"""Returns the reason why a trial cannot be executed; "" if it can."""
 
 
 class TooMuchError(Exception):
-    """A stage asks for more than it said that it would."""
+    """The requests of a stage exceed its bounds."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class StageTrials:
 
     Attributes:
         trials: in the order of execution, numbered.
-        refused: those that may not be executed: label, and why.
+        refused: label and reason of each trial that must not be executed.
     """
 
     trials: tuple[Trial, ...]
@@ -54,22 +54,22 @@ def follow(
     first: int,
     refusal: Refusal,
 ) -> StageTrials:
-    """The trials for which a stage asks; one that may not be executed is refused by itself.
+    """The trials that a stage requests; each trial that must not be executed is refused alone.
 
     Args:
-        requests: as the experiment yields them; no more are taken than the stage may ask for.
-        planned: a planned trial of the same point, whose bench, options and setup they share.
-        first: number of the first of them.
-        refusal: what a backend says of a trial.
+        requests: as the experiment yields them; at most one more than permitted is read.
+        planned: a planned trial of the same point, with the common bench, options and setup.
+        first: number of the first trial.
+        refusal: the backend's reason to refuse a trial.
 
-    Raises TooMuchError when there are more than were planned for; what `requests` raises.
+    Raises TooMuchError if the requests exceed the stage's bounds, and the errors of `requests`.
     """
-    asked = list(islice(requests, stage.most.trials + 1))
-    _check_size(stage.most, asked)
+    listed = list(islice(requests, stage.most.trials + 1))
+    _check_size(stage.most, listed)
     bench = Bench.model_validate(planned.bench, context={"si": True})
     trials: list[Trial] = []
     refused: list[tuple[str, str]] = []
-    for index, request in enumerate(asked):
+    for index, request in enumerate(listed):
         trial = _trial(stage, experiment, request, planned, first + len(trials), index)
         try:
             own = bench
@@ -114,11 +114,11 @@ def _trial(
     number: int,
     index: int,
 ) -> Trial:
-    """A trial of a stage. Its seed follows from its place, whatever else was refused or executed:
-    the test's seed, the point, the stage, and its index among what the stage asks for.
+    """A trial of a stage. Its seed depends on the test's seed, the point, the stage, and its index
+    among the requests, not on other refused or executed trials.
     """
-    asked = fields_of(experiment, request, planned.bench, {})
-    return Trial.model_construct(  # as in a plan: what there is to check of it, `_check` does
+    fields = fields_of(experiment, request, planned.bench, {})
+    return Trial.model_construct(  # as in a plan: `_check` makes the necessary checks
         number=number,
         test=planned.test,
         kind=planned.kind,
@@ -129,17 +129,17 @@ def _trial(
         truth=planned.truth,
         setup=planned.setup,
         set_by_operator=planned.set_by_operator,
-        **{**asked, "told": {**planned.told, **asked["told"]}},
+        **{**fields, "told": {**planned.told, **fields["told"]}},
     )
 
 
 def _check(trial: Trial, bench: Bench, experiment: ExperimentKind) -> None:
-    """ValueError with every reason for which a plan with this trial would be refused."""
+    """Raise ValueError with all reasons for which a plan with this trial would be refused."""
     name, names = trial.task.compensation, ["none", *bench.compensation]
     if name not in names:
         raise ValueError(f"the bench has no compensation {name!r}; it has {', '.join(names)}")
     check_recording(trial.task)
-    canonical_json(trial.model_dump(mode="json"))  # the journal has room for finite numbers only
+    canonical_json(trial.model_dump(mode="json"))  # the journal permits finite numbers only
     if reasons := [*_broken(trial, bench), *_unstable(trial, bench, experiment)]:
         raise ValueError("; ".join(reasons))
 

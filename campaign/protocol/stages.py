@@ -1,8 +1,8 @@
 """Stages of a plan: trials that depend on earlier results.
 
-A plan's own trials are the first stage of every test. What an experiment declares beyond them
-(`Experiment.stages`) is planned by point of the matrix: how many trials follow at most, how long
-they take, how much they record. Which they are, `protocol.follow` says once there is data.
+A plan's own trials are the first stage of every test. Stages that an experiment declares
+(`Experiment.stages`) are planned by point of the matrix: maximum number, duration and samples of
+their trials. `stage_trials.follow` makes the trials when there is data.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ class PlannedStage:
 
     Attributes:
         number: from `FIRST`: its place among the experiment's stages.
-        name, why: as the experiment declares them.
+        name, why: as declared by the experiment.
         point: swept path to value (SI).
-        seed: of the test; those of the trials follow from it.
-        most: what its trials take at most.
+        seed: of the test; the seeds of the trials depend on it.
+        most: upper bounds for its trials.
     """
 
     test: str
@@ -42,7 +42,7 @@ class PlannedStage:
     most: Most
 
     def is_of(self, trial: Trial) -> bool:
-        """Whether it follows from `trial`, among others: one of the same point, and no check."""
+        """Whether the stage depends on `trial`: same test and point, and no check."""
         return (
             trial.test == self.test
             and trial.role is not Role.CHECK
@@ -51,7 +51,7 @@ class PlannedStage:
 
     @property
     def place(self) -> str:
-        """The test and the point, for whoever groups by them."""
+        """The test and the point, as a key for groups."""
         return place_of(self.test, self.point)
 
 
@@ -61,7 +61,7 @@ def place_of(test: str, point: Mapping[str, JsonValue]) -> str:
 
 
 def planned_stages(test: Test, point: Point, seed: int) -> Iterator[PlannedStage]:
-    """The stages for which the options of a point ask. Raises what the experiment raises."""
+    """The stages that the options of a point request. Raises the errors of the experiment."""
     for number, stage in enumerate(test.experiment.stages, start=FIRST):
         most = stage.most(point.options, point.bench)
         if most.trials <= 0:
@@ -73,5 +73,5 @@ def planned_stages(test: Test, point: Point, seed: int) -> Iterator[PlannedStage
 
 
 def most_of(stages: Iterable[PlannedStage]) -> Most:
-    """What all of them take at most."""
+    """The sum of their upper bounds."""
     return sum((stage.most for stage in stages), NONE_MORE)

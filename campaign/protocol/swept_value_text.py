@@ -13,7 +13,7 @@ DIGITS = 6
 
 
 def as_written(value: Any) -> str:
-    """A value of a matrix with its unit, as it is written; "" for one that has none."""
+    """A value of a matrix with its unit, as written; "" for a value without a unit."""
     if not isinstance(value, str):
         return ""
     try:
@@ -26,26 +26,26 @@ def as_written(value: Any) -> str:
 def point_text(
     options: type[Options], written: Mapping[str, Any], point: Mapping[str, Any]
 ) -> dict[str, str]:
-    """What an experiment distinguishes its trials by, of what is a quantity.
+    """Texts of the quantities that distinguish the trials of an experiment.
 
     Args:
-        options: of the experiment; `speed` is said as its `speed` or `speeds` are.
-        written: the test's options as the protocol has them.
+        options: of the experiment; `speed` has the unit of its option `speed` or `speeds`.
+        written: the test's options as in the protocol.
         point: name to SI value.
     """
-    told = {}
+    texts = {}
     for name, value in point.items():
-        found = next(_like(options, name), None)
-        if found is not None and isinstance(value, float):
-            field, quantity = found[0], found[1].here
+        match = next(_like(options, name), None)
+        if match is not None and isinstance(value, float):
+            field, quantity = match[0], match[1].here
             unit = next(_units(written.get(field), quantity), quantity.display)
             shown = convert(value, quantity.si, unit)
-            told[name] = f"{shown:.{DIGITS}g} {unit}"
-    return told
+            texts[name] = f"{shown:.{DIGITS}g} {unit}"
+    return texts
 
 
 def _like(options: type[Options], name: str) -> Iterator[tuple[str, Quantity]]:
-    """The option that gives a name its values."""
+    """The options, with quantities, that a name may come from: the name itself or its plural."""
     known = _quantities(options)
     plural = name[:-1] + "ies" if name.endswith("y") else name + "s"
     yield from ((field, known[field]) for field in (name, plural) if field in known)
@@ -53,12 +53,12 @@ def _like(options: type[Options], name: str) -> Iterator[tuple[str, Quantity]]:
 
 @cache
 def _quantities(options: type[Options]) -> dict[str, Quantity]:
-    found = ((info.name, info.quantity) for info in describe(options))
-    return {name: quantity for name, quantity in found if quantity is not None}
+    pairs = ((info.name, info.quantity) for info in describe(options))
+    return {name: quantity for name, quantity in pairs if quantity is not None}
 
 
 def _units(written: Any, quantity: Quantity) -> Iterator[str]:
-    """Units of the quantity in what a protocol writes: a text, a list, a range."""
+    """Units of the quantity in a written text, list or range."""
     if isinstance(written, str):
         try:
             number, unit = split_quantity(written)

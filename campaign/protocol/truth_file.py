@@ -19,7 +19,7 @@ from campaign.trial import Tree
 
 @dataclass
 class Truths:
-    """Reads the truths that tests name; `typed`: what `--truth` was given in place of them."""
+    """Reader of the truths of tests; `typed`: the value of `--truth`, which replaces them."""
 
     files: FurtherFiles
     typed: str = ""
@@ -30,7 +30,7 @@ class Truths:
         return {name: source.text for name, source in self.files.sources.items()}
 
     def of(self, draft: Draft, written: str, stated: Bench, axes: Sequence[Axis]) -> Tree | None:
-        """The plant that is simulated for a test whose bench is `stated`; None when that is it."""
+        """The plant to simulate for a test with the bench `stated`; None without a valid truth."""
         source = self._source(draft, written)
         if source is None:
             return None
@@ -39,7 +39,7 @@ class Truths:
             self.files.problems += bench
             return None
         plant = plant_of(bench)
-        if lacking(stated):  # whoever simulates says so, at the stated bench's own file
+        if lacking(stated):  # the simulation reports this, at the stated bench's file
             return plant
         try:
             simulated(plant, stated)
@@ -58,18 +58,18 @@ class Truths:
 
 
 def _not_there(draft: Draft, plant: Tree, axes: Sequence[Axis], name: str) -> list[Problem]:
-    """A sweep over what the truth does not have would change the stated bench alone."""
-    found = []
+    """Problems of sweeps over settings that the truth lacks: only the stated bench would change."""
+    problems = []
     for axis in axes:
         if axis.of_bench and is_setting(axis.keys) and not has(plant, axis.keys):
             path = ".".join(map(str, axis.keys))
             message = f"the truth '{name}' has no '{path}', which the sweep changes"
-            found.append(draft.axes[axis.path][1].problem((), "key", message))
-    return found
+            problems.append(draft.axes[axis.path][1].problem((), "key", message))
+    return problems
 
 
 def _reason(error: ValueError) -> str:
-    """The first line of what a bench refuses."""
+    """The first error of a refused bench or truth."""
     errors = getattr(error, "errors", None)
     text = errors()[0]["msg"].removeprefix("Value error, ") if callable(errors) else str(error)
     return f"under the stated controller: {text}" if callable(errors) else text

@@ -107,7 +107,7 @@ def spread(
         low,
         high,
         LEVEL,
-        f"median of {count} draws, and where one more lies; {how}",
+        f"median of {count} draws, interval of one further draw; {how}",
         kind="quantile",
         freedom=count,
         systematic=systematic,

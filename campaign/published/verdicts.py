@@ -14,9 +14,7 @@ from campaign.units import convert
 
 NARROW = 0.10
 """Largest half-width of an interval that permits a decision, as a share of the published value."""
-LOST = Cause(
-    "lost by calibration", "within what the calibration leaves open of its bench it is not found"
-)
+LOST = Cause("lost by calibration", "not found within the uncertainty of the bench's calibration")
 CLAIMS = ("at most", "at least")
 """Relations of published cells that are one-sided."""
 

@@ -154,7 +154,7 @@ def _estimate(told: Mapping[str, str]) -> Estimate:
     if not ends:
         return Estimate.without_interval(*what, NO_INTERVAL(), origin=Origin.GIVEN)
     if len(ends) == 1:
-        raise ValueError("low and high go together: write both or none")
+        raise ValueError("low and high belong together: write both or none")
     low, high = ends
     if not low <= value <= high or low == high:
         raise ValueError(f"value lies between low and high, but {low:g}, {value:g}, {high:g} stand")

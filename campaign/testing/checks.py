@@ -424,7 +424,7 @@ def keeps_a_stop_from_outside(under_test: BackendUnderTest) -> None:
     """Once stopped it says by whom, and moves again only after just that stop was cleared."""
     with under_test.open() as backend:
         if not isinstance(backend, SupportsExternalStop):
-            told = "a way to stop it is given (stop_outside), but it cannot tell of a stop"
+            told = "a way to stop it is given (stop_outside), but it cannot report a stop"
             require(under_test.stop_outside is None, told)
             return
         require(under_test.stop_outside, "it can be stopped from outside: stop_outside says how")

@@ -110,7 +110,7 @@ def _parts(trends: Trends, making: PageParts) -> Iterator[Part]:
     yield Part("numbers", "All numbers", tuple(_numbers(trends, folder)))
     runs = folder.shown_table(runs_table(trends), (), "runs")
     circumstances = circumstances_table(trends)
-    same = "Besides what they found, neighbouring runs differ in nothing that the archives know of."
+    same = "Apart from their results, the archives of neighbouring runs do not differ."
     yield Part(
         "runs",
         "The runs",
@@ -144,11 +144,10 @@ def _numbers(trends: Trends, folder: Folder) -> Iterator[Piece]:
 
 def _how(trends: Trends) -> Iterator[str]:
     yield (
-        "Numbers go together that are the same quantity under the same conditions, of tests of the "
-        "same kind. Each point counts with its own interval and with the scatter between runs, "
-        "which may be correlated from run to run; how large it is and how strongly correlated is "
-        "integrated over, up to a correlation of 0.9, and not estimated and then believed. "
-        "Intervals are of 95 % and hold that; of few runs they are wide."
+        "A series is one quantity under the same conditions, in tests of the same kind. Each point "
+        "counts with its own interval and with the scatter between runs, which may be correlated "
+        "from run to run. Its size and correlation are integrated out, up to a correlation of 0.9. "
+        "Intervals are of 95 %; of few runs they are wide."
     )
     sides = trends.members[0].sides
     cancelled = {

@@ -310,7 +310,6 @@ def _notes(
         share = together(members, covariate, other)
         if abs(share) > GO_TOGETHER:
             yield (
-                f"Time and temperature go together in these runs (correlation {share:.2f}): a "
-                "number that follows the one seems to follow the other. These runs do not say "
-                "which it is."
+                f"Time and temperature are correlated in these runs ({share:.2f}): a trend over "
+                "one appears as a trend over the other. These runs do not separate them."
             )

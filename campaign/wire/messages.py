@@ -325,7 +325,7 @@ def _check(message: Message) -> None:
         if beyond or not message.channels or message.sample_rate <= 0:
             raise WireError("channels beyond their total, none at all, or no sample rate")
     elif isinstance(message, Hello | Bye) and not message.session:
-        raise WireError("sessions are counted from 1: 0 means nobody's")
+        raise WireError("sessions are counted from 1: 0 means none")
     elif isinstance(message, Start) and not message.trial:
         raise WireError("trials are counted from 1: 0 means none")
     elif (

@@ -114,4 +114,4 @@ def test_noise_that_hides_a_level_is_said_to() -> None:
     told = rise_interval(TIME, noisy, 0.0, 1.0, found)
     assert math.isnan(told[0].value)
     assert told[0].reason in HIDDEN_LEVEL
-    assert "hides when it comes to 90 %" in str(told[0].reason)
+    assert "hides when it reaches 90 %" in str(told[0].reason)

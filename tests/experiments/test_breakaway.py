@@ -103,7 +103,7 @@ def test_damping_carries_the_interval_of_the_stiffness() -> None:
 def test_the_window_matters_little_and_is_reported() -> None:
     window = table(result_of(load_only), "window")
     rows = window.rows
-    assert "scatter of all ramps alone" in window.note  # the same mean has another interval above
+    assert "scatter between ramps alone" in window.note  # the same mean has another interval above
     assert [row["share"] for row in rows] == [0.5, 0.65, 0.8, 0.9]
     for row in rows:
         assert row["mean"] == pytest.approx(18000.0, rel=0.03)

@@ -173,8 +173,7 @@ def test_every_number_has_an_interval_or_a_reason(three_days) -> None:
 
 
 TC_DIFFERS = (
-    "Between the directions differs, beyond what maps scatter (95 % for all parameters together), "
-    "Tc."
+    "The directions differ in Tc by more than maps scatter (95 % for all parameters together)."
 )
 
 

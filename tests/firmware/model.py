@@ -17,7 +17,7 @@ from campaign.wire.statemachine import (
 
 TIMEOUT = 100_000  # microseconds
 BRAKING = 2_000_000
-NOBODY = "somebody who did not say who"
+NOBODY = "an unnamed host"
 State, NakCode = wire.State, wire.NakCode
 
 

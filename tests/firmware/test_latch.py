@@ -22,7 +22,7 @@ from .host import (
     take,
 )
 
-NOBODY = "somebody who did not say who"
+NOBODY = "an unnamed host"
 STOPPED = LatchCause.STOPPED
 WHERE_IT_CAN_BE_CLEARED = [s for s in State if s not in (State.ARMED, State.RUNNING)]
 FOREIGN = [
@@ -211,7 +211,7 @@ def test_arm_is_refused_before_all_other_checks_but_the_state(
 def test_what_is_not_known_to_have_stopped_it_is_said_so(console: Console) -> None:
     bring_to(console, State.CONFIGURED, past="forgetful")
     [nak] = console.send(2, wire.Arm(CRC))
-    assert (nak.code, nak.text) == (NakCode.LATCHED, "stopped by nobody that it remembers")
+    assert (nak.code, nak.text) == (NakCode.LATCHED, "stopped by an unknown host")
 
 
 def test_clear_hello_a_reset_and_the_end_of_the_session_leave_it_latched(console: Console) -> None:

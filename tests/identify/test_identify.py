@@ -77,7 +77,7 @@ def test_what_no_interval_has_in_it_is_told_beside_the_numbers(
         section.result, key_numbers=(Finding.of(doubted.estimate, {}),), identified=own
     )
     told = replace(found, sections=(replace(section, result=result),))
-    remark = "Of unknown size, and in no interval: friction, at this excitation."
+    remark = "Not included in the intervals (size unknown): friction, at this excitation."
     page = write_identification(told, tmp_path / "page", templates_folder(), "campaign identify")
     assert remark in page.read_text(encoding="utf-8")
     _say(told)

@@ -285,7 +285,7 @@ def test_all_mistakes_of_a_mapping_are_told_at_once(tmp_path: Path):
         "there is no column 'runn'",
         "there is no [columns.rgi]",
         "'start' is a time, and with 'restarts'",
-        "'each' and 'restarts' both tell trials apart",
+        "'each' and 'restarts' both separate trials; use one of them",
         "the window 'a', 0 to 9 s, is no part",
         "the window 'b', 1 to 0 s, is no part",
     ):

@@ -86,7 +86,7 @@ def test_time_that_begins_anew_is_no_repetition(tmp_path: Path) -> None:
     ("lines", "rows", "says"),
     [
         ('restarts = true\nstart = "1 ms"', (0.0, 0.0), "there are several of it"),
-        ('restarts = true\neach = "run"', (0.0, 0.0), "both tell trials apart"),
+        ('restarts = true\neach = "run"', (0.0, 0.0), "both separate trials"),
         ("restarts = true", (0.0, 100.0), "its time begins once"),
     ],
 )

@@ -128,7 +128,7 @@ def test_the_sentences_say_all_of_it() -> None:
     text = agreement(board(fitted=("2",)))
     assert "8 published values compared, each counted once" in text
     # 4 + 4 + 6 cells; the number of "none" on hardware stands in both tables.
-    assert "Of 14 printed numbers 1 repeat and 5 without a number to compare are left out" in text
+    assert "Printed: 14. Excluded: 1 repeat and 5 without a number to compare. Compared: 8." in text
     assert "calibrated 0 of 2, predicted 2 of 6" in text
     assert "Claims missed: Figure 3 (b)." in text
     assert "1 not reached, 4 not run" in text
@@ -150,7 +150,7 @@ def test_what_the_document_excludes_is_in_no_count_and_is_told() -> None:
         for line in made.lines
     )
     text = agreement(replace(made, lines=lines))
-    assert "1 repeat, 1 inconsistent and 5 without a number to compare are left out: 7" in text
+    assert "1 repeat, 1 inconsistent and 5 without a number to compare. Compared: 7." in text
     first, *_ = scored_tables(replace(made, lines=lines), PUBLISHED, {})
     assert (first.good, first.compared) == (1, 2)
     first, *_ = scored_tables(made, PUBLISHED, {})

@@ -77,5 +77,5 @@ def test_what_numbers_do_not_say_is_told_once() -> None:
     assert list(remarks((*numbers, *numbers))) == [
         "Without an interval: a single value.",
         "The interval is of one trial.",
-        "Of unknown size, and in no interval: dwell.",
+        "Not included in the intervals (size unknown): dwell.",
     ]

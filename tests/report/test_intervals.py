@@ -106,7 +106,7 @@ def test_digits_that_no_reader_needs_are_left_to_the_file() -> None:
     shown = show(table({"a": cells}))
     assert [row[0].text for row in shown.rows] == ["1485.2", "1487.90 ± 0.10", "2000 ± 0"]
     (remark,) = shown.notes
-    assert "narrower than its digits; the CSV file has it" in remark
+    assert "narrower than the last digit; the CSV file has it" in remark
     assert "\n1485.2135,1485.2125," in table_csv(table({"a": cells}))
     assert not show(table({"a": cells[1:]})).notes
 
@@ -189,7 +189,7 @@ def test_systematic_parts_that_nobody_has_sized_are_named() -> None:
     found = remarks(table({"a": [loose, loose], "b": [loose, bare]}))
     assert list(found) == [
         "Without an interval: B in 1 of 2 rows (a single trial).",
-        "Of unknown size, and in no interval: inertia.",
+        "Not included in the intervals (size unknown): inertia.",
     ]
 
 

@@ -88,7 +88,7 @@ def test_of_draws_it_is_said_that_they_are_medians() -> None:
         result=Result(findings=own, key_numbers=own),
     )  # fmt: skip
     where, _ = shown_key_numbers(test, TestUnits(test), (), None)
-    assert where == "median of 3 draws, and where one more lies"
+    assert where == "median of 3 draws, interval of one further draw"
 
 
 OWN = """

@@ -319,11 +319,11 @@ def test_published_values_take_part_in_one_sentence(made_up: ModuleType, tmp_pat
     said, close = found.opening.compared.split(". Of ")
     counts = re.findall(r"\d+", said)
     assert int(counts[0]) == sum(int(each) for each in counts[2::2])
-    assert "published values were compared: reproduced are" in said
+    assert "published values compared. Reproduced:" in said
     values = filter(is_compared, once(found.scoreboard.lines))
     sizes = [abs(line.deviation) for line in values if line.deviation is not None]
     within = [sum(size <= limit for size in sizes) for limit in (5, 10)]
-    assert close == f"{len(sizes)} numbers {within[0]} within 5 % and {within[1]} within 10 %."
+    assert close == f"{len(sizes)} numbers, {within[0]} within 5 % and {within[1]} within 10 %."
     html = render(run, tmp_path, made_up.EXPERIMENTS, made_up.TEMPLATES)[0]
     assert '<a href="#scoreboard">' in _section(html)
 

@@ -326,7 +326,7 @@ def test_files_stand_on_the_page_and_in_the_data(made_up: ModuleType, tmp_path: 
         ),
         ("quantity,value,unit\ninertia,nan,kg m^2\n", "line 2: value is a number, but 'nan'"),
         ("quantity,value,unit\n\ninertia,2,furlong\n", "line 3: 'furlong' is not a unit"),
-        ("quantity,value,unit,low,high\ninertia,2,kg m^2,1,\n", "low and high go together"),
+        ("quantity,value,unit,low,high\ninertia,2,kg m^2,1,\n", "low and high belong together"),
         ("quantity,value,unit,low,high\ninertia,2,kg m^2,3,4\n", "value lies between low and high"),
         ("quantity,value,unit,f [Hz]\ninertia,2,kg m^2,low\n", "f is a number, but 'low'"),
     ],

@@ -179,7 +179,7 @@ def test_an_interval_of_one_trial_says_that_it_is(made_up: ModuleType, tmp_path:
         return set(shown_line(told).notes) - set(shown_line(line).notes)
 
     ends = {"low": 0.9 * value, "high": 1.1 * value}
-    said = "one trial: the interval is of the calibration; how trials scatter is not in it"
+    said = "one trial: the interval is of the calibration, without the scatter between trials"
     assert notes(reason=OF_ONE_TRIAL(), **ends) == {said}
     assert notes(reason=Reason("of blocks", str(OF_ONE_TRIAL())), **ends) == set()
     said = "no interval: one trial, and no calibration of its bench"

@@ -11,11 +11,13 @@ import pytest
 
 from campaign.archive import open_run
 from campaign.archive.layout.journal import Decision, RunResumed, parse_journal
+from campaign.archive.layout.run_folder import PLAN
+from campaign.archive.writing.unseal_run import unseal
 from campaign.backends.serial import SerialOptions
 from campaign.backends.sim import SimBackend
 from campaign.cli.resume import remake
 from campaign.cli.run import Remarks
-from campaign.errors import ExitCode, UsageError
+from campaign.errors import ArchiveError, ExitCode, UsageError
 from campaign.recording import Ending, Fault, Outcome
 from tests.archive.test_resuming import content, documented_differences
 from tests.system.laboratory import BENCH, Laboratory
@@ -54,6 +56,14 @@ def test_a_resumed_run_equals_an_uninterrupted_one_in_all_but_what_is_documented
     allowed = documented_differences()
     assert {path for path in differing if not allowed.fullmatch(path)} == set()
     assert "/trial_00003_attempt_1/data/gyro_rate" in differing
+
+
+def test_a_run_whose_plan_is_damaged_is_not_resumed(lab: Laboratory):
+    folder = unseal(interrupted(lab))
+    plan = folder / PLAN
+    plan.write_text("".join(plan.read_text("utf-8").splitlines(keepends=True)[:3]), "utf-8")
+    with pytest.raises(ArchiveError, match="its plan has 3 of 4 trials: it is damaged"):
+        lab.resume(folder)
 
 
 @pytest.mark.slow

@@ -264,7 +264,7 @@ def test_who_may_sign_is_the_file_s_to_say(
 
 def test_one_option_without_the_other_and_a_file_that_is_not_there_are_bad_usage(tmp_path: Path):
     for signer, allowed in (("ada", None), (None, tmp_path / "a"), ("", tmp_path / "a")):
-        with pytest.raises(UsageError, match="go together"):
+        with pytest.raises(UsageError, match="belong together"):
             wanted_signature(signer, allowed)
 
 

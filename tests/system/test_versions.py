@@ -45,4 +45,4 @@ def test_an_old_stop_is_confirmed_by_a_new_controller_and_latches_it(
             kinds += [frame.kind for frame in decoder.feed(line.read())]
         line.close()
         status = campaign(tmp_path, "status", "--port", port).out
-        assert "stopped by somebody who did not say who" in status
+        assert "stopped by an unnamed host" in status

@@ -89,7 +89,7 @@ def _story(folder: Path, damaged: DamageList) -> Lines:
     for number in story.damaged:
         damaged.add(f"{JOURNAL}:{number}", "is not a line of a journal")
     if not story.all(RunStarted) and not damaged.found:
-        damaged.add(JOURNAL, "does not tell of the start of the run")
+        damaged.add(JOURNAL, "has no line of the start of the run")
     return story
 
 

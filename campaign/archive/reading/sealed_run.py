@@ -143,7 +143,7 @@ def _note_contradictions(
             "outcome/safe_state": ended.safe_state,
         }
     else:
-        damaged.add("/run/journal", "does not tell of the end of the run")
+        damaged.add("/run/journal", "has no line of the end of the run")
     for place, wanted in says.items():
         with damaged.noting():
             read = texts.integer if isinstance(wanted, int) else texts.text
@@ -219,7 +219,7 @@ class _Trials:
         attempts = self._told()
         unknown = len(self.lines.keys() - {each.record for each in attempts}) if self.whole else 0
         if unknown:
-            damaged.add("/run/index", f"has {unknown} records of which the journal does not tell")
+            damaged.add("/run/index", f"has {unknown} records that are not in the journal")
         names = entry_names(attempts)
         sound = self.whole and self.story.whole and not damaged.found
         sound = sound and [each.record for each in names.values()] == list(self.lines)

@@ -85,7 +85,7 @@ def _summarise_folder(folder: Path, size: int) -> RunSummary:
     header = read_header(folder)
     story = read_lines((folder / JOURNAL).read_bytes())
     if not story.all(RunStarted):
-        raise ArchiveError(f"{folder / JOURNAL}: does not tell of the start of the run")
+        raise ArchiveError(f"{folder / JOURNAL}: has no line of the start of the run")
     finished, ended = story.finished.values(), story.ended
     planned = header.trials + len(planned_in(stages_in(story.entries)))
     return RunSummary(

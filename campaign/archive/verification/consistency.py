@@ -69,7 +69,7 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
     elif started[0].run != header.name:
         found.add(place, f"is of the run {started[0].run!r}, not of {header.name!r}")
     elif started[0].trials != header.trials:
-        found.add(place, f"tells of {started[0].trials} trials; {header.trials} are planned")
+        found.add(place, f"states {started[0].trials} trials; {header.trials} are planned")
 
 
 def check_measured(story: Lines, place: str, found: DamageList) -> None:
@@ -92,11 +92,11 @@ def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList)
     stages = stages_in(story.entries)
     numbers = [trial.number for trial in planned_in(stages)]
     if numbers != list(range(header.trials + 1, header.trials + 1 + len(numbers))):
-        found.add(place, "tells of trials that followed, and does not number them after the plan's")
+        found.add(place, "numbers trials of later stages otherwise than after the plan's")
     asked = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
     for text, count in asked.items():
         if count > 1:
-            found.add(place, f"tells {count} times which trials follow at {text}")
+            found.add(place, f"names the trials of a stage {count} times at {text}")
 
 
 def check_trials(

@@ -214,7 +214,7 @@ class _Check(EntryCheck):
         ended = story.ended
         if ended is None:
             if story.entries:
-                self.problems.add("/run/journal", "does not tell of the end of the run")
+                self.problems.add("/run/journal", "has no line of the end of the run")
             return
         for what in ("status", "reason", "safe_state"):
             mine, theirs = str(getattr(run, what)), str(getattr(ended, what))

@@ -162,7 +162,7 @@ def best_series(
         better = fresh < scores
         best[better], scores[better] = tried[better], fresh[better]
     if not np.isfinite(np.min(scores)) or np.min(scores) > 1e6:
-        raise ValueError(f"no motion tells {', '.join(terms)} apart: leave one of them out")
+        raise ValueError(f"no motion separates {', '.join(terms)}: leave out one of them")
     return _series(period, best[int(np.argmin(scores))])
 
 

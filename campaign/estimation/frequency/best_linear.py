@@ -207,8 +207,8 @@ def _undetermined(excitation: Excitation) -> tuple[str, ...]:
         )
     elif excitation.realisations < FEWEST_REALISATIONS:
         told.append(
-            f"{excitation.realisations} realisations tell a variance too roughly to weigh a fit "
-            f"with: {FEWEST_REALISATIONS} are the fewest for intervals of modes, margins and "
-            "parameters."
+            f"{excitation.realisations} realisations estimate the variance too roughly for the "
+            f"weights of a fit: intervals of modes, margins and parameters need "
+            f"{FEWEST_REALISATIONS}."
         )
     return tuple(told)

@@ -12,7 +12,7 @@ from campaign.estimation.frequency.measured_response import MeasuredResponse
 from campaign.estimation.frequency.rational import SURE, Weights
 from campaign.reason import NONE, Cause, Reason
 
-NO_DEVIATION = Cause("no deviation", "too few realisations or averages tell how it scatters")
+NO_DEVIATION = Cause("no deviation", "too few realisations or averages for a standard deviation")
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,9 @@ def rational_fit(
     if up > down or up < 0 or down < 1:
         raise ValueError("the numerator's order must not be above the denominator's")
     if 2 * len(measured.frequency) < free + 4:
-        raise ValueError(f"{len(measured.frequency)} frequencies cannot tell {free} parameters")
+        raise ValueError(
+            f"{len(measured.frequency)} frequencies cannot determine {free} parameters"
+        )
     weights = Weights.of(measured)
     frequency = measured.frequency
     scale = float(np.sqrt(frequency[0] * frequency[-1]))

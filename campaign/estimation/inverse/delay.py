@@ -27,7 +27,7 @@ SAMPLES = 5.0
 OWN = 0.05
 """Share of what a delay changes that has to be like no other term."""
 METHOD = "least residual over a shift of the force, Bartlett HAC"
-HALF_BAND_OPEN = Cause("half band open", "half the band does not tell it: {why}")
+HALF_BAND_OPEN = Cause("half band open", "half the band does not determine it: {why}")
 STILL_FALLING = Cause(
     "residual still falling", "the residual still falls at {milliseconds:+.3g} ms"
 )

@@ -51,7 +51,7 @@ def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> Ins
         raise ValueError("what was wanted never asks for some term of the model")
     scaled = across / np.outer(length, np.linalg.norm(design, axis=0))
     if np.linalg.cond(scaled) > 1e8:
-        raise ValueError("what was wanted cannot tell the model's terms apart")
+        raise ValueError("the setpoints do not separate the model's terms")
     inverse = np.asarray(np.linalg.solve(across, other.T))
     fit = fitted(pieces, inverse, design, force)
     return InstrumentFit(fit, _strength(design, other, pieces))

@@ -19,7 +19,7 @@ REPEATS, SEED = 2000, 1
 FEWEST_BLOCKS = 8
 """Blocks of rows that know of each other: with fewer, no bootstrap says anything."""
 TOO_FEW_BLOCKS = Cause(
-    "too few independent blocks", "only {blocks} parts of the motion do not know of each other"
+    "too few independent blocks", "only {blocks} parts of the motion are uncorrelated"
 )
 
 

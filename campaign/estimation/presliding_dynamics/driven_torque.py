@@ -83,7 +83,7 @@ def driven_torques(
     left = np.split(torque - found, places)
     noise, telling = _noise(left, step, 0.0, highest, len(size))
     if not np.isfinite(noise):
-        raise ValueError("too few samples to tell a torque from its noise: record longer")
+        raise ValueError("too few samples to separate a torque from its noise: record longer")
     # What is left within the band may be torque that is no linear answer; above it, it is noise.
     sensor = min(noise, _noise(left, step, ABOVE * highest, np.inf)[0])
     if sensor * telling <= CLEAN * float(np.linalg.norm(size)):

@@ -77,7 +77,7 @@ def spread_of(fit: JointFit) -> Spread:
     scaled = information / np.outer(length, length)
     condition = float(np.linalg.cond(scaled))
     if not condition < TELLABLE:
-        raise ValueError("these records cannot tell the parameters of the fit apart")
+        raise ValueError("these records do not separate the parameters of the fit")
     inverse = np.linalg.inv(scaled) / np.outer(length, length)
     count = sum(float(np.sum(c.there)) for group in fit.channels for c in group)
     variance = fit.cost / max(count - fit.parameters.size, 1.0)

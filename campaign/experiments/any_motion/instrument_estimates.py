@@ -178,7 +178,7 @@ def _weak(found: Instruments, terms: Sequence[Term]) -> str:
     index = int(np.argmin(strength))
     if strength[index] >= WEAK:
         return ""
-    return f"the simulated motion hardly tells {terms[index].name} (F {strength[index]:.2g})"
+    return f"the simulated motion hardly determines {terms[index].name} (F {strength[index]:.2g})"
 
 
 def _iterated(
@@ -278,7 +278,7 @@ def _regressed(
     try:
         return by_instruments(own, other)
     except np.linalg.LinAlgError as error:
-        raise ValueError("the simulated motion cannot tell the model's terms apart") from error
+        raise ValueError("the simulated motion does not separate the model's terms") from error
 
 
 def _estimate(

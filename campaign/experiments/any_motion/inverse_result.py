@@ -234,9 +234,9 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
         yield instruments_note(found)
     if any(each.reason in BENDS for each in found.estimates.values()):
         yield (
-            "A term that bends over the rate was added because it predicts better. It stands in "
-            "for whatever bends friction, most often a Stribeck curve, which `--model whole_model` "
-            "fits: shares of it are told without intervals."
+            "A term that is nonlinear in the rate was added because it predicts better. It "
+            "approximates nonlinear friction, most often a Stribeck curve, which `--model "
+            "whole_model` fits. Its shares have no intervals."
         )
     late = found.delay
     if math.isnan(late.value):
@@ -254,8 +254,8 @@ def _notes(found: InverseDynamics, data: TestData) -> Iterator[str]:
         )
     for one, two, share in correlated(found.fit, found.best.structure.terms):
         yield (
-            f"{words(one)} and {words(two)} go together (correlation {share:.3f}): "
-            "the motion hardly separates them, and only their sum is known well."
+            f"{words(one)} and {words(two)} are correlated ({share:.3f}): "
+            "the motion hardly separates them; only their sum is well determined."
         )
     if not _is_plain(found):
         yield (

@@ -111,9 +111,9 @@ def deviations_table(key: str, title: str, tried: CandidateFit) -> Table:
     )
     note = (
         f"Standard deviations (1 sigma). Residual {100 * fit.relative:.4f} % of the force, "
-        f"condition number {fit.condition:.5g}; {fit.count} rows are worth {fit.effective:.0f}. "
-        "Ordinary deviations hold for residuals that do not know of each other; these do. The "
-        "largest is used where half and twice the bandwidth differ by more than 1.3."
+        f"condition number {fit.condition:.5g}; effective sample size {fit.effective:.0f} of "
+        f"{fit.count}. Ordinary deviations hold for uncorrelated residuals; these are correlated. "
+        "The largest is used where half and twice the bandwidth differ by more than 1.3."
     )
     return Table(key, title, columns, rows, note=note)
 
@@ -168,8 +168,8 @@ def instruments_note(found: InverseDynamics) -> str:
     if not differs(found.squares, held):
         return undecided
     return (
-        "The two differ by more than scatter explains: noise of the motion, or what disturbed it "
-        "unrecorded, biases one of them. Record the motion that was wanted to tell which. "
+        "The two differ by more than scatter explains: noise of the motion, or an unrecorded "
+        "disturbance, biases one of them. Record the setpoints to find out which. "
         f"{undecided}"
     )
 

@@ -195,9 +195,8 @@ def _bars(ramps: Ramps) -> str:
     if not any(each.has_interval and each.combined != (each.low, each.high) for each in every):
         return f"{own}."
     return (
-        f"{own}: whether ramps differ shows by these. The bar of the mean and the intervals of "
-        "the table are wider: they include the uncertainty of the bench's constants, which all "
-        "ramps share."
+        f"{own}: compare ramps by these. The bar of the mean and the intervals of the table are "
+        "wider: they include the uncertainty of the bench's constants, common to all ramps."
     )
 
 

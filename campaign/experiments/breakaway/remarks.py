@@ -76,8 +76,8 @@ def _rest(ramps: Ramps) -> Iterator[str]:
     length = float(np.mean(torques)) / rate
     if rest < SHORT_REST * length:
         yield (
-            f"After a standstill of {rest:.3g} s the gyro's bias is hardly known, and σ0 is wide: "
-            f"rest {LONG_REST * length:.2g} s or longer."
+            f"A rest of {rest:.3g} s determines the gyro's bias poorly, which widens the interval "
+            f"of σ0: rest {LONG_REST * length:.2g} s or longer."
         )
 
 

@@ -119,8 +119,7 @@ def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
             Column("highest", "Highest", "N m/rad", "N m/rad", reason=EXTREME()),
         ),
         rows=tuple(rows),
-        note="These intervals hold the scatter of all ramps alone, for comparing windows with one "
-        "another. What shifts all ramps alike (torque constant, ramp rate, dwell) is not in them; "
-        "it is in the interval of σ0 in the table above, which is therefore another one, even for "
-        "the same mean.",
+        note="These intervals include the scatter between ramps alone, to compare windows. The "
+        "interval of σ0 in the table above also includes what shifts all ramps equally: torque "
+        "constant, ramp rate, dwell.",
     )

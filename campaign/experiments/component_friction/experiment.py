@@ -293,8 +293,8 @@ def _table(readings: list[Reading], suffix: str) -> Table:
         ),
         rows=tuple(rows),
         thesis=("4.1",),
-        note="What was measured at the motor shaft is multiplied by the gear ratio. A deviation of "
-        "so few readings is itself one draw: its interval says of what.",
+        note="Torques measured at the motor shaft are multiplied by the gear ratio. The interval "
+        "of a standard deviation accounts for the small number of readings.",
     )
 
 

@@ -108,9 +108,9 @@ def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     return Figure(
         key=f"plane{suffix}",
         title="Where the series goes",
-        caption="Rate over angle of one period, asked and reached. Friction is told at the rates, "
-        "and what depends on the place at the angles, that lie on the path.",
-        alt="Rate over angle, asked and reached.",
+        caption="Rate over angle of one period, setpoint and measured. Friction is determined at "
+        "the rates of the path, torques that depend on position at its angles.",
+        alt="Rate over angle, setpoint and measured.",
         panels=(
             Panel(
                 Axis("Angle", "rad", "deg"),

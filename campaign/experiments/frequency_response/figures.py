@@ -62,7 +62,7 @@ def closed_loop_figures(
         "Open-loop response, rate error to gyro rate",
         "Phase margin: distance of the phase from -180° where the gain is 0 dB. Gain margin: "
         "distance of the gain below 0 dB where the phase is -180°."
-        + (" Both are drawn where they were found." if kept.gain_marks or kept.phase_marks else "")
+        + (" Marks show both." if kept.gain_marks or kept.phase_marks else "")
         + (
             " What lies above the sweep is extrapolated (thin), by one of the fits between which "
             "the margin may lie."

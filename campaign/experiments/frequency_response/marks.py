@@ -171,8 +171,7 @@ def servo_figure(sweeps: Sequence[Sweep]) -> Iterator[Figure]:
     yield Figure(
         key="servo-characteristics",
         title="Bandwidth and stability margins",
-        caption="What compensation changes in the servo loop: each with its 95 % interval where "
-        "there is one.",
+        caption="Characteristics of the servo loop by compensation, with 95 % intervals.",
         alt="Bandwidth, gain margin and phase margin, a dot with its interval for each sweep.",
         panels=tuple(panels),
         across=3,

@@ -155,8 +155,8 @@ def _servo_table(named: tuple[Column, ...], rows: list[Mapping[str, Cell]]) -> T
         thesis=("5.3", "5.9"),
         note="Bandwidth is where the gain of the closed loop falls to -3 dB of unity, which its "
         "integral action gives it at zero frequency. Margins are of the open loop T / (1 - T). "
-        "Intervals hold noise and interpolation between the frequencies, not what friction does "
-        "from day to day. A gain margin beyond the sweep is the hull of several fits of an "
+        "Intervals include noise and interpolation between the frequencies, not the friction's "
+        "changes from day to day. A gain margin beyond the sweep is the hull of several fits of an "
         "integrator with a delay; what it is at least assumes only that the gain rises no more.",
     )
 
@@ -246,8 +246,8 @@ def closed_notes(sweeps: list[Sweep]) -> Iterator[str]:
             yield (
                 f"With {sweep.label} the phase crosses -180° near {gain.frequency.value:.3g} Hz, "
                 f"above the sweep's {highest:.4g} Hz: the gain margin is extrapolated. Its "
-                "interval is the hull of several fits; a sweep that reaches the crossing tells "
-                "it to a tenth of a decibel."
+                "interval is the hull of several fits. A sweep beyond the crossing measures it to "
+                "0.1 dB."
             )
 
 

@@ -179,7 +179,7 @@ def fit_figure(fits: Curves, suffix: str, where: str, trials: tuple[int, ...] = 
         key=f"fit{suffix}",
         title=f"Stribeck curve fitted to the map{f' ({where})' if where else ''}",
         caption="Equation 4.6 fitted by least squares, (a, b) with δ free and with δ = 2; (c, d) "
-        "what the points differ from the fit with δ free, on a scale of its own. "
+        "residuals of the fit with δ free, on a scale of their own. "
         f"{_misfit(fits.fits)} The logarithmic axis shows the low speeds that decide Ts and vs. "
         "Bars and band: 95 %.",
         alt="Measured friction torque over speed on a logarithmic axis with both fitted curves, "

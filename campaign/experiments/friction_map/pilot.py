@@ -309,7 +309,7 @@ def _reason(options: PilotedMapOptions, longer: VelocityMapOptions, fits: Curves
 
 STAGE = Stage(
     name="map",
-    why="the pilot's friction decides at which speeds the others tell most of it",
+    why="the pilot's friction determines the most informative speeds for the others",
     most=most,
     trials=following,
 )

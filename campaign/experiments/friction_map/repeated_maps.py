@@ -61,7 +61,7 @@ def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
         key="sets",
         title="Friction-velocity maps on one another",
         caption=f"The same speeds in {len(shown)} {count}, each direction in its own sign"
-        f"{'; below, what each differs from the first' if len(shown) > 1 else ''}.{told} "
+        f"{'; below, difference from the first map' if len(shown) > 1 else ''}.{told} "
         "Bars: 95 %, window and scatter between points.",
         alt="Friction torque over speed on a logarithmic axis, one panel per direction, dots of "
         "each map, and the differences of the maps from the first.",
@@ -100,10 +100,11 @@ def _drifts(sets: Sequence[MapSet]) -> str:
                 mean = amount(float(np.mean(change)), "N m", digits=2)
                 words.append(f"{mean} ({ends[0]} to {ends[1]}) {direction}")
         if words:
-            parts.append(f"sets {each.name} by {listed(words)}")
+            parts.append(f"sets {each.name} {listed(words)}")
     if not parts:
         return ""
-    return f" From sets {sets[0].name} differ, mean and range over the speeds, {'; '.join(parts)}."
+    of_first = f"Difference from sets {sets[0].name}, mean and range over the speeds"
+    return f" {of_first}: {'; '.join(parts)}."
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -168,11 +169,8 @@ def _apart(sets: Sequence[MapSet], means: Mapping[str, Estimate]) -> str:
             apart.append(SYMBOLS[name])
     if not apart:
         return " No parameter differs between the directions, as far as these maps show."
-    word = "s" if len(apart) == 1 else ""
     sure = f"{100 * LEVEL:.0f} % for all parameters together"
-    return (
-        f" Between the directions differ{word}, beyond what maps scatter ({sure}), {listed(apart)}."
-    )
+    return f" The directions differ in {listed(apart)} by more than maps scatter ({sure})."
 
 
 def _differs(values: Array, level: float, spare: float) -> bool:

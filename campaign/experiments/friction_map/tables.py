@@ -96,8 +96,8 @@ def point_table(
         columns=shown,
         rows=tuple({name: cell for name, cell in row.items() if name in kept} for row in rows),
         note="Mean drive torque over the settled window, less inertia times residual acceleration. "
-        "The interval is that of the window: what friction changes from trial to trial is not in "
-        "it, and shows in the fit."
+        "The interval is that of the window. It does not include the scatter between trials, which "
+        "the fit includes."
         if runs
         else "",
     )
@@ -162,7 +162,7 @@ def parameter_table(fits: Curves, suffix: str, where: str) -> Table:
         rows=(*rows, rms),
         thesis=("4.3",),
         note="δ free is for the static model and this table; δ = 2 is what the LuGre model uses. "
-        "Nominal is the mean of both directions, whose errors go together.",
+        "Nominal is the mean of both directions, whose errors are correlated.",
     )
 
 
@@ -231,7 +231,7 @@ def _scatter(fit: DirectionFit) -> str:
         + ("friction without its viscous part" if each.steady_viscous else "their torque")
         for each in fit.scatters
     )
-    undecided = "; they do not tell which" if len(fit.scatters) > 1 else ""
+    undecided = ", which the points do not distinguish" if len(fit.scatters) > 1 else ""
     return f"points scatter by {shares} beyond their windows{undecided}"
 
 
@@ -245,7 +245,7 @@ def _ripple(fits: Curves, direction: str) -> str:
         return (
             f"a ripple of {ripple.periods:.4g} periods over {angle_text(2.0 * np.pi, '.4g')}, "
             f"{source}, and {100 * abs(ripple.amplitude):.2g} % of dry friction in {ripple.runs} "
-            f"runs, was taken out of all points; {short} windows are shorter than its period"
+            f"runs, was subtracted from all points; {short} windows are shorter than its period"
         )
     least = angle_text(
         min(abs(point.speed) * (point.stop - point.start) for point in points), ".2g"

@@ -61,7 +61,7 @@ def static_figure(data: TrialData, suffix: str, amplitude: float) -> Figure:
         key=f"static-curve{suffix}",
         title="Friction of steady sliding and its parts",
         caption="The Stribeck part s(v) falls from static to Coulomb friction, the viscous part "
-        "rises with the rate; their sum is what every model here comes to at a constant rate.",
+        "rises with the rate; their sum is the torque of every model at a constant rate.",
         alt="Friction torque over rate in both directions: the Stribeck part, the straight viscous "
         "part, and their sum, with a jump at zero rate.",
         panels=(
@@ -165,8 +165,8 @@ def variation_figures(trials: Sequence[TrialData], suffix: str) -> Iterator[Figu
         yield Figure(
             key=f"dynamic-parameters{suffix}",
             title="Output of the model for variations of its dynamic parameters",
-            caption="Near zero rate only, because steady sliding does not know these parameters: "
-            "they decide how the torque reverses.",
+            caption="Only near zero rate: steady sliding does not depend on these parameters. They "
+            "determine how the torque reverses.",
             alt="Torque over rate near zero for lower, unchanged and higher values, one panel per "
             "dynamic parameter.",
             panels=tuple(_variation(name, items, plain, True) for name, items in dynamic.items()),

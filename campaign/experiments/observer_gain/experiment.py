@@ -256,9 +256,9 @@ def _notes(
 ) -> Iterator[str]:
     first = _first_unstable(gains)
     expected = (
-        f"the eigenvalues of the loop without dry friction say {limit:.3g} Hz"
+        f"by the eigenvalues of the loop without dry friction, from {limit:.3g} Hz"
         if limit is not None
-        else "so say the eigenvalues of the loop"
+        else "by the eigenvalues of the loop"
     )
     if first is not None:
         yield (

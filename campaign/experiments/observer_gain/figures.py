@@ -94,7 +94,7 @@ def noise_figure(gains: Sequence[Gain], own: float, limit: float | None = None) 
         key="noise",
         title="Gyro noise that reaches the load, over the gain of the observer",
         caption="The observer differentiates the gyro, so more gain lets more noise through. "
-        "Equation 5.5 knows no delay: where the dots leave its line the loop runs out of phase."
+        "Equation 5.5 has no delay: the dots leave its line where delays make the loop less stable."
         + _stability_words(gains),
         alt="Standard deviation of the load's rate due to gyro noise over the observer's corner "
         "frequency, rising, beside the line of Equation 5.5.",

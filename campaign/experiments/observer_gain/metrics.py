@@ -28,7 +28,7 @@ ERROR = "stabilization_error"
 ERROR_THEORY = "error_by_equation_5_4"
 NOISE = "noise_rate"
 REJECTION = "disturbance_rejection"
-BY_THEORY = Cause("by theory", "an equation says so, not a measurement")
+BY_THEORY = Cause("by theory", "calculated from an equation, not measured")
 TOO_FEW = Cause(
     "too few frequencies",
     "{frequencies} frequencies; from {enough} on their range encloses it",

@@ -61,12 +61,11 @@ def _table(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Table:
             Column("conditions", "Conditions"),
             Column("unit", "Unit"),
             Column("draws", "Draws", exact=True),
-            Column("spread", "Median, and one more draw"),
+            Column("spread", "Median, interval of one further draw"),
         ),
         rows=tuple(_rows(found, seeds)),
-        note=f"Each draw is the bench with another seed of its scatter ({SEED}). The interval is "
-        "where one further draw lies, such as the one that a document prints; that of their mean "
-        "is narrower.",
+        note=f"Each draw is the bench with another seed of its scatter ({SEED}). The interval "
+        "is that of one further draw, such as the one in a document; that of the mean is narrower.",
     )
 
 

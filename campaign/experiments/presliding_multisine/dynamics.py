@@ -154,7 +154,7 @@ def table_of(rows: Sequence[Mapping[str, Cell]], suffix: str = "") -> Table:
         rows=tuple(rows),
         note="Fitted to the whole motion by its simulation; the last row to all trials at once. "
         "Stiffness and damping are the sums over all interfaces, before any of them slips; damping "
-        "is bristles' and viscous friction's together, which small motions do not tell apart.",
+        "is bristles' and viscous friction's together, which small motions do not separate.",
     )
 
 
@@ -304,7 +304,7 @@ def remarks(found: PreslidingDynamics) -> Iterator[str]:
         for j, other in enumerate(names[:i]):
             if abs(shares[i, j]) >= 0.9 and not {one, other} & {*SPLIT, "yielding"}:
                 told = [NAMES.get(n, n).replace("_", " ") for n in (other, one)]
-                yield f"{told[0]} and {told[1]} go together (correlation {shares[i, j]:.3f})."
+                yield f"{told[0]} and {told[1]} are correlated ({shares[i, j]:.3f})."
     if np.any(np.isfinite(found.spread.freedom)):
         yield (
             "The trials differ by more than their noise: intervals are from how they differ. "

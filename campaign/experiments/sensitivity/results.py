@@ -227,10 +227,10 @@ def thresholds_figure(
         if any(one.threshold.kind == "at least" for one in ordered)
         else ""
     )
-    change = Axis("Change that is too much", "", "percent", limits=(0.0, math.nan))
+    change = Axis("Smallest inadmissible change", "", "percent", limits=(0.0, math.nan))
     yield Figure(
         key="thresholds",
-        title=f"How well each parameter has to be known, {method_label(compensation)}",
+        title=f"Admissible error of each parameter, {method_label(compensation)}",
         caption="The smallest change, up or down, at which the error passes "
         f"{_milliradians(limit.value)}, with its 95 % interval where there is one; the most "
         f"important parameter first.{beyond}",

@@ -129,12 +129,12 @@ class ConditionGroup:
 
 
 OF_ONE = (
-    "Without repeats an interval is of the one recording: repeat the test to see how trials "
-    "scatter. --check-step shows what the time step of a simulation adds."
+    "Without repeats an interval is of one recording: repeat the test to measure the scatter "
+    "between trials. --check-step measures the error of the simulation's time step."
 )
 """For the note of a table of such experiments."""
 NONE_RESOLVED = Cause(
-    "not resolved by the simulation", "a simulated friction may be off by {error}: it is no larger"
+    "not resolved by the simulation", "it does not exceed the error of simulated friction, {error}"
 )
 RESOLVED = TORQUE_ERRORS[ENGINE]
 """of a friction torque, that a simulation at its usual step may be off by."""

@@ -70,9 +70,7 @@ from campaign.trial import OfferedRecording, Trial, TrialRequest
 SAMPLES_PER_CYCLE = 10
 """of the base motion, at least: the standard deviation needs the shape of the error."""
 LARGEST = "largest_error"
-OF_A_RECORD = Cause(
-    "largest of its record", "the largest of its record: a longer one holds a larger"
-)
+OF_A_RECORD = Cause("largest of its record", "the largest value of a record grows with its length")
 SPREAD = Cause(
     "spread of the trials", "the standard deviation of the trials about the error before it"
 )

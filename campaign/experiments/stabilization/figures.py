@@ -166,10 +166,10 @@ def _rate_figure(place: Condition) -> Iterator[Figure]:
     yield Figure(
         key="relative-rate",
         title="Rate of the load relative to the hull",
-        caption="Dotted: a load held still in space. Where the relative rate passes zero, friction "
-        "that is left carries the load along with the hull; too strong a compensation drives it "
-        "ahead. Titles say how far off it gets at most"
-        f"{', and the last panel how far off each is' if len(cuts) > 1 else ''}. "
+        caption="Dotted: a load held still in space. Where the relative rate passes zero, residual "
+        "friction moves the load with the hull; overcompensation moves it ahead of the hull. "
+        "Titles: largest deviation from the dotted line"
+        f"{'; last panel: deviation of each method' if len(cuts) > 1 else ''}. "
         f"{found.words}{place.words}",
         alt="Relative rate over time: the whole motion, one reversal for each compensation method "
         "beside the line of a load held still, and the difference.",
@@ -315,12 +315,11 @@ def _torque_figure(place: Condition) -> Iterator[Figure]:
     beside = ", beside the friction that acted (known only to a simulation)" if left else ""
     if len(left) > 1:  # how far off each method is, beside the others
         panels.append(Panel(TIME, LEFT, left, "All: friction less compensation"))
-        beside += "; the last panel has what that leaves of friction, on a scale of its own"
+        beside += "; last panel: friction less compensation, on a scale of its own"
     yield Figure(
         key="compensation-torque",
         title="Compensation torque",
-        caption=f"What each method adds to the drive torque{beside}."
-        f"{_chatter_words(windows)}{place.words}",
+        caption=f"Drive torque added by each method{beside}.{_chatter_words(windows)}{place.words}",
         alt="Compensation torque over time, one panel per method, square-like with the sign of the "
         "relative rate.",
         panels=tuple(panels),

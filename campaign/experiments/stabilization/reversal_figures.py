@@ -257,7 +257,7 @@ def _how(rate: RelativeRate) -> str:
         return ""
     return (
         f"the slope of a line through {_time(rate.window)} of the encoder's samples, a filter "
-        f"that delays nothing and tells {rate_text(rate.finest, '.2g')} apart"
+        f"without delay that resolves {rate_text(rate.finest, '.2g')}"
     )
 
 

@@ -41,8 +41,8 @@ FRICTION = "friction.load"
 LEFT_OPEN = "the motion leaves it open"
 PARTS = Cause(
     "parts of the motion",
-    "fitted to {used:.0f} of {recorded:.0f} s, in the {parts} parts that tell most of friction: a "
-    "fit of all takes too long",
+    "fitted to {used:.0f} of {recorded:.0f} s, in the {parts} parts most informative on friction: "
+    "a fit of all takes too long",
 )
 STILL = 0.25
 """of the rate below which a plain regression takes an axis for standing: curves begin there."""
@@ -165,7 +165,7 @@ def _notes(best: Fit) -> Iterator[str]:
             yield f"{words(name)} is not known: {each.reason}."
     for (one, two), share in best.fit.correlation.items():
         if abs(share) >= 0.9:
-            yield f"{words(one)} and {words(two)} go together (correlation {share:.3f})."
+            yield f"{words(one)} and {words(two)} are correlated ({share:.3f})."
     for number in best.model.numbers:
         ratio = best.fit.estimates[number.name]
         low, high = ratio.combined
@@ -186,7 +186,7 @@ def _notes(best: Fit) -> Iterator[str]:
 def _alike(as_good: Sequence[str]) -> Iterator[str]:
     if as_good:
         others = " and ".join(f"‘{name}’" for name in as_good)
-        yield f"The motion does not tell this model from {others}."
+        yield f"The motion does not distinguish this model from {others}."
 
 
 EXPERIMENT = of_any_motion(

@@ -1,7 +1,7 @@
-"""What is wrong with a recording: pure functions on arrays.
+"""Defects of a recording: pure functions on arrays.
 
-Nothing is repaired because it was found: what a mapping asks for is done where channels are made of
-columns (`importing.made`), times a clock (`even_clock`) and samples read.
+They only detect. Repairs that a mapping requests happen where channels are made of columns
+(`importing.derived_channels`), times become a clock (`even_clock`), and samples are read.
 """
 
 from campaign.importing.defects.defect import Defect
@@ -13,4 +13,4 @@ CHANNEL_KINDS = (
     *("absurd", "clipping", "delay", "dropout", "factor", "filled", "held"),
     *("lost", "sign", "spike", "twice", "unrelated", "wraparound"),
 )
-"""Kinds of what is found in channels; those of time are not among them."""
+"""Kinds of defects in channels, without those of time."""

@@ -1,7 +1,7 @@
 """Defects between an angle and its rate: factor, sign, delay.
 
-They are held against each other over stretches of time, by how far each says that the axis moved:
-from sample to sample a quantised angle has no derivative, over a stretch it has a difference.
+Angle and integrated rate are compared by their travel over stretches of time: a quantized angle
+has no derivative from sample to sample, but it has a difference over a stretch.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from campaign.importing.defects.defect import (
 )
 
 _LIKE = 0.98
-"""The share from which on a factor between a rate and its angle is one."""
+"""Least explained share of variance at which a factor between rate and angle is valid."""
 _UNEXPLAINED = 0.1
-"""How far a factor may be from 1 before it needs an explanation: filters and noise cost some."""
+"""Deviation of a factor from 1 above which it is a defect: filters and noise cause some."""
 
 _TURN = {"rad": 2 * math.pi, "deg": 360.0, "turns": 1.0}
 _TURN_PER_S = {"rad/s": 2 * math.pi, "deg/s": 360.0, "rpm": 60.0, "turns per s": 1.0}
@@ -40,7 +40,7 @@ FACTORS = (
     (1000.0, "time is in ms, or the rate in thousandths of the angle's unit"),
     (1e-3, "the angle is in thousandths of the rate's unit"),
 )
-"""Usual factors between a rate and the derivative of its angle, and what each would mean."""
+"""Usual factors between a rate and the derivative of its angle, each with its meaning."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Slope:
         factor: with its sign.
         explained: share of variance.
         error: standard error, as a share of the factor.
-        travel: of the angle in all, in its smallest steps; inf where it has none.
+        travel: total travel of the angle, in its smallest steps; inf without steps.
     """
 
     factor: float
@@ -63,7 +63,7 @@ class Slope:
 def slope(time: Array, angle: Array, rate: Array) -> Slope | None:
     """The factor between a rate and the derivative of an angle, all shape (n,).
 
-    The stretches are as long as makes both agree best. None where too little moves.
+    The stretch length gives the best agreement of both. None if the travel is too small.
     """
     n = len(time)
     if n < 20:
@@ -79,10 +79,10 @@ def slope(time: Array, angle: Array, rate: Array) -> Slope | None:
         places = np.arange(0, n - wide, max(1, wide // 2))
         whole = known[places] & (lost[places + wide] == lost[places])
         places = places[whole]
-        moved, told = (each[places + wide] - each[places] for each in (angle, gone))
-        found = _fit(moved, told, least)
-        if found is not None and (best is None or found.explained > best.explained):
-            best = found
+        moved, integrated = (each[places + wide] - each[places] for each in (angle, gone))
+        fit = _fit(moved, integrated, least)
+        if fit is not None and (best is None or fit.explained > best.explained):
+            best = fit
         wide *= 2
     return best
 
@@ -95,7 +95,7 @@ def _fit(moved: Array, told: Array, least: float) -> Slope | None:
     both = float(moved @ told)
     explained = both**2 / (own * other)
     factor = math.copysign(math.sqrt(other / own), both)
-    # Stretches overlap by half; those that hardly moved weigh nothing.
+    # Stretches overlap by half; those with almost no travel do not count.
     independent = max(2.0, 0.5 * float(clear.sum()))
     error = math.sqrt(max(1 - explained, 0.0) / max(explained, 1e-9) / independent)
     travel = float(np.abs(moved[clear]).sum()) / least if least else math.inf
@@ -109,42 +109,42 @@ def of_rate(
     names: tuple[str, str] = ("angle", "rate"),
     gear: float | None = None,
 ) -> Iterator[Defect]:
-    """How a rate disagrees with its angle, shapes (n,): factor, sign, delay.
+    """Defects between a rate and its angle, shapes (n,): factor, sign, delay.
 
     Args:
         names: of the two channels.
-        gear: a ratio that may stand between them.
+        gear: ratio of a gear that may be between them.
     """
     rows = (0, len(time) - 1)
-    found = slope(time, angle, rate)
-    if found is None or found.travel < 30:
+    fit = slope(time, angle, rate)
+    if fit is None or fit.travel < 30:
         return
     one, two = names
-    if found.explained < 0.9 and (late := list(delay(time, angle, rate, names))):
-        yield from late  # what it is a factor of cannot be told before it is put back
+    if fit.explained < 0.9 and (late := list(delay(time, angle, rate, names))):
+        yield from late  # the factor is unknown until the delay is removed
         return
-    if found.explained < 0.5:
+    if fit.explained < 0.5:
         what = (
-            f"{two} is not the derivative of {one}: it explains {100 * found.explained:.2g} % of "
+            f"{two} is not the derivative of {one}: it explains {100 * fit.explained:.2g} % of "
             "how far that moved"
         )
-        yield Defect("unrelated", (two, one), what, rows, found.explained, noted=True)
+        yield Defect("unrelated", (two, one), what, rows, fit.explained, noted=True)
         return
-    if found.factor < 0 and found.explained > 0.9:
+    if fit.factor < 0 and fit.explained > 0.9:
         what = (
-            f"{two} has the opposite sign of the derivative of {one} (factor {found.factor:.4g}, "
-            f"R² {found.explained:.3f})"
+            f"{two} has the opposite sign of the derivative of {one} (factor {fit.factor:.4g}, "
+            f"R² {fit.explained:.3f})"
         )
-        yield Defect("sign", (two, one), what, rows, found.factor)
-    yield from _factor(found, names, rows, gear)
-    if found.explained > 0.9:
-        apart = delay(time, angle, math.copysign(1.0, found.factor) * rate, names)
-        # Both agree on how far it moved: a long delay would be that of a part that hardly changes.
-        yield from (each for each in apart if each.noted)
+        yield Defect("sign", (two, one), what, rows, fit.factor)
+    yield from _factor(fit, names, rows, gear)
+    if fit.explained > 0.9:
+        delays = delay(time, angle, math.copysign(1.0, fit.factor) * rate, names)
+        # Both agree on the travel: a long delay would come from a nearly constant part.
+        yield from (each for each in delays if each.noted)
 
 
 def candidates(factor: float, error: float = 0.0, gear: float | None = None) -> list[str]:
-    """What a factor other than 1 may mean, in words; any whole ratio may be a gear."""
+    """Possible causes of a factor other than 1, in words; any integer ratio may be a gear."""
     tolerance = max(0.003, 3 * error)
     size = abs(factor)
     means = [meaning for value, meaning in FACTORS if abs(size / value - 1) <= tolerance]
@@ -164,21 +164,21 @@ def _factor(
     off = abs(size - 1)
     if found.explained < _LIKE or off <= max(0.03, 4 * found.error):
         return
-    told = f"{two} is {size:.5g} times the derivative of {one} (R² {found.explained:.4f})"
+    relation = f"{two} is {size:.5g} times the derivative of {one} (R² {found.explained:.4f})"
     means = candidates(found.factor, found.error, gear)
     if means:
-        what = f"{told}: {'either ' * (len(means) > 1)}{', or '.join(means)}"
+        what = f"{relation}: {'either ' * (len(means) > 1)}{', or '.join(means)}"
         yield Defect("factor", (two, one), what, rows, size)
     elif off > _UNEXPLAINED:
         severe = found.travel > 100 and not 0.5 < size < 2
-        what = f"{told}, for no usual reason"
+        what = f"{relation}, for no usual reason"
         yield Defect("factor", (two, one), what, rows, size, noted=not severe)
 
 
 def delay(
     time: Array, angle: Array, rate: Array, names: tuple[str, str] = ("angle", "rate")
 ) -> Iterator[Defect]:
-    """By how much a rate comes after the derivative of its angle, s, from half a step on."""
+    """Delay (s) of a rate after the derivative of its angle, if at least half a step."""
     known = np.isfinite(angle) & np.isfinite(rate)
     n = len(time)
     step = float(time[-1] - time[0]) / max(n - 1, 1)
@@ -192,7 +192,7 @@ def delay(
     sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (rate, rate**2))
     mean = (sums[width:] - sums[:-width]) / width
     spread = (squares[width:] - squares[:-width]) / width - mean**2
-    # Where the rate stands still it is like nothing.
+    # A constant rate correlates with nothing.
     floor = max(1e-9 * float(rate.var()), 1e-300)
     size = np.sqrt(np.maximum(spread, floor)) * max(float(derivative.std()), 1e-150)
     likeness = np.clip(np.where(spread > floor, products / width / size, 0.0), -1.0, 1.0)
@@ -200,7 +200,7 @@ def delay(
     at_rest = float(likeness[most])
     if not 0 < peak < 2 * most or likeness[peak] < 0.8:
         return
-    # At least a tenth of what does not agree must be due to the delay.
+    # The delay must explain at least a tenth of the disagreement.
     if 1 - likeness[peak] ** 2 > 0.9 * (1 - at_rest**2):
         return
     before, top, after = likeness[peak - 1 : peak + 2]

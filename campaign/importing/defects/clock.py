@@ -1,11 +1,10 @@
 """The clock of a table's rows: step, rounding, gaps, restarts.
 
-A missing sample shifts everything behind it for good, a late stamp only itself: that tells a gap
-from jitter. Stamps of a coarse clock jump by its step, which is neither.
+A missing sample shifts all later stamps; a late stamp shifts only itself. This distinguishes a gap
+from jitter. Stamps of a coarse clock jump by its resolution, which is neither.
 
-A trial is sampled evenly. Times that are rounded are no reason to touch anything; times that
-stand still, run back, jump or wander are told with their rows, and nothing is done about them that
-the mapping does not ask for.
+A trial is sampled evenly. Rounded times need no repair. Times that repeat, decrease, jump or drift
+are reported with their rows, and repaired only as the mapping requests.
 """
 
 from __future__ import annotations
@@ -19,17 +18,17 @@ from numpy.typing import NDArray
 from campaign.importing.defects.defect import Array, counted
 
 SHORTEST = 10
-"""Samples that a recording has at least: fewer tell no motion."""
+"""Minimum number of samples of a recording: fewer show no motion."""
 _BESIDE = 5
-"""Samples on either side by which a lasting shift is told from a late stamp."""
+"""Samples on either side that distinguish a lasting shift from a late stamp."""
 TOLERANCE = 0.25
-"""of a sample by which a time may be off an even clock: half of what would name another sample."""
+"""Permitted offset of a time from an even clock, in samples: half of the rounding limit, 0.5."""
 WORTH_TELLING = 0.02
-"""of a sample; less is the rounding of times that are written with few digits."""
+"""Offset in samples above which a remark is made; less is rounding to few digits."""
 GAP = 1.5
-"""of the usual step, beyond which rows are missing."""
+"""Step, in usual steps, above which rows are missing."""
 LONGEST = 50_000_000
-"""rows of a trial whose times are repaired: that is done in memory."""
+"""Maximum number of rows of a trial with repaired times: the repair is in memory."""
 BLOCK = 1 << 20
 Times = Callable[[int, int], Array]
 """The times (s) of rows [first, stop), shape (stop - first,)."""
@@ -37,13 +36,13 @@ Times = Callable[[int, int], Array]
 
 @dataclass(frozen=True)
 class Ticks:
-    """What the stamps of a recording tell of its clock.
+    """Clock estimated from the time stamps of a recording.
 
     Attributes:
-        step: s between samples, as most of them have it; 0 where that cannot be told.
-        resolution: s that all stamps are multiples of; 0 where they are as fine as numbers.
-        gaps: rows behind which samples are missing.
-        scatter: standard deviation of the steps beside gaps, beyond what rounding explains; s.
+        step: median time between samples (s); 0 if it cannot be estimated.
+        resolution: common divisor of all stamps (s); 0 if they are not visibly rounded.
+        gaps: rows after which samples are missing.
+        scatter: standard deviation of the steps without gaps and without rounding (s).
     """
 
     step: float
@@ -53,7 +52,7 @@ class Ticks:
 
 
 def ticks(time: Array) -> Ticks:
-    """The clock behind stamps, shape (n,), s, all finite."""
+    """Estimate the clock of stamps, shape (n,), s, all finite."""
     steps = np.diff(time)
     wide = max(1, min(64, len(steps) // 4))
     step = float(np.median(time[wide:] - time[:-wide])) / wide if len(steps) else 0.0
@@ -74,7 +73,7 @@ def ticks(time: Array) -> Ticks:
             gaps.append(row)
     kept = np.delete(steps, gaps)
     scatter = float(np.std(kept)) if len(kept) else 0.0
-    # Of two rounded stamps the difference scatters by their step / sqrt(6).
+    # The difference of two rounded stamps has the standard deviation resolution / sqrt(6).
     scatter = float(np.sqrt(max(scatter**2 - resolution**2 / 6, 0.0)))
     if resolution and np.all(np.abs(kept - step) <= resolution + slack):
         scatter = 0.0
@@ -82,50 +81,50 @@ def ticks(time: Array) -> Ticks:
 
 
 def _resolution(steps: Array, step: float) -> float:
-    """What all steps are multiples of, where that is coarse enough to be seen in them."""
+    """Common divisor of all steps (s); 0 if it is too fine to be visible in them."""
     noise = 1e-5 * step
     levels = np.unique(np.round(steps / noise) * noise)
     if len(levels) < 2 or len(levels) > max(3, len(steps) // 4):
         return 0.0
-    apart = np.diff(levels)
-    apart = apart[apart > 3 * noise]
-    finest = float(apart.min()) if len(apart) else 0.0
+    spacing = np.diff(levels)
+    spacing = spacing[spacing > 3 * noise]
+    finest = float(spacing.min()) if len(spacing) else 0.0
     if finest <= 1e-3 * step:
         return 0.0
     off = levels / finest - np.round(levels / finest)
-    # With samples missing, the steps of an even clock are multiples of its own.
+    # If samples are missing, the steps of an even clock are multiples of the usual step.
     regular = abs(finest / step - 1) < 0.02
     return 0.0 if regular or np.abs(off).max() > 0.1 else finest
 
 
 def restarts(times: Array) -> list[int]:
-    """Rows at which times, shape (n,), begin anew: they fall back past half of what went before.
+    """Rows at which times, shape (n,), restart: they decrease by over half of the time before.
 
-    A clock that is set back, and rows that were exchanged, fall back by less.
+    A clock that is set back decreases by less, and so do exchanged rows.
     """
     steps = np.diff(times)
     forward = steps[steps > 0]
     if not len(forward):
         return []
-    found, begin = [], 0
+    rows, begin = [], 0
     for fall in np.flatnonzero(steps < -SHORTEST * float(np.median(forward))):
         if times[fall] - times[fall + 1] > 0.5 * (times[fall] - times[begin]):
             begin = int(fall) + 1
-            found.append(begin)
-    return found
+            rows.append(begin)
+    return rows
 
 
 @dataclass(frozen=True)
 class EvenClock:
-    """Samples at k / rate, and which rows they come from.
+    """Samples at k / rate, and their source rows.
 
     Attributes:
         rate: Hz.
         start: time of the first row (s).
-        samples: how many.
-        positions: the row that each sample comes from, from the trial's first, shape (samples,);
-            a fraction between two rows, NaN where a gap is marked. None: sample k is row k.
-        remarks: what was done, and what was seen, in sentences.
+        samples: number of samples.
+        positions: source row of each sample, from the trial's first, shape (samples,); a fraction
+            between two rows, NaN in a marked gap. None: sample k is row k.
+        remarks: repairs and observations, in sentences.
     """
 
     rate: float
@@ -139,9 +138,9 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
     """The clock of `rows` rows from row `first`.
 
     Args:
-        repairs: what may be done: `drop repeated`, `mark gaps`, `resample`.
+        repairs: permitted repairs: `drop repeated`, `mark gaps`, `resample`.
 
-    Raises ValueError for times that are no even clock: in which rows, and what would help.
+    Raises ValueError for times that are no even clock, with the rows and a remedy.
     """
     if rows < 2:
         raise ValueError(f"{counted(rows, 'row')} hold{'s' if rows == 1 else ''} no recording")
@@ -149,13 +148,13 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
     if np.isfinite(last - start) and last > start:
         rate = (rows - 1) / (last - start)
         worst, row, level, bend = _furthest(times, first, rows, start, rate)
-        if WORTH_TELLING < worst <= 4.0 * TOLERANCE:  # the two ends may be the worst of all
+        if WORTH_TELLING < worst <= 4.0 * TOLERANCE:  # the two end rows may have the largest errors
             start += (level - 0.5 * (rows - 1) * bend) / rate
             rate /= 1.0 + bend
             worst, row, *_ = _furthest(times, first, rows, start, rate)
         if worst <= TOLERANCE:
-            told = f"times are off an even clock by up to {worst:.2g} of a sample (row {row})"
-            remarks = (told,) if worst > WORTH_TELLING else ()
+            note = f"times are off an even clock by up to {worst:.2g} of a sample (row {row})"
+            remarks = (note,) if worst > WORTH_TELLING else ()
             return EvenClock(rate, start, rows, None, remarks)
     if rows > LONGEST:
         raise ValueError(f"its times are no even clock, and {rows} rows are too many to repair")
@@ -165,9 +164,9 @@ def even_clock(times: Times, first: int, rows: int, repairs: Sequence[str] = ())
 def _furthest(
     times: Times, first: int, rows: int, start: float, rate: float
 ) -> tuple[float, int, float, float]:
-    """How far a row is off sample k of the clock, at most, and which row it is; samples.
+    """Largest offset of a row k from sample k of the clock, and its row; in samples.
 
-    Also the mean of all of them, and their slope over k: what start and rate are off by.
+    Also the mean of all offsets and their slope over k: the errors of start and rate.
     """
     worst, row, total, moment, square = 0.0, first, 0.0, 0.0, 0.0
     middle = 0.5 * (rows - 1)
@@ -187,17 +186,17 @@ def _furthest(
 
 
 def _usual_step(clock: Array) -> float:
-    """Of times, shape (n,), all finite."""
+    """The usual step (s) of times, shape (n,), all finite; ValueError if none increases."""
     steps = np.diff(clock)
     if not (steps > 0).any():
         raise ValueError("its times do not go on: all rows have one time")
-    # Of rounded times no step is the usual one: 2 and 3 ms at 430 Hz.
-    told = ticks(np.unique(clock))
-    return told.step if told.resolution else float(np.median(steps[steps > 0]))
+    # Rounded times have no usual step: 2 and 3 ms at 430 Hz.
+    fit = ticks(np.unique(clock))
+    return fit.step if fit.resolution else float(np.median(steps[steps > 0]))
 
 
 def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
-    """Raises ValueError where `repairs` do not allow for what is wrong."""
+    """The repaired clock. Raises ValueError for errors that `repairs` do not cover."""
     remarks: list[str] = []
     undefined = np.flatnonzero(~np.isfinite(clock)) + first
     if len(undefined):
@@ -207,9 +206,9 @@ def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
     back = np.flatnonzero(np.diff(clock) <= 0) + 1 + first
     rows = np.arange(len(clock))
     if len(back):
-        if anew := restarts(clock):
+        if begins := restarts(clock):
             raise ValueError(
-                f"time begins anew in row {_told(np.array(anew) + first)}: {len(anew) + 1} "
+                f"time begins anew in row {_told(np.array(begins) + first)}: {len(begins) + 1} "
                 "recordings; in [[test.recording]] write 'restarts = true', or 'each' with a "
                 "column that numbers them"
             )
@@ -223,8 +222,8 @@ def _repaired(clock: Array, first: int, repairs: Sequence[str]) -> EvenClock:
         later = clock[1:] > np.maximum.accumulate(clock)[:-1]
         rows = np.flatnonzero([True, *later])
         left = np.flatnonzero(~later) + 1 + first
-        told = f"{len(left)} rows were left out, whose time was no later: row {_told(left)}"
-        remarks.append(told)
+        note = f"{len(left)} rows were left out, whose time was no later: row {_told(left)}"
+        remarks.append(note)
         clock = clock[rows]
         if len(clock) < 2:
             raise ValueError("its times do not go on")
@@ -241,10 +240,10 @@ def _marked(
     repairs: Sequence[str],
     remarks: list[str],
 ) -> EvenClock:
-    """Each row on the sample it belongs to, and nothing where there is no row."""
+    """The clock with each row at its nearest sample; samples without a row are NaN."""
     steps = np.diff(clock)
     number = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.rint(steps / step)))])
-    # The usual step is rounded as the times are; the line through all of them is not.
+    # The usual step is rounded like the times; the line through all times is not.
     slope = float(np.polynomial.Polynomial.fit(number, clock, 1).convert().coef[1])
     number = np.rint((clock - clock[0]) / slope)
     off = np.abs((clock - clock[0]) / slope - number)
@@ -272,21 +271,21 @@ def _marked(
 
 
 def _coarse(clock: Array) -> str:
-    """What to say of times that an even clock explains, but for their rounding; "" of others."""
-    told = ticks(clock)
-    if not told.resolution or told.scatter or told.gaps or np.any(np.diff(clock) < 0):
+    """Message for times of an even clock that are too coarsely rounded; "" for other times."""
+    fit = ticks(clock)
+    if not fit.resolution or fit.scatter or fit.gaps or np.any(np.diff(clock) < 0):
         return ""
     step = float(np.polyfit(np.arange(len(clock)), clock, 1)[0])
     return (
-        f"its times are rounded to {told.resolution:.3g} s, too coarse for steps of {step:.3g} s; "
+        f"its times are rounded to {fit.resolution:.3g} s, too coarse for steps of {step:.3g} s; "
         f"give the 'sample_rate' in place of their column, about {1 / step:.4g} Hz"
     )
 
 
 def _resampled(clock: Array, rows: Array, step: float, remarks: list[str]) -> EvenClock:
-    """Samples on lines between rows; where rows are missing, nothing."""
-    # Jitter may double a step; more than that is a hole, across which no line is put. The usual
-    # step is told by all of them: single ones jitter.
+    """The clock with samples interpolated between rows; NaN where rows are missing."""
+    # Jitter may double a step; a longer step is a hole, which is not interpolated. The usual
+    # step is the mean of all others, because single steps jitter.
     steps = np.diff(clock)
     holes = steps > 2.0 * GAP * step
     step = float(steps[~holes].mean()) if not holes.all() else step
@@ -298,16 +297,16 @@ def _resampled(clock: Array, rows: Array, step: float, remarks: list[str]) -> Ev
     hole = (clock[after] - clock[after - 1] > 2.0 * GAP * step) & ~on_row
     positions[hole] = np.nan
     moved = float(np.max(np.abs(np.diff(clock) - step))) / step
-    told = (
+    note = (
         f"resampled at {1 / step:.6g} Hz on lines between rows; steps varied by up to {moved:.2g}"
     )
-    remarks.append(f"{told} of a sample")
+    remarks.append(f"{note} of a sample")
     if hole.any():
         remarks.append(f"{int(hole.sum())} samples lie in gaps and are marked as lost")
     return EvenClock(1.0 / step, float(clock[0]), samples, positions, tuple(remarks))
 
 
 def _told(rows: NDArray[np.intp]) -> str:
-    """`17, 18, 40 and 12 more`, as people count: from 1."""
-    told = ", ".join(str(row + 1) for row in rows[:3])
-    return told if len(rows) <= 3 else f"{told} and {len(rows) - 3} more"
+    """Row numbers from 1 as text: `17, 18, 40 and 12 more`."""
+    text = ", ".join(str(row + 1) for row in rows[:3])
+    return text if len(rows) <= 3 else f"{text} and {len(rows) - 3} more"

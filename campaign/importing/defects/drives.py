@@ -1,7 +1,7 @@
 """Defects of torque, force or current: clipping, sign, delay, copies.
 
-It is what accelerates a mass and overcomes friction: a sum of parts that follow from the rate. At
-the right delay they explain it, and at another only as far as a motion is like itself.
+The torque accelerates a mass and overcomes friction: a sum of terms of the rate. They explain the
+torque at the right delay; at others only as far as the motion is correlated with itself.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from campaign.importing.defects.defect import (
 )
 
 SAME = 0.999
-"""Share of a channel's variance that another explains when both are one signal."""
+"""Least share of a channel's variance that another explains if both are one signal."""
 BLOCK = 0.005
-"""s over which samples are averaged at least: an acceleration of single ones is their noise."""
+"""Least averaging time (s): the acceleration of single samples is mostly noise."""
 MOST = 400_000
-"""blocks of a recording that are looked at; of a longer one they are longer."""
+"""Maximum number of averaging blocks; a longer recording has longer blocks."""
 EXPLAINED = 0.95
-"""Share of the torque that the motion explains at a delay that is believed."""
+"""Least share of the torque that the motion explains at a valid delay."""
 CONSTANT = 1e-9
-"""of its size, below which a part does not change."""
+"""Standard deviation of a term, relative to its size, below which it is constant."""
 RISE = 0.05
-"""of the largest rate, over which friction turns round."""
+"""Width of the friction reversal, relative to the largest rate."""
 
 
 def of_drive(name: str, values: Array) -> Iterator[Defect]:
-    """Where a torque, a force or a current is clipped: it stands at its extreme."""
+    """Clipping of a torque, a force or a current: runs of samples at the extreme."""
     known = values[np.isfinite(values)]
     if len(known) < 100 or np.ptp(known) == 0:
         return
@@ -63,9 +63,9 @@ def of_drive(name: str, values: Array) -> Iterator[Defect]:
 
 
 def _repeats(values: Array) -> bool:
-    """Whether samples beside the extremes have the value of their neighbour, too.
+    """Whether samples away from the extremes often repeat the value before.
 
-    Noise hardly ever does: then a plateau is one by its being there.
+    Noise seldom does; a plateau in a channel without repeats is thus clipping.
     """
     same = np.diff(values) == 0
     at = (values == np.nanmax(values)) | (values == np.nanmin(values))
@@ -74,12 +74,12 @@ def _repeats(values: Array) -> bool:
 
 
 def _cut(values: Array, stretch: tuple[int, int]) -> bool:
-    """Whether a channel runs into a plateau instead of settling at it, and leaves it likewise."""
+    """Whether a channel enters and leaves a plateau with full slope instead of settling at it."""
     first, last = stretch
     before, after = values[max(0, first - 4) : first + 1], values[last : last + 5]
     if len(before) < 4 or len(after) < 4:
         return False
-    # Settling halves what is left with every few samples; what is cut comes with its full slope.
+    # Settling halves the distance every few samples; a clipped signal has its full slope.
     entering, leaving = np.abs(np.diff(before)), np.abs(np.diff(after))
     return bool(
         entering[-1] > 0.25 * entering.max() > 0
@@ -92,13 +92,13 @@ def _cut(values: Array, stretch: tuple[int, int]) -> bool:
 def of_drive_sign(
     time: Array, angle: Array | None, rate: Array, torque: Array, names: tuple[str, str]
 ) -> Iterator[Defect]:
-    """A drive that takes energy out of a motion, and a mass that accelerates against it.
+    """Sign defect of a drive that removes energy from the motion; a negative mass proves it.
 
-    Braking alone proves nothing: where most of the torque is the inertia's, a late rate turns what
-    is stored into what seems to be lost. A mass has its sign, however late the rate is.
+    Braking alone proves nothing: if most of the torque is inertial, a late rate makes stored
+    energy look lost. The sign of the mass is independent of the delay of the rate.
 
     Args:
-        angle: shape (n,); where it does not come back, gravity may have driven.
+        angle: shape (n,); if it does not return, gravity may have driven.
         names: of torque and rate.
     """
     known = np.isfinite(rate) & np.isfinite(torque)
@@ -106,7 +106,7 @@ def of_drive_sign(
         return
     power = torque[known] * rate[known]
     whole = float(np.abs(power).sum())
-    # Power that only scatters cancels down to one over the root of how many samples it has.
+    # Random power averages to 1 / sqrt(number of samples) of its size.
     if whole <= 0 or float(power.sum()) > -0.2 * whole:
         return
     mass = _mass_sign(time, rate, torque)
@@ -126,7 +126,7 @@ def of_drive_sign(
 
 
 def _mass_sign(time: Array, rate: Array, torque: Array) -> int:
-    """The sign of the mass that torque and rate tell of; 0 where they tell of none.
+    """Sign of the estimated mass; 0 if the estimate is not significant.
 
     Impulse = mass * change of rate + friction, over stretches of some samples.
     """
@@ -141,7 +141,7 @@ def _mass_sign(time: Array, rate: Array, torque: Array) -> int:
     places = places[known[places] & known[places + wide]]
     if len(places) < 12:
         return 0
-    told = impulse[places + wide] - impulse[places]
+    impulses = impulse[places + wide] - impulse[places]
     terms = np.column_stack(
         [each[places + wide] - each[places] for each in (rate, moved, rubbed, time)]
     )
@@ -149,21 +149,21 @@ def _mass_sign(time: Array, rate: Array, torque: Array) -> int:
     if scale[0] == 0:
         return 0
     terms /= np.where(scale > 0, scale, 1.0)
-    found, *_ = np.linalg.lstsq(terms, told, rcond=1e-9)
-    left = told - terms @ found
+    solution, *_ = np.linalg.lstsq(terms, impulses, rcond=1e-9)
+    left = impulses - terms @ solution
     inverse = np.linalg.pinv(terms.T @ terms)[0, 0]
-    error = math.sqrt(max(float(left @ left) / len(told) * float(inverse), 0.0))
-    return int(np.sign(found[0])) if abs(found[0]) > 6 * error else 0
+    error = math.sqrt(max(float(left @ left) / len(impulses) * float(inverse), 0.0))
+    return int(np.sign(solution[0])) if abs(solution[0]) > 6 * error else 0
 
 
 def _hardly_moves(angle: Array) -> bool:
-    """Whether a rate that was made of this angle would be its steps more than its motion."""
+    """Whether the angle moves by less than 20 of its steps: its derivative is quantization."""
     known = angle[np.isfinite(angle)]
     return not len(known) or float(np.ptp(known)) < 20 * step_size(angle)
 
 
 def _turns(rate: Array) -> bool:
-    """Whether it moves both ways, each at least a tenth of the time it moves."""
+    """Whether it moves in both directions, each for over a tenth of the time in motion."""
     moving = np.abs(rate) > 0.1 * float(np.abs(rate).max())
     ahead = float((rate[moving] > 0).mean()) if moving.any() else 0.0
     return 0.1 < ahead < 0.9
@@ -175,17 +175,17 @@ def _comes_back(angle: Array) -> bool:
 
 
 def of_twins(names: tuple[str, str], one: Array, two: Array) -> Iterator[Defect]:
-    """Whether two channels, shapes (n,), are one signal: two = factor one + offset."""
+    """Defect of two channels, shapes (n,), that are one signal: two = factor one + offset."""
     known = np.isfinite(one) & np.isfinite(two)
     if known.sum() < 20 or np.ptp(one[known]) == 0 or np.ptp(two[known]) == 0:
         return
-    alike = float(np.corrcoef(one[known], two[known])[0, 1])
-    if not math.isfinite(alike) or alike**2 < SAME:
+    likeness = float(np.corrcoef(one[known], two[known])[0, 1])
+    if not math.isfinite(likeness) or likeness**2 < SAME:
         return
     factor, offset = (float(x) for x in np.polyfit(one[known], two[known], 1))
     what = (
         f"{names[1]} is {factor:.5g} times {names[0]} {'+' if offset >= 0 else '-'} "
-        f"{abs(offset):.3g} (R² {alike**2:.5f}): one signal, not two measurements"
+        f"{abs(offset):.3g} (R² {likeness**2:.5f}): one signal, not two measurements"
     )
     yield Defect("twice", names, what, (0, len(one) - 1), factor, noted=True)
 
@@ -193,7 +193,7 @@ def of_twins(names: tuple[str, str], one: Array, two: Array) -> Iterator[Defect]
 def of_drive_delay(
     time: Array, rate: Array, torque: Array, names: tuple[str, str]
 ) -> Iterator[Defect]:
-    """By how much a torque comes after its motion, s, where that is more than a filter's delay.
+    """Delay (s) of a torque after its motion, if it is longer than a filter's.
 
     Args:
         time, rate, torque: shape (n,), the times even.
@@ -231,8 +231,8 @@ def of_drive_delay(
 def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
     """Share of a torque that a motion explains, by delay from -most to most blocks: (2 most + 1,).
 
-    By the acceleration, the rate, its sign, and a constant. 0 where the torque hardly changes. And
-    what is left, as a share of how the whole torque varies: of a part that is steady, nothing.
+    The terms are acceleration, rate, its sign, and a constant. 0 if the torque hardly changes. Also
+    the rest, as a share of the variance of the whole torque: near 0 for a steady part.
     """
     width = len(rate) - 2 * most
     rise = RISE * float(np.abs(rate).max()) or 1.0
@@ -241,18 +241,18 @@ def _explained(rate: Array, torque: Array, most: int) -> tuple[Array, Array]:
     reach = np.abs(parts).max(axis=1)
     parts = parts - parts.mean(axis=1, keepdims=True)
     scale = np.sqrt(np.mean(parts**2, axis=1))
-    # What is constant but for its last digits, as the sign of one direction, explains nothing.
+    # A term that is constant except for its last digits, as the sign in one direction, is ignored.
     varies = scale > CONSTANT * reach
     parts = parts * (varies / np.where(varies, scale, 1.0))[:, None]
     products = np.stack([correlation(torque, part) for part in parts])
     whole = parts @ parts.T
-    about = torque - torque.mean()
-    sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (about, about**2))
+    centered = torque - torque.mean()
+    sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (centered, centered**2))
     gone = sums[width:] - sums[:-width]
     variance = squares[width:] - squares[:-width] - gone**2 / width
-    told = np.einsum("jk,jk->k", products, np.linalg.pinv(whole, rcond=1e-9) @ products)
+    fitted = np.einsum("jk,jk->k", products, np.linalg.pinv(whole, rcond=1e-9) @ products)
     whole_torque = max(float(squares[-1]) * width / len(torque), 1e-300)
     telling = variance > 0.5 * whole_torque
-    share: Array = np.where(telling, told / np.maximum(variance, 0.5 * whole_torque), 0.0)
-    left: Array = np.maximum(variance - told, 0.0) / np.maximum(variance, whole_torque)
+    share: Array = np.where(telling, fitted / np.maximum(variance, 0.5 * whole_torque), 0.0)
+    left: Array = np.maximum(variance - fitted, 0.0) / np.maximum(variance, whole_torque)
     return np.minimum(share, 1.0), left

@@ -30,50 +30,50 @@ from campaign.importing.defects.samples import continuous, frozen, of_channel, s
 ANGLES = (RELATIVE_ANGLE, MOTOR_ANGLE)
 DRIVES = (DRIVE_TORQUE, JOINT_TORQUE, MOTOR_CURRENT)
 ASKED = (COMMAND, REFERENCE)
-"""Channels that nobody measures: they may stand still and jump as they like."""
+"""Channels that are not measured: they may be constant and may jump."""
 TOLD = (*ASKED, FRICTION_TORQUE, LOAD_RATE)
 _DERIVATIVES = ((RELATIVE_ANGLE, RELATIVE_RATE), (MOTOR_ANGLE, MOTOR_RATE))
 LARGEST = 1e100
-"""What no number of a recording is beyond, in any unit."""
+"""Largest magnitude of a plausible number, in any unit."""
 
 
 def find(
     time: Array, channels: Mapping[str, Array], *, gear: float | None = None
 ) -> tuple[Defect, ...]:
-    """What is wrong with a recording, the worst first.
+    """All defects of a recording, the worst first.
 
     Args:
         time: shape (n,), s, even.
         channels: by their name in the vocabulary, each shape (n,), in one system of units.
-        gear: ratio of motor to load, where it is known.
+        gear: ratio of motor to load, if known.
     """
-    found = [*_absurd(channels)]
+    defects = [*_absurd(channels)]
     channels = {
-        name: np.where(np.isinf(values), np.nan, values)  # infinity was never measured
+        name: np.where(np.isinf(values), np.nan, values)  # infinity is no measurement
         for name, values in channels.items()
-        if not any(name in each.channels for each in found)
+        if not any(name in each.channels for each in defects)
     }
     sound = {}
-    # What follows a command that is drawn by lines is drawn by lines, too.
+    # A channel that follows a held or interpolated command has the same period.
     asked = (slower(name, channels[name]) for name in ASKED if name in channels)
     drawn = {(each.kind, each.size) for own in asked for each in own}
     for name, values in channels.items():
         own = list(of_channel(name, values, angle=name in ANGLES))
         if name not in ASKED:
             own += [each for each in slower(name, values) if (each.kind, each.size) not in drawn]
-        found += own
+        defects += own
         scale = next((each.size for each in own if each.kind == "wraparound"), None)
         sound[name] = values if scale is None else continuous(values, scale)
     for name, values in sound.items():
-        found += frozen(name, values) if name not in TOLD else ()
-        found += of_drive(name, values) if name in DRIVES else ()
+        defects += frozen(name, values) if name not in TOLD else ()
+        defects += of_drive(name, values) if name in DRIVES else ()
     if len(time) > 1:
-        found += _between(time, sound, gear)
-    return tuple(sorted(found, key=lambda each: (each.noted, each.rows)))
+        defects += _between(time, sound, gear)
+    return tuple(sorted(defects, key=lambda each: (each.noted, each.rows)))
 
 
 def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
-    """Numbers whose squares would be none: nobody measured them, and nothing follows from them."""
+    """Defects for numbers with a magnitude above `LARGEST`: their squares may overflow."""
     for name, values in series.items():
         beyond = np.flatnonzero(np.isfinite(values) & (np.abs(values) > LARGEST))
         if len(beyond):
@@ -84,26 +84,26 @@ def _absurd(series: Mapping[str, Array]) -> Iterator[Defect]:
 
 
 def _between(time: Array, channels: Mapping[str, Array], gear: float | None) -> list[Defect]:
-    found: list[Defect] = []
+    defects: list[Defect] = []
     for names in (both for both in _DERIVATIVES if channels.keys() >= set(both)):
-        found += of_rate(time, channels[names[0]], channels[names[1]], names, gear)
+        defects += of_rate(time, channels[names[0]], channels[names[1]], names, gear)
     if gear is not None:
-        found += _across_the_gear(time, channels, gear)
+        defects += _across_the_gear(time, channels, gear)
     drives = [name for name in DRIVES if name in channels]
     drive = next((name for name in (DRIVE_TORQUE, MOTOR_CURRENT) if name in channels), None)
     moving = _motion(time, channels)
     if drive is not None and moving is not None:
-        name, there, moves = moving
-        found += of_drive_sign(time, there, moves, channels[drive], (drive, name))
+        name, angle, moves = moving
+        defects += of_drive_sign(time, angle, moves, channels[drive], (drive, name))
         for each in drives:
-            found += of_drive_delay(time, moves, channels[each], (each, name))
+            defects += of_drive_delay(time, moves, channels[each], (each, name))
     for pair in combinations(drives, 2):
-        found += of_twins(pair, channels[pair[0]], channels[pair[1]])
-    return found
+        defects += of_twins(pair, channels[pair[0]], channels[pair[1]])
+    return defects
 
 
 def _across_the_gear(time: Array, channels: Mapping[str, Array], gear: float) -> Iterator[Defect]:
-    """A rate against the angle on the other side, where it has none on its own."""
+    """Defects of a rate against the angle across the gear, if its own side has no angle."""
     across = (
         (RELATIVE_ANGLE, RELATIVE_RATE, MOTOR_ANGLE, MOTOR_RATE, gear),
         (MOTOR_ANGLE, MOTOR_RATE, RELATIVE_ANGLE, RELATIVE_RATE, 1.0 / gear),
@@ -117,13 +117,13 @@ def _across_the_gear(time: Array, channels: Mapping[str, Array], gear: float) ->
 
 
 def _motion(time: Array, channels: Mapping[str, Array]) -> tuple[str, Array | None, Array] | None:
-    """What a drive's torque is held against: name of the rate, its angle, the rate itself."""
+    """Motion to compare a drive's torque with: name of the rate, angle, rate; None if absent."""
     for angle, rate in _DERIVATIVES:
         if rate in channels:
             return rate, channels.get(angle), channels[rate]
     for angle, _ in _DERIVATIVES:
         if angle in channels and len(time) > 2:
-            there = channels[angle]
+            position = channels[angle]
             step = float(time[-1] - time[0]) / (len(time) - 1)
-            return f"the derivative of {angle}", there, np.gradient(there, step)
+            return f"the derivative of {angle}", position, np.gradient(position, step)
     return (GYRO_RATE, None, channels[GYRO_RATE]) if GYRO_RATE in channels else None

@@ -1,9 +1,8 @@
 """Defects of one channel: lost samples, dropouts, wraparound, slow sampling.
 
-Standing still is no defect, however long: what only a motion would show is judged by how a channel
-enters and leaves the stretch in question. A channel that is slower than its table is held, or
-filled in between: it changes in every p-th row only, and always in the same phase, as no motion
-does.
+A constant channel is no defect, however long: a stretch is judged by the samples before and after
+it. A channel that is slower than its table is held or interpolated in between: it changes in every
+p-th row only, always in the same phase, as no motion does.
 """
 
 from __future__ import annotations
@@ -24,26 +23,26 @@ from campaign.importing.defects.defect import (
 )
 
 SPANS = (2 * math.pi, 360.0, 1.0, *(float(2**n) for n in range(8, 33)))
-"""Where angles begin anew: a turn, in the units that it is told in."""
+"""Scales at which angles wrap around: one turn in the usual units, and powers of 2."""
 _LONGEST_DROPOUT = 0.05
-"""Share of a recording; what is zero for longer has another reason."""
+"""Share of a recording; a larger share of zeros has another reason."""
 _SPIKE = 5.0
-"""Spans of nearly all samples by which a single one may be off its neighbours."""
+"""Permitted deviation of a sample from its neighbors, in spans of the central 98 %."""
 _ABRUPT = 8.0
-"""Usual steps, beyond which a step is none that the motion before it would lead to."""
+"""Step, in usual steps, above which the motion before it does not explain it."""
 FEWEST = 20
-"""Changes by which a rhythm is believed."""
+"""Minimum number of changes for a period."""
 _REGULAR = 0.95
-"""Share of the changes that keep to the rhythm."""
+"""Least share of the changes that have the same phase."""
 _MOST = 10
-"""Stretches in which a channel stands still; with more that is how it is made: of counts, say."""
+"""Maximum number of frozen stretches; more are a property of the channel, such as counts."""
 
 
 def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Defect]:
-    """What is wrong with a channel's samples, shape (n,), in any unit; NaN is a lost sample.
+    """Defects of a channel's samples, shape (n,), in any unit; NaN is a lost sample.
 
     Args:
-        angle: whether it may turn past the end of its scale.
+        angle: whether the channel may wrap around.
     """
     known = np.isfinite(values)
     rows = (0, max(len(values) - 1, 0))
@@ -56,7 +55,7 @@ def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Def
         ends = (int(lost[0]), int(lost[-1]))
         what = f"{name} lacks {counted(len(lost), 'sample')}, the first in row {lost[0] + 1}"
         yield Defect("lost", (name,), what, ends, float(len(lost)), noted=True)
-    if len(values) < 2 or np.ptp(values[known]) == 0:  # standing still is no defect
+    if len(values) < 2 or np.ptp(values[known]) == 0:  # a constant channel is no defect
         return
     turns = list(_wraparound(name, values)) if angle else []
     yield from turns
@@ -66,7 +65,7 @@ def of_channel(name: str, values: Array, *, angle: bool = False) -> Iterator[Def
 
 
 def _wraparound(name: str, values: Array) -> Iterator[Defect]:
-    """Jumps by nearly a whole scale, which end where the motion would have led."""
+    """Jumps by nearly a whole scale, in agreement with the motion around them."""
     steps = np.diff(values)
     size = np.abs(steps)
     span = float(np.ptp(values[np.isfinite(values)]))
@@ -89,28 +88,28 @@ def _wraparound(name: str, values: Array) -> Iterator[Defect]:
 
 
 def continuous(values: Array, scale: float) -> Array:
-    """An angle whose scale began anew, shape (n,), without its jumps; lost samples stay lost."""
+    """An angle, shape (n,), without its wraparound jumps; lost samples stay lost."""
     known = np.isfinite(values)
-    made = values.copy()
-    made[known] = np.unwrap(values[known], period=scale)
-    return made
+    unwrapped = values.copy()
+    unwrapped[known] = np.unwrap(values[known], period=scale)
+    return unwrapped
 
 
 def _zeros(name: str, values: Array) -> Iterator[Defect]:
-    """Zeros that a channel jumps to, and from there back to where it would be."""
+    """Zeros with a jump to them and a jump back to the expected value."""
     zero = values == 0
     if not zero.any() or zero.mean() > _LONGEST_DROPOUT:
         return
-    found = [(first, last) for first, last in runs(zero) if first > 0 and last < len(values) - 1]
-    if not found:
+    zeros = [(first, last) for first, last in runs(zero) if first > 0 and last < len(values) - 1]
+    if not zeros:
         return
     inside = zero.copy()
     inside[1:] |= zero[:-1]
     usual = usual_step(np.where(inside, np.nan, values))
-    firsts, lasts = (np.array(each) for each in zip(*found, strict=True))
+    firsts, lasts = (np.array(each) for each in zip(*zeros, strict=True))
     before, after = values[firsts - 1], values[lasts + 1]
     lengths = lasts - firsts + 1
-    # Where the motion can have led in that time.
+    # The largest change that the motion explains in that time.
     reach = usual * (lengths + 1)
     abrupt = np.minimum(np.abs(before), np.abs(after)) > _ABRUPT * usual
     back = (np.abs(after - before) <= np.maximum(reach, 0.3 * np.abs(before))) & (
@@ -122,7 +121,7 @@ def _zeros(name: str, values: Array) -> Iterator[Defect]:
 
 
 def _spikes(name: str, values: Array) -> Iterator[Defect]:
-    """Single samples that no motion leads to or away from, far beyond all the others."""
+    """Single samples far from both neighbors and from the range of the others."""
     known = values[np.isfinite(values)]
     low, high = np.quantile(known, (0.01, 0.99))
     span = max(float(high - low), usual_step(values))
@@ -130,9 +129,9 @@ def _spikes(name: str, values: Array) -> Iterator[Defect]:
         return
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(values[1:-1] - 0.5 * values[:-2] - 0.5 * values[2:])
-        found = off > _SPIKE * span
-        found &= np.abs(values[2:] - values[:-2]) < 0.1 * off
-    rows = np.flatnonzero(found) + 1
+        is_spike = off > _SPIKE * span
+        is_spike &= np.abs(values[2:] - values[:-2]) < 0.1 * off
+    rows = np.flatnonzero(is_spike) + 1
     if len(rows):
         what = (
             f"{name} has {counted(len(rows), 'single sample')} far beyond all others, the first in "
@@ -144,7 +143,7 @@ def _spikes(name: str, values: Array) -> Iterator[Defect]:
 
 
 def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Defect]:
-    """One defect for all stretches that there are."""
+    """One defect for all stretches."""
     if found:
         first, last = map(int, found[0])
         samples = int(sum(last - first + 1 for first, last in found))
@@ -155,7 +154,7 @@ def dropouts(name: str, found: list[tuple[int, int]], does: str) -> Iterator[Def
 
 
 def slower(name: str, values: Array) -> Iterator[Defect]:
-    """A channel whose value is new in every p-th row only; `size` is p."""
+    """Defect of a channel that is sampled in every p-th row only; `size` is p."""
     if not np.isfinite(values).all() or len(values) < 2 * FEWEST:
         return
     rows = (0, len(values) - 1)
@@ -175,26 +174,26 @@ def slower(name: str, values: Array) -> Iterator[Defect]:
 
 
 def _rhythm(places: NDArray[np.intp], length: int) -> int:
-    """Period of what happens in every p-th row, p > 1; 0 where it has none."""
+    """Period p > 1 of changes that occur in every p-th row; 0 without a period."""
     if len(places) < FEWEST or len(places) > 0.75 * length:
         return 0
-    apart = np.diff(places)
-    period = int(np.gcd.reduce(apart)) if len(apart) else 0
+    distances = np.diff(places)
+    period = int(np.gcd.reduce(distances)) if len(distances) else 0
     if period < 2:
-        usual, counts = np.unique(apart, return_counts=True)
+        usual, counts = np.unique(distances, return_counts=True)
         period = int(usual[np.argmax(counts)])
     if period < 2:
         return 0
     phases = np.bincount(places % period, minlength=period)
-    # Rows in which nothing happened are many, too, where it stood still.
+    # A channel at rest also has many rows without a change.
     happened = len(places) * period / length
     return period if phases.max() >= _REGULAR * len(places) and happened > 0.2 else 0
 
 
 def frozen(name: str, values: Array) -> Iterator[Defect]:
-    """Where a channel with noise stands still for a while, and then jumps: nothing came from it.
+    """Stretches in which a noisy channel is constant and then jumps: no data arrived.
 
-    Noise seldom repeats itself; how seldom, the rest of the channel tells.
+    Noise seldom repeats a value; the whole channel gives the probability.
     """
     if len(values) < 100 or not np.isfinite(values).all():
         return
@@ -205,16 +204,16 @@ def frozen(name: str, values: Array) -> Iterator[Defect]:
         return
     usual = float(np.median(size[size > 0]))
     peak = float(np.abs(values).max())
-    found = []
+    stretches = []
     for first, last in runs(same):
         length = last - first + 1
-        # Chance of such a run anywhere, were repetitions independent of each other.
+        # Expected number of such runs if repetitions are independent.
         chance = len(values) * max(share, 1.0 / len(values)) ** length
         leap = float(size[last + 1]) if last + 1 < len(size) else 0.0
-        # A filter that has run out rests at next to nothing, and not in the middle of motion.
+        # A filter that has decayed rests near zero, not in the middle of motion.
         rests = abs(values[first]) <= 1e-6 * peak
         moved = first >= 4 and not same[first - 4 : first].any() and not rests
         if length >= 4 and moved and chance < 1e-6 and leap > 5 * usual:
-            found.append((first + 1, last + 1))
-    if len(found) <= _MOST:
-        yield from dropouts(name, found, "stands still")
+            stretches.append((first + 1, last + 1))
+    if len(stretches) <= _MOST:
+        yield from dropouts(name, stretches, "stands still")

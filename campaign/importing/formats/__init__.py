@@ -1,4 +1,4 @@
-"""Formats of recordings, one file each or an installed plug-in: which one a file has."""
+"""Formats of recordings, one module or plug-in each, and their detection."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, 
 from campaign.plugins import Kinds
 
 TEXT = "text"
-"""What any text may be; all other formats are asked before."""
+"""The format that fits any text; all others have precedence."""
 
 
 @cache
@@ -20,18 +20,18 @@ def recording_formats() -> Kinds[RecordingFormat]:
 
 
 def open_recordings(path: Path) -> tuple[RecordingFormat, Sequence[Table]]:
-    """A file's format, by its first bytes, and its tables; its name decides where several fit.
+    """A file's format, by its first bytes, and its tables; if several fit, the extension decides.
 
-    Raises RecordingError with everything that is wrong, also when it is in no format there is.
+    Raises RecordingError with all problems of the file, and for an unknown format.
     """
     with regular(path) as file:
         head = file.read(HEAD)
     if not head.strip():
         raise RecordingError.of(path, "it is empty")
     formats = [each for _, each in recording_formats().described() if not isinstance(each, str)]
-    fitting = [each for each in formats if each.recognises(head)]
-    fitting.sort(key=lambda each: (each.name == TEXT, path.suffix.lower() not in each.endings))
-    if not fitting:
+    matches = [each for each in formats if each.recognises(head)]
+    matches.sort(key=lambda each: (each.name == TEXT, path.suffix.lower() not in each.endings))
+    if not matches:
         known = ", ".join(sorted(each.name for each in formats))
         raise RecordingError.of(path, f"it is in none of the formats {known}")
-    return fitting[0], fitting[0].tables(path)
+    return matches[0], matches[0].tables(path)

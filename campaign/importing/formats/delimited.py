@@ -1,7 +1,7 @@
 """CSV, TSV and other text tables, with a detected dialect.
 
-Test machines write a table for each step of a procedure, with lines about the step above it: such
-tables lie below each other, each under the same heading.
+Test machines write one table per step of a procedure, each after lines about that step. Such tables
+follow each other in the file, with the same heading.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from campaign.importing.interface import HEAD, RecordingError, RecordingFormat, 
 from campaign.importing.rows import beginning, blocks, columns_of, encoding_of_file, lines_of
 
 SAMPLE = 400
-"""Lines by which the table is."""
+"""Number of lines in which the table must begin."""
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """The table of a text file, or those below each other. Raises RecordingError."""
+    """The table of a text file, or its consecutive tables. Raises RecordingError."""
     sample = beginning(path, SAMPLE)
     dialect = dialect_of(sample)
     if dialect is None:
@@ -36,15 +36,15 @@ def tables(path: Path) -> Sequence[Table]:
         message = f"no table of numbers, separated by {separators}, was found in it"
         raise RecordingError.of(path, message)
     title = _title(dialect, sample)
-    found = _below(path, dialect, title) if title and _again(path, title) else []
-    if len(found) > 1:
-        return found
+    several = _below(path, dialect, title) if title and _again(path, title) else []
+    if len(several) > 1:
+        return several
     read = partial(blocks, path, dialect)
     return [Table("", columns_of(dialect), read, doubts=dialect.doubts)]
 
 
 def _title(dialect: Dialect, sample: Sequence[str]) -> str:
-    """The line with the names of the columns; "" where there is none."""
+    """The line with the names of the columns; "" if there is none."""
     for line in reversed(sample[: dialect.first - 1]):
         cells = dialect.split(line)
         if dialect.names and [name_and_unit(each)[0] for each in cells][: len(dialect.names)] == [
@@ -55,7 +55,7 @@ def _title(dialect: Dialect, sample: Sequence[str]) -> str:
 
 
 def _again(path: Path, title: str) -> bool:
-    """Whether a line begins as that heading twice; found without reading lines."""
+    """Whether the heading occurs at the start of a second line; searched in the raw bytes."""
     needle = title.encode(encoding_of_file(path).removesuffix("-sig"))
     with path.open("rb") as raw, mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as content:
         first = content.find(needle)
@@ -63,16 +63,16 @@ def _again(path: Path, title: str) -> bool:
 
 
 def _below(path: Path, dialect: Dialect, title: str) -> list[Table]:
-    """The tables below each other, given how the first is read and its line of names."""
-    found: list[Table] = []
+    """The consecutive tables, from the dialect of the first and its line of names."""
+    result: list[Table] = []
     titles: list[str] = []
     own, first, last = dialect, 0, 0
 
     def end() -> None:
         if first:
             read = partial(blocks, path, own, rows=last - first + 1)
-            name = f"block {len(found) + 1}"
-            found.append(Table(name, columns_of(own), read, doubts=dialect.doubts))
+            name = f"block {len(result) + 1}"
+            result.append(Table(name, columns_of(own), read, doubts=dialect.doubts))
 
     for number, line in enumerate(lines_of(path), start=1):
         bare = line.rstrip("\r\n")
@@ -87,11 +87,11 @@ def _below(path: Path, dialect: Dialect, title: str) -> list[Table]:
         elif titles and bare.strip():
             titles.append(bare)
     end()
-    return found
+    return result
 
 
 def _headed(dialect: Dialect, titles: Sequence[str], first: int) -> Dialect:
-    """As the first table is read, from another line, with the units of its own."""
+    """The dialect of the first table for a later one, with its first line and its units."""
     names, units = heading([dialect.split(line) for line in titles], len(dialect.numeric))
     units = units if len(names) == len(dialect.names) else dialect.units
     return replace(dialect, first=first, units=units)

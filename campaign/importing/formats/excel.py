@@ -1,7 +1,7 @@
 """Excel workbooks (`.xlsx`): each sheet as a text table; needs openpyxl.
 
-What is read is what Excel last computed and stored: a formula that it never computed has no value.
-Of merged cells only the first holds their text. Dates and times of day become seconds.
+Values are those that Excel last computed and stored: a formula that was never computed has none.
+Only the first of merged cells holds their text. Dates and times of day become seconds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from campaign.importing.rows import blocks_of, columns_of
 from campaign.importing.subprocess_reader import tables_streamed
 
 SAMPLE = 200
-"""Rows by which a table is found."""
+"""Number of rows in which the table is located."""
 DAY = 86400.0
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _MOMENTS = (dt.datetime, dt.date, dt.time, dt.timedelta)
@@ -40,26 +40,28 @@ Cells = Sequence[Any]
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """The tables of a workbook, in the process that asks."""
+    """The tables of a workbook, read in this process."""
     _check_size(path)
-    with _opened(path) as book, _opened(path, values=False) as asked:
-        found = [t for sheet in book.worksheets for t in _table(path, sheet, asked[sheet.title])]
-    if not found:
+    with _opened(path) as book, _opened(path, values=False) as formulas:
+        result = [
+            t for sheet in book.worksheets for t in _table(path, sheet, formulas[sheet.title])
+        ]
+    if not result:
         raise RecordingError.of(path, "no sheet of it has a table of numbers")
-    return found
+    return result
 
 
 def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
-    """The table of a sheet, if it has one; `formulas`: the sheet with those in place of values."""
+    """The table of a sheet, if any; `formulas`: the sheet with formulas in place of values."""
     sample = list(islice(_rows(sheet), SAMPLE))
     texts = [[_text(cell) for cell in cells] for cells in sample]
     width = max((k + 1 for cells in texts for k, cell in enumerate(cells) if cell), default=0)
     texts = [[*cells, *[""] * width][:width] for cells in texts]
     start = next((k for k, cells in enumerate(texts) if _is_row(cells)), None)
-    found = None if start is None else read_as(list(_lines(_heading(texts, start))), "\t", ".")
-    if found is None:
+    match = None if start is None else read_as(list(_lines(_heading(texts, start))), "\t", ".")
+    if match is None:
         return
-    dialect = replace(found[1], sheet=sheet.title)
+    dialect = replace(match[1], sheet=sheet.title)
     body = [both for cells in sample[dialect.first - 1 :] for both in enumerate(cells)]
     moments = {k for k, cell in body if isinstance(cell, _MOMENTS)}
     commas = sorted({k for k, cell in body if _has_comma(cell)})
@@ -69,8 +71,8 @@ def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
     ]
     doubts: tuple[str, ...] = ()
     if commas:
-        told = ", ".join(columns[k].name for k in commas)
-        doubts = (f"numbers of {told} are text with a decimal comma",)
+        names = ", ".join(columns[k].name for k in commas)
+        doubts = (f"numbers of {names} are text with a decimal comma",)
     if moments:
         doubts += ("dates and times are kept as days, to some 10 us: steps of it are rounding",)
     _check_formulas(path, dialect, sample, formulas)
@@ -80,7 +82,7 @@ def _table(path: Path, sheet: Any, formulas: Any) -> Iterator[Table]:
 def _read(
     path: Path, dialect: Dialect, moments: Container[int], places: Sequence[int]
 ) -> Iterator[Array]:
-    """Columns in `places`; `moments`: those of dates and times."""
+    """Blocks of the columns `places`; `moments`: columns of dates and times."""
     with _opened(path) as book:
         rows = islice(_rows(book[dialect.sheet]), dialect.first - 1, None)
         texts = ([_value(cell, k in moments) for k, cell in enumerate(cells)] for cells in rows)
@@ -90,7 +92,7 @@ def _read(
 
 
 def _lines(rows: Iterable[list[str]], width: int = 0) -> Iterator[str]:
-    """Rows as lines; one goes on behind the columns of the table only with what is no blank."""
+    """Rows as tab-separated lines, without blank cells after the last column of the table."""
     for cells in rows:
         while width and len(cells) > width and not cells[-1]:
             cells.pop()
@@ -98,7 +100,7 @@ def _lines(rows: Iterable[list[str]], width: int = 0) -> Iterator[str]:
 
 
 def _text(cell: Any) -> str:
-    """A cell as a text file would have it; numbers with a point."""
+    """Text of a cell, with a decimal point in numbers."""
     if cell is None or cell in _ERRORS:
         return ""
     if isinstance(cell, _MOMENTS):
@@ -112,7 +114,7 @@ def _text(cell: Any) -> str:
 
 
 def _value(cell: Any, moment: bool) -> str:
-    """The same of a column of dates and times, or of one of numbers; what is not of it is none."""
+    """Text of a cell in a column of dates (`moment`) or numbers; the other kind is no number."""
     if isinstance(cell, (int, float) if moment else _MOMENTS):
         return f"{cell}, {'no' if moment else 'a'} time"
     return _text(cell)
@@ -124,30 +126,30 @@ def _has_comma(cell: Any) -> bool:
 
 
 def _is_row(cells: Sequence[str]) -> bool:
-    """Whether half of what a row holds are numbers."""
+    """Whether at least half of the nonempty cells of a row are numbers."""
     figures = [is_number(cell, ".") for cell in cells if cell]
     return any(figures) and 2 * sum(figures) >= len(figures)
 
 
 def _heading(rows: list[list[str]], start: int) -> list[list[str]]:
-    """The rows, those above row `start` made a heading: where cells are merged one goes on in the
-    next, and what an empty row parts from the table is none.
+    """The rows, with those above row `start` as a heading: rows of merged cells are combined;
+    rows that an empty row separates from the table are removed.
     """
-    found: list[list[str]] = []
+    heading: list[list[str]] = []
     for cells in rows[:start]:
         given = [cell for cell in cells if cell]
         goes_on = 2 * len(given) >= len(cells) > len(given) and not all(map(is_unit, given))
         if not given and start < len(rows):
-            found = [[] for _ in found]
-        elif found and goes_on and not all(found[-1]):
-            cells = [own or upper for own, upper in zip(cells, found[-1] or cells, strict=True)]
-            found[-1] = []
-        found.append(cells)
-    return [*found, *rows[start:]]
+            heading = [[] for _ in heading]
+        elif heading and goes_on and not all(heading[-1]):
+            cells = [own or upper for own, upper in zip(cells, heading[-1] or cells, strict=True)]
+            heading[-1] = []
+        heading.append(cells)
+    return [*heading, *rows[start:]]
 
 
 def _check_size(path: Path) -> None:
-    """A small file may unpack to more than a machine holds."""
+    """Raises RecordingError for a file that unpacks to more than the permitted size."""
     with read_by("zipfile", path, "workbook"), zipfile.ZipFile(path) as packed:
         sizes = {each.filename: each.file_size for each in packed.infolist()}
     shared = max((size for name, size in sizes.items() if "sharedStrings" in name), default=0)
@@ -159,7 +161,7 @@ def _check_size(path: Path) -> None:
 
 @contextmanager
 def _opened(path: Path, values: bool = True) -> Iterator[Any]:
-    """A workbook; with its formulas in place of their values if `values` is false."""
+    """An open workbook; with formulas in place of their values if `values` is false."""
     with read_by("openpyxl", path, "workbook", "excel"):
         import openpyxl
 
@@ -177,8 +179,8 @@ def _rows(sheet: Any) -> Iterator[Cells]:
 def _check_formulas(path: Path, dialect: Dialect, sample: Sequence[Cells], formulas: Any) -> None:
     """Raises RecordingError for a formula among the first rows whose value is not in the file."""
     written = islice(_rows(formulas), dialect.first - 1, None)
-    told = zip(sample[dialect.first - 1 :], written, strict=False)
-    for row, cells in enumerate(told, dialect.first):
+    both = zip(sample[dialect.first - 1 :], written, strict=False)
+    for row, cells in enumerate(both, dialect.first):
         for place, (value, text) in enumerate(zip_longest(*cells)):
             if value is None and isinstance(text, str) and text.startswith("="):
                 message = "a formula whose value is not in the file; open and save it in Excel"

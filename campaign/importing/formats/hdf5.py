@@ -1,7 +1,7 @@
 """HDF5 files, including MATLAB version 7.3: datasets by path, read in parts.
 
-Nothing outside the file is opened: links to other files, and datasets whose numbers lie in others,
-are left out.
+Nothing outside the file is opened: links to other files and datasets with external data are
+omitted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from campaign.importing.subprocess_reader import tables_streamed
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 MOST = 10_000
-"""Objects of a file that are looked at."""
+"""Maximum number of objects of a file that are examined."""
 CLASS = "MATLAB_class"
 PLAIN = {"double", "single", "logical", "int8", "int16", "int32", "int64"}
 PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
@@ -27,7 +27,7 @@ PLAIN |= {"uint8", "uint16", "uint32", "uint64"}
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """What is in a file, in the process that asks; a broken one can end it."""
+    """The tables of a file, read in this process; a broken file can crash it."""
     import h5py
 
     arrays: list[NamedArray] = []
@@ -72,7 +72,7 @@ def _sort_out(
     kind = dataset.attrs.get(CLASS, b"")
     kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
     if dataset.shape is None or dataset.is_virtual or dataset.external:
-        return  # without any number, or with numbers that lie in other files
+        return  # without numbers, or with numbers in other files
     if kind and kind not in PLAIN:
         if kind not in ("char", "cell", "struct", "function_handle"):
             objects.append(name)
@@ -83,7 +83,7 @@ def _sort_out(
 
 
 def _named(path: Path, name: str, dataset: Any, matlab: bool) -> NamedArray:
-    """A series; MATLAB's arrays lie transposed in the file."""
+    """The array of a dataset; MATLAB's arrays are transposed in the file."""
     along = int(np.argmax(dataset.shape))
     unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
     unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit

@@ -1,8 +1,8 @@
 """LabVIEW measurement files (`.lvm`): blocks with heading and clock.
 
-A block has a column of times for all channels, one for each, or none; then time follows from `X0`
-and `Delta_X`. What stands in the comment column is no channel. Files that LabVIEW wrote without any
-heading are plain text tables.
+A block has one column of times for all channels, one for each channel, or none; without one, time
+follows from `X0` and `Delta_X`. The comment column is no channel. LabVIEW files without a heading
+are plain text tables.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _FACT = re.compile(r"([^\t,;]+)([\t,;])(.*)")
 
 @dataclass
 class _Block:
-    """A block as its heading tells it; `rows` counts what follows."""
+    """A block by its heading; `rows` counts the rows after it."""
 
     name: str
     heading: dict[str, list[str]]
@@ -38,38 +38,38 @@ class _Block:
 
 def _tables(path: Path) -> Sequence[Table]:
     lines = enumerate(lines_of(path), start=1)
-    said = _said(lines)
-    separator = SEPARATORS.get(said.get("Separator", "Tab").lower(), "\t")
-    found = _blocks(path, lines, separator)
-    decimal = said.get("Decimal_Separator", ".")
+    properties = _said(lines)
+    separator = SEPARATORS.get(properties.get("Separator", "Tab").lower(), "\t")
+    found_blocks = _blocks(path, lines, separator)
+    decimal = properties.get("Decimal_Separator", ".")
     if decimal not in (".", ","):
         message = f"Decimal_Separator is {decimal!r}, and not a point or a comma"
         raise RecordingError.of(path, message)
-    if not found:
+    if not found_blocks:
         raise RecordingError.of(path, f"no block ended its heading with {END}")
     tables: list[Table] = []
-    for block in found:
+    for block in found_blocks:
         if not block.rows:
             raise RecordingError.of(path, "a block without any row", block.first)
         dialect = Dialect.of_numbers(separator, decimal, block.first, block.titles)
-        tables += _of_block(path, dialect, said, block)
+        tables += _of_block(path, dialect, properties, block)
     return tables
 
 
 def _said(lines: Iterator[tuple[int, str]]) -> dict[str, str]:
-    """What the file says of itself, up to the end of its own heading."""
-    said: dict[str, str] = {}
+    """The properties in the heading of the file."""
+    properties: dict[str, str] = {}
     for _, line in lines:
         if line.startswith(END):
             break
         if fact := _FACT.match(line):
             key, separator, value = fact.groups()
-            said[key] = value.strip(f"{separator} ")
-    return said
+            properties[key] = value.strip(f"{separator} ")
+    return properties
 
 
 def _blocks(path: Path, lines: Iterator[tuple[int, str]], separator: str) -> list[_Block]:
-    found: list[_Block] = []
+    result: list[_Block] = []
     heading: dict[str, list[str]] = {}
     titled = inside = False
     for number, line in lines:
@@ -81,17 +81,17 @@ def _blocks(path: Path, lines: Iterator[tuple[int, str]], separator: str) -> lis
         elif titled:
             titles = [title for title in cells if title]
             titles = titles[:-1] if titles[-1] == "Comment" else titles
-            found.append(_Block(f"block {len(found) + 1}", heading, titles, number + 1))
+            result.append(_Block(f"block {len(result) + 1}", heading, titles, number + 1))
             titled, inside, heading = False, True, {}
         elif inside and cells[0] != "Channels":
-            found[-1].rows += 1
-        elif found and not heading and _is_row(cells):
+            result[-1].rows += 1
+        elif result and not heading and _is_row(cells):
             message = "a row of numbers behind an empty line, which ends a block"
             raise RecordingError.of(path, message, number)
         else:
             inside = False
             heading[cells[0]] = cells[1:]
-    return found
+    return result
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -99,14 +99,14 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 
 def _of_block(path: Path, dialect: Dialect, said: dict[str, str], block: _Block) -> Iterator[Table]:
-    """The tables of one block: one, but for channels with clocks of their own."""
+    """The tables of one block: one for each different clock."""
     titles, times = block.titles, said.get("X_Columns", "One").lower()
     channels = list(range(1, len(titles), 2 if times == "multi" else 1))
     clocks: list[Clock | int] = [0] * len(channels)
     if times == "multi":
         clocks = [place - 1 for place in channels]
     elif times == "no":
-        # The column of times is there all the same, and empty.
+        # The column of times exists nevertheless, and is empty.
         channels = [place for place, title in enumerate(titles) if title != TIMES]
         clocks = [*_clocks(path, block, dialect.decimal, len(channels))]
     units = [*block.heading.get("Y_Unit_Label", []), *[""] * len(titles)]
@@ -131,7 +131,7 @@ def _place(block: _Block, column: int) -> str:
 
 
 def _clocks(path: Path, block: _Block, decimal: str, count: int) -> list[Clock]:
-    """Start and step of each channel, as the heading states them."""
+    """Start and step of each channel, from the heading."""
     try:
         starts, steps = (
             [value_of(cell, decimal) for cell in block.heading[key] if cell][:count]

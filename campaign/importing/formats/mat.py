@@ -1,7 +1,7 @@
 """MAT files of version 4 to 7.2: variables, Simulink structures, dSPACE X and Y.
 
-Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) are in
-no documented form; where there is nothing else, how to save what is in them is said.
+Version 7.3 is HDF5 (`hdf5.py`). Objects of MATLAB's classes (timeseries, table, datetime) have no
+documented format; if a file holds nothing else, the error says how to save their content.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from campaign.importing.interface import (
 from campaign.importing.subprocess_reader import tables_streamed
 
 MOST_TIMES = 100
-"""How many times its own size a file may unpack to; what is measured has noise, and does not."""
+"""Largest ratio of unpacked to file size: measurements contain noise and compress less."""
 _COMPRESSED, _BLOCK = 15, 1 << 20
 DEEPEST = 8
-"""Structures within each other."""
+"""Maximum depth of nested structures."""
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """What is in a MAT file, read in this process. Raises RecordingError."""
+    """The tables of a MAT file, read in this process. Raises RecordingError."""
     from scipy.io import loadmat
 
     _check_size(path)
     with read_by("scipy", path, "MAT file of version 4 to 7.2"):
-        # mat_dtype: whole numbers were written as bytes; their differences would wrap around.
-        found = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
+        # mat_dtype: MATLAB may store integral numbers as bytes, whose differences wrap around.
+        variables = loadmat(path, mat_dtype=True, struct_as_record=False, squeeze_me=True)
     whole: list[Table] = []
     arrays: list[NamedArray] = []
     objects: list[str] = []
-    for name, value in found.items():
+    for name, value in variables.items():
         if not name.startswith("__") and name != "None":
             _sort_out(name, value, whole, arrays, objects)
     whole += tables_of(arrays)
     if not whole:
-        nameless = not {"None", "__function_workspace__"}.isdisjoint(found)
+        nameless = not {"None", "__function_workspace__"}.isdisjoint(variables)
         if not objects and not nameless:
             raise RecordingError.of(path, "no variable of it is a series of numbers")
         raise RecordingError.of(path, f"{(*objects, 'a variable')[0]} {OPAQUE}")
@@ -58,9 +58,9 @@ def tables(path: Path) -> Sequence[Table]:
 
 
 def _check_size(path: Path) -> None:
-    """A small file may unpack to more than a machine holds; it is counted, and nothing is kept."""
+    """Raises RecordingError for a file that unpacks to too many bytes; counts without storing."""
     unpacked = 0
-    with suppress(OSError, zlib.error), path.open("rb") as file:  # reading it says so
+    with suppress(OSError, zlib.error), path.open("rb") as file:  # the reader reports these
         most = min(MOST_UNPACKED, max(LARGEST_PART, MOST_TIMES * path.stat().st_size))
         for count in _unpacking(file):
             unpacked += count
@@ -70,7 +70,7 @@ def _check_size(path: Path) -> None:
 
 
 def _unpacking(file: BinaryIO) -> Iterator[int]:
-    """Bytes that each step of unpacking the variables of a file of version 5 gives."""
+    """Number of bytes from each step of unpacking the variables of a version 5 file."""
     head = file.read(128)
     order = ">" if head[126:] == b"MI" else "<"
     while head[:6] == b"MATLAB" and len(tag := file.read(8)) == 8:
@@ -95,7 +95,7 @@ def _sort_out(
     objects: list[str],
     deep: int = 0,
 ) -> None:
-    """Put a variable where it belongs: a table of its own, an array, or an object's name."""
+    """Add a variable to the tables, the arrays or the names of objects, recursively."""
     if deep > DEEPEST:
         return
     if _is_opaque(value):
@@ -124,7 +124,7 @@ def _fields(value: Any) -> Mapping[str, Any] | None:
 
 
 def _structures(value: Any) -> list[Mapping[str, Any]]:
-    """The fields of each of an array of structures, where a single one is no array."""
+    """The fields of each structure in an array, or of a single structure."""
     listed = value.ravel() if isinstance(value, np.ndarray) else [value]
     return [fields for each in listed if (fields := _fields(each)) is not None]
 
@@ -134,7 +134,7 @@ def _text(value: Any) -> str:
 
 
 def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
-    """ControlDesk's recordings: times in `X`, each signal in `Y` with the index of its times."""
+    """Tables of ControlDesk: times in `X`, each signal in `Y` with the index of its times."""
     clocks, signals = (
         [each for each in _structures(fields.get(key)) if "Data" in each] for key in "XY"
     )
@@ -145,30 +145,30 @@ def _dspace(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
         index = of.get("XIndex")
         if not (isinstance(index, int | float) and 1 <= index <= len(clocks)):
             if lengths.count(len(data)) != 1:
-                # Two clocks of one length: whose it is cannot be told. A short one is a parameter.
+                # Ambiguous if two clocks have this length; a parameter if none has.
                 continue
             index = lengths.index(len(data)) + 1
         series = named(_text(of.get("Name")) or f"Y({k})", data, _text(of.get("Unit")))
         if series is not None and series.length == lengths[int(index) - 1]:
             groups.setdefault(int(index), []).append(series)
-    for index, found in sorted(groups.items()):
+    for index, series_list in sorted(groups.items()):
         times = named("time", np.atleast_1d(clocks[index - 1]["Data"]), "s")
         if times is not None:
             part = name if len(groups) == 1 else f"{name}.X({index})"
-            yield table_of([times, *found], part)
+            yield table_of([times, *series_list], part)
 
 
 def _with_time(name: str, fields: Mapping[str, Any]) -> Iterator[Table]:
-    """Simulink's structure with time: `time`, and `signals` of values and labels."""
+    """Table of Simulink's structure with time: `time`, and `signals` of values and labels."""
     times = named("time", np.atleast_1d(np.asarray(fields.get("time", ()))), "s")
     signals = enumerate(_structures(fields.get("signals")), start=1)
     series = [
         named(_text(of.get("label")) or f"signals({k})", np.asarray(of.get("values", ())))
         for k, of in signals
     ]
-    alike = [one for one in series if one is not None and times and one.length == times.length]
-    if times is not None and alike:
-        yield table_of([times, *alike], name)
+    matching = [one for one in series if one is not None and times and one.length == times.length]
+    if times is not None and matching:
+        yield table_of([times, *matching], name)
 
 
 def _is_opaque(value: Any) -> bool:

@@ -1,7 +1,7 @@
 """MDF files (`.mf4`, `.mdf`), group by group; needs asammdf.
 
-A group has one clock. Groups are never laid over each other: what one recorded at other moments
-than another would have to be invented.
+A group has one clock. Groups are never merged: values between the times of a group would be
+invented.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from campaign.importing.subprocess_reader import tables_streamed
 MAGIC = (b"MDF     3.", b"MDF     4.")
 UNFINISHED = b"UnFinMF "
 DENSEST = 1100
-"""Times its size that compressed data can unpack to."""
+"""Largest ratio of the unpacked size to the compressed size."""
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """The groups of a file with more than one sample, in the process that asks."""
-    found: list[Table] = []
+    """The groups of a file with more than one sample, read in this process."""
+    result: list[Table] = []
     with _opened(path) as file:
         for group, each in enumerate(file.groups):
             rows = int(each.channel_group.cycles_nr)
@@ -41,20 +41,20 @@ def tables(path: Path) -> Sequence[Table]:
                 continue
             size = each.channel_group.samples_byte_nr + each.channel_group.invalidation_bytes_nr
             if rows * size > DENSEST * path.stat().st_size:
-                told = f"group {group + 1} says that it has {rows} samples of {size} bytes"
-                raise RecordingError.of(path, f"{told}, more than are in a file of this size")
+                size_note = f"group {group + 1} says that it has {rows} samples of {size} bytes"
+                raise RecordingError.of(path, f"{size_note}, more than are in a file of this size")
             columns, places = _columns(file, group, each)
             if any(column.numeric for column in columns[1:]):
                 name = str(getattr(each.channel_group, "acq_name", "") or f"group {group + 1}")
                 read = partial(_read, path, group, places, rows)
-                found.append(Table(name, tuple(columns), read))
-    if not found:
+                result.append(Table(name, tuple(columns), read))
+    if not result:
         raise RecordingError.of(path, "no group of it has a series of numbers")
-    return found
+    return result
 
 
 def _columns(file: Any, group: int, of: Any) -> tuple[list[Column], list[int | None]]:
-    """The clock first, then the channels as they come, by index; two may have one name."""
+    """The clock, then the channels in order, by index: two channels may have the same name."""
     where = f"group {group + 1}"
     columns = [Column("time", "s", f"{where}, its clock")]
     places: list[int | None] = [None]
@@ -77,15 +77,15 @@ def _read(
         for start in range(0, rows, ROWS):
             count = min(ROWS, rows - start)
             series = [_part(file, group, places[place], start, count) for place in wanted]
-            there = min((len(each) for each in series), default=count)
-            if there < count:
-                message = f"group {group + 1} ends after {start + there} of {rows} samples"
+            available = min((len(each) for each in series), default=count)
+            if available < count:
+                message = f"group {group + 1} ends after {start + available} of {rows} samples"
                 raise RecordingError.of(path, message)
             yield np.column_stack(series) if series else np.empty((count, 0))
 
 
 def _part(file: Any, group: int, index: int | None, start: int, count: int) -> Array:
-    """Physical values of a channel, or the clock; those marked as invalid are lost."""
+    """Physical values of a channel, or the clock (index None); invalid samples become NaN."""
     if index is None:
         times = file.get_master(group, record_offset=start, record_count=count)
         return np.asarray(times, dtype=np.float64)

@@ -61,8 +61,8 @@ def _is_numeric(field: pa.Field) -> bool:
 
 
 def _unit(field: pa.Field) -> str:
-    told: dict[bytes, bytes] = field.metadata or {}
-    return (told.get(b"units") or told.get(b"unit", b"")).decode("utf-8", "replace")
+    metadata: dict[bytes, bytes] = field.metadata or {}
+    return (metadata.get(b"units") or metadata.get(b"unit", b"")).decode("utf-8", "replace")
 
 
 FORMAT = RecordingFormat(

@@ -1,7 +1,7 @@
 """TDMS of LabVIEW and other programs of NI; needs npTDMS (`pip install 'campaign[tdms]'`).
 
-Time is no channel there: a waveform states its offset and its step, and one that states none has no
-known time. Channels with different clocks, or that started at different moments, are apart.
+Time is no channel: a waveform states its offset and its step; without them its time is unknown.
+Channels with different clocks or start times are in separate tables.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _reading = partial(read_by, "npTDMS", what="TDMS file", extra="tdms")
 
 
 def tables(path: Path) -> Sequence[Table]:
-    """What is in a file, in the process that asks."""
-    alike: dict[tuple[str, int, Clock | None, str], list[tuple[str, Any]]] = {}
+    """The tables of a file, read in this process."""
+    groups: dict[tuple[str, int, Clock | None, str], list[tuple[str, Any]]] = {}
     with _reading(path):
         from nptdms import TdmsFile
 
@@ -39,12 +39,12 @@ def tables(path: Path) -> Sequence[Table]:
             for group in file.groups():
                 for channel in group.channels():
                     if len(channel) > 1 and channel.dtype.kind in "fiub":
-                        told = channel.properties
-                        clock = _clock(told)
-                        start = told.get("wf_start_time")
+                        facts = channel.properties
+                        clock = _clock(facts)
+                        start = facts.get("wf_start_time")
                         key = (group.name, len(channel), clock, str(start))
-                        alike.setdefault(key, []).append((channel.name, told.get("unit_string")))
-    if not alike:
+                        groups.setdefault(key, []).append((channel.name, facts.get("unit_string")))
+    if not groups:
         raise RecordingError.of(path, "no channel of it is a series of numbers")
     return [
         Table(
@@ -53,12 +53,12 @@ def tables(path: Path) -> Sequence[Table]:
             partial(_read, path, group, [name for name, _ in channels], length),
             clock,
         )
-        for (group, length, clock, _), channels in alike.items()
+        for (group, length, clock, _), channels in groups.items()
     ]
 
 
 def _clock(told: Any) -> Clock | None:
-    """Of a waveform; both of what it needs, or none: half a clock is no clock."""
+    """The clock of a waveform; None unless both step and offset are stated."""
     step, offset = told.get("wf_increment"), told.get("wf_start_offset")
     if step is None or offset is None or not float(step) > 0:
         return None
@@ -76,7 +76,7 @@ def _read(
             for start in range(0, length, ROWS):
                 stop = min(start + ROWS, length)
                 yield np.column_stack(
-                    # Scaled, as the file says how; raw counts are nobody's quantity.
+                    # Scaled as the file states: raw counts are no physical quantity.
                     [np.asarray(channel[start:stop], dtype=np.float64) for channel in channels]
                 )
 

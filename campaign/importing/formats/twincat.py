@@ -1,8 +1,7 @@
 """TwinCAT Scope text export: channel facts, then times beside values.
 
-A column headed `Name` holds times (ms); the channels up to the next such column share them. Columns
-of other clocks stand in the same rows and have nothing to do with each other: each clock is a
-table.
+A column headed `Name` holds times (ms) of the channels up to the next such column. Columns of
+different clocks share rows but are unrelated: each clock is a table.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from campaign.importing.rows import beginning, blocks
 NAME = "Name"
 SEPARATORS = "\t;,"
 LONGEST_HEADING = 200
-"""Lines in which the table has to begin."""
+"""Number of lines in which the table must begin."""
 
 
 def _tables(path: Path) -> Sequence[Table]:
@@ -49,7 +48,7 @@ def _tables(path: Path) -> Sequence[Table]:
 def _decimal(cells: Sequence[str]) -> str:
     """The decimal sign of a row of numbers; "" for any other row."""
     given = [cell for cell in cells if not is_lost(cell)]
-    # Without any decimals either will do; times of whole milliseconds say nothing.
+    # Without decimals, either sign is correct; whole milliseconds give no evidence.
     decimal = "," if any("," in cell for cell in given) else "."
     return decimal if given and all(is_number(cell, decimal) for cell in given) else ""
 
@@ -70,7 +69,7 @@ def _by_clock(path: Path, dialect: Dialect, facts: dict[str, list[str]]) -> Iter
 
 
 def _unit(facts: dict[str, list[str]], place: int) -> str:
-    """Of a channel; `Nm (Torque)` is the unit, and what it is of."""
+    """Unit of a channel; `Nm (Torque)` is the unit and its quantity."""
     unit = facts["Unit"][place].split(" (")[0].strip() if "Unit" in facts else ""
     return unit if unit.lower() not in NO_UNIT and is_unit(unit) else ""
 
@@ -78,7 +77,7 @@ def _unit(facts: dict[str, list[str]], place: int) -> str:
 def _rows(
     path: Path, dialect: Dialect, among: Sequence[int], places: Sequence[int]
 ) -> Iterator[Array]:
-    """A clock that ends before others leaves its cells empty, from there to the end of the file."""
+    """Blocks of a clock; after its end, its cells are empty up to the end of the file."""
     over, row = False, dialect.first
     for block in blocks(path, dialect, [0, *places], among=among):
         timed = np.isfinite(block[:, 0])

@@ -1,4 +1,4 @@
-"""A first mapping of files that nobody described: what is in them, and what columns may be."""
+"""A draft mapping of undescribed files: their tables, and likely roles and units of columns."""
 
 from campaign.importing.guess.column_guess import guess
 from campaign.importing.guess.columns import Basis, ColumnGuess, TableGuess

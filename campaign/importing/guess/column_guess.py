@@ -1,7 +1,7 @@
 """Draft roles and units of columns, each with its evidence.
 
-Certain is what a file states. What its numbers suggest is likely, and is marked; sign, side of the
-gear, constants, offsets and filters are never guessed. What is wrong with the numbers a plan says.
+Statements of the file are certain; suggestions of its numbers are marked as likely. Sign, side of
+the gear, constants, offsets and filters are never guessed. The plan reports defects of the numbers.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from campaign.importing.interface import Array, Column, Table
 from campaign.unit_grammar import parse_unit
 
 SAMPLE = 200_000
-"""Rows by which is guessed: enough for any motion, and little of a large file."""
+"""Number of examined rows: enough for any motion, and little of a large file."""
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _THIS_CENTURY = (1e9, 4e9)
-"""s since 1970, of the years 2001 to 2096."""
+"""Times (s) since 1970 in the years 2001 to 2096."""
 
 
 def guess(paths: Sequence[Path]) -> list[TableGuess]:
-    """What the tables of files may be. Raises RecordingError for those that cannot be read."""
+    """Guesses for the tables of files. Raises RecordingError for unreadable files."""
     return [each for path in paths for each in _of_file(path)]
 
 
 def _of_file(path: Path) -> Iterator[TableGuess]:
-    found, tables = open_recordings(path)
+    form, tables = open_recordings(path)
     series = [_beginning(table) for table in tables]
     columns = [_by_names(path, *both) for both in zip(tables, series, strict=True)]
     axis = iter(axes([column for own in columns for column in own]))
     for table, own, values in zip(tables, columns, series, strict=True):
-        yield _of_table(path, found.name, table, [replace(c, axis=next(axis)) for c in own], values)
+        yield _of_table(path, form.name, table, [replace(c, axis=next(axis)) for c in own], values)
 
 
 def _beginning(table: Table) -> Series:
-    """The first rows of the columns that hold numbers, by their places."""
+    """The first rows of the numeric columns, by column index."""
     places = [k for k, column in enumerate(table.columns) if column.numeric]
     blocks = [np.empty((0, len(places)))]
     reading = table.read(places)
@@ -57,7 +57,7 @@ def _beginning(table: Table) -> Series:
 
 
 def _by_names(path: Path, table: Table, series: Series) -> list[ColumnGuess]:
-    """What names say, held against the numbers; of a single signal the file's name may be one."""
+    """Guesses by names, checked with the numbers; the file's name may name a single signal."""
     path_of_all = common_path([each.name for each in table.columns])
     columns = [_by_name(c, series.get(k), path_of_all) for k, c in enumerate(table.columns)]
     if table.clock is None and len(series) > 1 and all(each.role != TIME for each in columns):
@@ -74,24 +74,24 @@ def _by_names(path: Path, table: Table, series: Series) -> list[ColumnGuess]:
 def _by_name(column: Column, values: Array | None, before: str = "") -> ColumnGuess:
     if values is None:
         return ColumnGuess(column.name, column.place, UNKNOWN, "it holds no numbers")
-    found = named(column.name, column.unit, column.place, before)
+    guess = named(column.name, column.unit, column.place, before)
     known = values[np.isfinite(values)]
     if len(known):
-        found = replace(found, low=float(known.min()), high=float(known.max()))
-    if found.role in (TIME, INDEX) and not _increases(values):
-        return replace(found, role=UNKNOWN, why=f"a name of {found.role}, but it does not increase")
-    if found.role != TIME and found.why in ("", BY_UNIT) and _counts(values):
-        return replace(found, role=INDEX, why="it counts rows")
-    if found.role == TIME and len(known) < len(values):
-        return replace(found, doubts=(f"{len(values) - len(known)} of its cells hold no number",))
-    return found
+        guess = replace(guess, low=float(known.min()), high=float(known.max()))
+    if guess.role in (TIME, INDEX) and not _increases(values):
+        return replace(guess, role=UNKNOWN, why=f"a name of {guess.role}, but it does not increase")
+    if guess.role != TIME and guess.why in ("", BY_UNIT) and _counts(values):
+        return replace(guess, role=INDEX, why="it counts rows")
+    if guess.role == TIME and len(known) < len(values):
+        return replace(guess, doubts=(f"{len(values) - len(known)} of its cells hold no number",))
+    return guess
 
 
 def _with_time(columns: list[ColumnGuess], series: Series) -> list[ColumnGuess]:
-    """Without any column that is called so, the first that runs like a clock is time.
+    """The columns with the first one that increases evenly as time; no column is named time.
 
-    Its name says nothing, or it is the first of a matrix: what stands beside it there are signals
-    of one axis, and not one of each.
+    Its name is uninformative, or it is the first column of a matrix: the other columns of that
+    matrix are signals of one axis, not one per axis.
     """
     for place, values in series.items():
         each = columns[place]
@@ -110,15 +110,15 @@ def _of_table(
     rows = len(next(iter(series.values()), ()))
     columns, time = _timed(columns, series, table, rows)
     columns = [_unit_by_range(c, series[k]) if k in series else c for k, c in enumerate(columns)]
-    doubts, step, anew = table.doubts, None, []
+    doubts, step, starts = table.doubts, None, []
     if time is None:
         doubts = (*doubts, "no time is known: state a rate, or which column holds times")
     else:
-        anew = restarts(time)
-        step = ticks(np.split(time, anew[:1])[0]).step or None
+        starts = restarts(time)
+        step = ticks(np.split(time, starts[:1])[0]).step or None
         columns = with_units(with_roles(columns, series, time), series, time)
     return TableGuess(
-        path, form, table.name, tuple(columns), rows, step, table.clock is not None, len(anew),
+        path, form, table.name, tuple(columns), rows, step, table.clock is not None, len(starts),
         tuple(doubts),
     )  # fmt: skip
 
@@ -126,7 +126,7 @@ def _of_table(
 def _timed(
     columns: list[ColumnGuess], series: Series, table: Table, rows: int
 ) -> tuple[list[ColumnGuess], Array | None]:
-    """The columns with the unit of their times, and those, s; None where nothing tells them."""
+    """The columns with the unit of their times, and the times (s); None if unknown."""
     if table.clock is not None:
         return columns, table.clock.start + table.clock.step * np.arange(rows, dtype=np.float64)
     for place in (k for k, each in enumerate(columns) if each.role == TIME):
@@ -141,18 +141,18 @@ def _timed(
     return columns, None
 
 
-# What the numbers of one column say
+# Evidence from the numbers of one column
 
 
 def _increases(values: Array) -> bool:
-    """Whether a column can be one of times: it hardly ever goes back, but where it begins anew."""
+    """Whether a column can hold times: under 1 % of its steps decrease, except at restarts."""
     known = values[np.isfinite(values)]
     parts = [part for part in np.split(known, restarts(known)) if len(part) > 1]
     return bool(parts) and all(p[-1] > p[0] and (np.diff(p) < 0).mean() < 0.01 for p in parts)
 
 
 def _evenly(values: Array) -> bool:
-    """Whether it does so in steps of one size, as clocks do and motions do not."""
+    """Whether a column increases in equal steps, as clocks do and motions do not."""
     if len(values) < 8 or not np.isfinite(values).all() or not _increases(values):
         return False
     clock = ticks(values)
@@ -160,12 +160,12 @@ def _evenly(values: Array) -> bool:
 
 
 def _counts(values: Array) -> bool:
-    """Whether it counts rows: whole numbers, one by one."""
+    """Whether a column counts rows: steps of 1 from 0 or 1."""
     return len(values) > 1 and values[0] in (0.0, 1.0) and bool(np.all(np.diff(values) == 1))
 
 
 def _unit_of_time(values: Array) -> tuple[str, str]:
-    """A unit, and what suggests it: size and step, as no rig samples at others; or "" twice."""
+    """Likely unit of times and its evidence, from size and usual sampling steps; else "" twice."""
     step = ticks(values).step
     if step <= 0:
         return "", ""
@@ -178,7 +178,7 @@ def _unit_of_time(values: Array) -> tuple[str, str]:
 
 
 def _unit_by_range(column: ColumnGuess, values: Array) -> ColumnGuess:
-    """A temperature as laboratories have it; an angle by where its scale begins anew."""
+    """The column with a likely unit: degC in laboratory range; an angle by its wraparound."""
     known = values[np.isfinite(values)]
     span = column.high - column.low
     if column.basis is not Basis.UNKNOWN or not len(known):

@@ -13,26 +13,26 @@ TIME, INDEX, UNKNOWN = "time", "index", "unknown"
 
 
 class Basis(StrEnum):
-    """What a unit rests on."""
+    """Evidence for a unit."""
 
-    STATED = "stated"  # the file says so
+    STATED = "stated"  # by the file
     LIKELY = "likely"  # the numbers suggest it
     UNKNOWN = "not stated"
 
 
 @dataclass(frozen=True)
 class ColumnGuess:
-    """A column of a table, and what it may be.
+    """A column of a table with its likely role and unit.
 
     Attributes:
         role: a channel of the vocabulary, or `time`, `index`, `unknown`.
-        why: what the role rests on; "" where the name says nothing.
-        unit: as `parse_unit` has it; "" where unknown.
-        doubts: what its reader should check, in sentences.
-        low, high: the range of what was looked at; NaN where it holds no numbers.
-        tag: words and numbers of its name that say no role; of several axes they are the name.
-        axis: which of several it is of; "" where it is of all of them.
-        sided: False where nothing says which side of the gear it is of.
+        why: evidence for the role; "" if the name gives none.
+        unit: in the spelling of `parse_unit`; "" if unknown.
+        doubts: what the user should check, in sentences.
+        low, high: range of the examined rows; NaN without numbers.
+        tag: words and numbers of the name that indicate no role; with several axes, their names.
+        axis: axis of the column; "" if common to all axes.
+        sided: False if the side of the gear is unknown.
     """
 
     name: str
@@ -51,11 +51,11 @@ class ColumnGuess:
 
     @property
     def is_channel(self) -> bool:
-        """Whether it was taken for one."""
+        """Whether the role is a channel."""
         return self.role not in (TIME, INDEX, UNKNOWN)
 
     def likely(self, unit: str, why: str) -> ColumnGuess:
-        """With a unit that numbers suggest, and why; as it was where they suggest none."""
+        """A copy with a likely unit and its evidence; unchanged if `unit` is empty."""
         return replace(self, unit=unit, basis=Basis.LIKELY, unit_why=why) if unit else self
 
 
@@ -64,11 +64,11 @@ class TableGuess:
     """A table of a file.
 
     Attributes:
-        rows: how many were looked at.
-        step: s between samples, as far as the unit of times is known; None where it is not.
+        rows: number of examined rows.
+        step: time between samples (s); None if the unit of the times is unknown.
         clock: whether the file states the clock, without a column of times.
-        restarts: how often its time begins anew.
-        doubts: what is wrong with it as a whole.
+        restarts: number of restarts of its time.
+        doubts: problems of the table as a whole.
     """
 
     file: Path

@@ -1,7 +1,7 @@
 """A draft as mapping text: known entries, and `# ?` for open ones.
 
-A unit is only written plainly where the file states it; any other is a comment that its reader
-turns into a line, or corrects.
+Only units that the file states are active lines; others are comments that the user activates or
+corrects.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ _LACKING = {
     TORQUES: "no column was taken for what drives it, which `motion` needs: drive_torque or "
     "joint_torque; of a current it is made with `times`:",
 }
-"""What an experiment needs, one of each."""
+"""Groups of roles: an experiment needs one of each group. Values: comment if it is missing."""
 
 
 def mapping_text(tables: Sequence[TableGuess], base: Path | None = None) -> str:
-    """A first MAPPING.toml for what was guessed; `base` is the folder of it and of the files."""
+    """A draft MAPPING.toml for guessed tables; `base` is the folder of it and of the files."""
     columns = [column for table in tables for column in table.columns]
     linear = any(_same(column.unit, each) for column in columns for each in _due(column)[1:])
     asked = "; some are in m: is the axis linear?" if linear else ""
     files = sorted({table.file.name for table in tables})
     title = _quoted(f"Recordings of {', '.join(files[:3])}" + " and others" * (len(files) > 3))
     lines = [_HEAD.format(kind="linear" if linear else "rotary", asked=asked, title=title)]
-    found = layouts(tables)
-    for axis in dict.fromkeys(layout.axis for layout in found):
+    drafts = layouts(tables)
+    for axis in dict.fromkeys(layout.axis for layout in drafts):
         lines += ["", "[[test]]", f"name = {_quoted(slug(f'axis {axis}') if axis else 'recorded')}"]
         lines += ['kind = "motion"', _doubt("the rig: see above"), 'bench = "rig.toml"']
-        for layout in (each for each in found if each.axis == axis):
+        for layout in (each for each in drafts if each.axis == axis):
             own = _recording(layout, base)
-            # What files are read as stands once for all that are alike.
+            # Files with the same format share one comment.
             lines += ["", *(x for x in own if x not in lines or not x.startswith("# read as"))]
-    alike = Counter(layout.name for layout in found)
-    for name, layout in {each.name: each for each in reversed(found)}.items():
+    alike = Counter(layout.name for layout in drafts)
+    for name, layout in {each.name: each for each in reversed(drafts)}.items():
         lines += ["", *_columns(layout, alike[name])]
     return "\n".join(lines) + "\n"
 
@@ -58,9 +58,9 @@ def _recording(layout: Layout, base: Path | None) -> Iterator[str]:
     if len(layout.tables) == 1 and layout.tables[0].name:
         yield f"table = {_quoted(layout.tables[0].name)}"
     yield f"columns = {_quoted(layout.name)}"
-    if anew := max(table.restarts for table in layout.tables):
-        told = f"time begins anew {counted(anew, 'time')}: a trial for each stretch"
-        yield _doubt(f"restarts = true  # {told}")
+    if starts := max(table.restarts for table in layout.tables):
+        note = f"time begins anew {counted(starts, 'time')}: a trial for each stretch"
+        yield _doubt(f"restarts = true  # {note}")
     for table in layout.tables:
         of = f"{table.file.name if layout.joins_files else table.name}: ".lstrip(": ")
         rate = "" if table.step is None else f", {1 / table.step:.6g} samples per second"
@@ -69,7 +69,7 @@ def _recording(layout: Layout, base: Path | None) -> Iterator[str]:
 
 
 def _columns(layout: Layout, alike: int) -> Iterator[str]:
-    """The `[columns.NAME]` of so many recordings; ranges are those of the first."""
+    """The `[columns.NAME]` of `alike` recordings; ranges are those of the first."""
     first = layout.tables[0]
     others = f" and of {alike - 1} more that are alike" if alike > 1 else ""
     yield _comment(f"Columns of {first.file.name} {first.name} {layout.axis}".rstrip() + others)
@@ -93,7 +93,7 @@ def _columns(layout: Layout, alike: int) -> Iterator[str]:
 
 
 def _block(layout: Layout, placed: PlacedColumn, again: bool) -> Iterator[str]:
-    """The lines of one column; in comments where it is none, or of a channel that another has."""
+    """The lines of one column; comments if it is no channel, or `again` the same channel."""
     column = placed.column
     numeric = column.low == column.low  # not NaN
     seen = f"from {column.low:.6g} to {column.high:.6g}" if numeric else "without numbers"
@@ -107,7 +107,7 @@ def _block(layout: Layout, placed: PlacedColumn, again: bool) -> Iterator[str]:
         return
     yield _comment(f"{column.place}, {seen}; taken for {column.role}: {column.why}")
     if again:
-        # Of two columns one role is left to the first.
+        # The first of two columns with the same role keeps it.
         yield _doubt(f"{column.role} as well: {column.name}; is it this one?")
     for line in (*_which(layout, placed, column.role), *_unit(column)):
         yield f"# {line}" if again and not line.startswith("#") else line
@@ -115,7 +115,7 @@ def _block(layout: Layout, placed: PlacedColumn, again: bool) -> Iterator[str]:
 
 
 def _which(layout: Layout, placed: PlacedColumn, role: str) -> Iterator[str]:
-    """What every block begins with; a name that two columns have is told by its place."""
+    """The first lines of a block; a column with an ambiguous name is given by its place."""
     name = placed.column.name
     twice = sum((p.table, p.column.name) == (placed.table, name) for p in layout.columns) > 1
     yield f"[columns.{layout.name}.{role}]"
@@ -126,7 +126,7 @@ def _which(layout: Layout, placed: PlacedColumn, role: str) -> Iterator[str]:
 
 
 def _unit(column: ColumnGuess) -> Iterator[str]:
-    """The line of the unit, and that which is missing where it measures something else."""
+    """The line of the unit, and a `times` to complete if the unit has another dimension."""
     unit, due = f"unit = {_quoted(column.unit or '...')}", _due(column)
     if column.basis is Basis.STATED:
         yield unit
@@ -139,7 +139,7 @@ def _unit(column: ColumnGuess) -> Iterator[str]:
 
 
 def _due(column: ColumnGuess) -> list[str]:
-    """What a channel is in, on a rotary and on a linear axis; nothing of what is no channel."""
+    """Units of a channel on a rotary and on a linear axis; none if it is no channel."""
     if column.role not in VOCABULARY:
         return []
     quantity = VOCABULARY[column.role].quantity
@@ -152,11 +152,11 @@ def _same(one: str, other: str) -> bool:
 
 
 def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
-    """What `motion` needs and no column was taken for; of a current it can be made."""
-    for roles, told in _LACKING.items():
+    """Lines for channels that `motion` needs and no column provides; torque from a current."""
+    for roles, note in _LACKING.items():
         if taken.isdisjoint(roles):
             yield ""
-            yield _doubt(told)
+            yield _doubt(note)
     current = next((p for p in layout.columns if p.column.role == channels.MOTOR_CURRENT), None)
     if current is not None and taken.isdisjoint(TORQUES):
         unit = current.column.unit
@@ -167,13 +167,13 @@ def _lacking(layout: Layout, taken: set[str]) -> Iterator[str]:
 
 
 def _quoted(text: str) -> str:
-    """As a string of TOML; JSON's is one, but for DEL and for halves of characters."""
+    """A TOML string: a JSON string, except for DEL and surrogates."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _comment(text: str) -> str:
-    """Without what may not stand in one."""
+    """A comment line without unprintable characters."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return "# " + "".join(c if c.isprintable() else "?" for c in whole)
 

@@ -291,17 +291,17 @@ def _compared(scoreboard: Scoreboard) -> str:
     others = [count for count in summary.counts if count.status not in NOBODY_FITTED]
     shares = [
         f"{sum(each.good for each in counts)} of {sum(each.compared for each in counts)} {which}"
-        for counts, which in ((free, "that were not fitted"), (others, "others" if free else ""))
+        for counts, which in ((free, "not fitted"), (others, "others" if free else ""))
         if counts
     ]
-    what = "published value was" if summary.compared == 1 else "published values were"
+    what = "published value" if summary.compared == 1 else "published values"
     fitted = "" if free else ", none of which is a prediction"
     near = [
         f"{sum(each.within[LIMITS.index(limit)] for each in summary.counts)} within {limit} %"
         for limit in CLOSE
     ]
     numbers = sum(each.numbers for each in summary.counts)
-    close = f" Of {numbers} numbers {' and '.join(near)}." if numbers else ""
-    return f"{summary.compared} {what} compared: reproduced are {' and '.join(shares)}".rstrip() + (
+    close = f" Of {numbers} numbers, {' and '.join(near)}." if numbers else ""
+    return f"{summary.compared} {what} compared. Reproduced: {' and '.join(shares)}".rstrip() + (
         f"{fitted}.{close}"
     )

@@ -69,7 +69,7 @@ def shown_key_numbers(
         )
         rest = {name: v for name, v in shared.items() if (name, v) not in plain}
         where = _where(rest, units)
-    drawn = f"median of {draws} draws, and where one more lies" if draws > 1 else ""
+    drawn = f"median of {draws} draws, interval of one further draw" if draws > 1 else ""
     return ", ".join(filter(None, (drawn, where))), numbers
 
 

@@ -82,7 +82,7 @@ def _not_in_the_interval(line: Line) -> str:
     if value is None or value.reason not in OF_ONE_TRIAL:
         return ""
     if value.has_interval:
-        return "one trial: the interval is of the calibration; how trials scatter is not in it"
+        return "one trial: the interval is of the calibration, without the scatter between trials"
     return "no interval: one trial, and no calibration of its bench"
 
 
@@ -227,7 +227,7 @@ def _cell_in_words(line: Line) -> str:
 def _sentences(found: Headline) -> Iterator[str]:
     shares = ", ".join(f"{c.status} {c.good} of {c.compared}" for c in found.counts)
     values = "published value" if found.compared == 1 else "published values"
-    yield f"{found.compared} {values} compared, each counted once, however often it is printed."
+    yield f"{found.compared} {values} compared, each counted once, also if printed several times."
     yield _bridge(found)
     yield f"Reproduced (they agree, are compatible or meet their claim): {shares}."
     missed = ", ".join(dict.fromkeys(map(_cell_in_words, found.missed)))
@@ -253,6 +253,6 @@ def _bridge(found: Headline) -> str:
         *([f"{without} without a number to compare"] if without else []),
     )
     if not less:
-        return f"That is every one of the {found.printed} printed numbers."
+        return f"Printed: {found.printed}, all compared."
     listed = " and ".join(filter(None, (", ".join(less[:-1]), less[-1])))
-    return f"Of {found.printed} printed numbers {listed} are left out: {found.compared} are left."
+    return f"Printed: {found.printed}. Excluded: {listed}. Compared: {found.compared}."

@@ -191,14 +191,14 @@ def remarks(table: Table) -> Iterator[str]:
             yield f"{head}: {'; '.join(pieces)}."
     if any(_is_narrow(row.get(c.name)) for c in table.columns for row in table.rows[:ROWS]):
         yield (
-            "Where a number with five digits stands without an interval, that is narrower than its "
-            "digits; the CSV file has it."
+            "Numbers with five digits and no interval: it is narrower than the last digit; the CSV "
+            "file has it."
         )
     sources = dict.fromkeys(
         source for column in table.columns for source in _of_unknown_size(table, column)
     )
     if sources:
-        yield f"Of unknown size, and in no interval: {', '.join(sources)}."
+        yield f"Not included in the intervals (size unknown): {', '.join(sources)}."
 
 
 def _by_reason(

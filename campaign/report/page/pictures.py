@@ -59,7 +59,7 @@ def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
         "Published values among the draws of a random bench",
         "Tick: the bench with another seed of its scatter. Dot: their median. Band: where 95 % of"
         " further draws lie, systematic parts included. The line at 0 is the"
-        " published value, one draw itself; the share of draws below it stands on the right.",
+        " published value, itself one draw. Right: share of draws below it.",
         "One strip of ticks per published number, around a line at the published value.",
         "draws",
     )

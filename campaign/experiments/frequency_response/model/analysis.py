@@ -58,8 +58,8 @@ from campaign.units import Frequency, Time
 LOUDER = "excite with more torque, or record longer, around the antiresonance and the resonance"
 AMPLITUDES = "measure at a second amplitude, half of this or twice as much"
 MORE_PHASES = (
-    f"record {FEWEST_REALISATIONS} realisations with other phases, which tell inertias and "
-    "stiffness as well"
+    f"record {FEWEST_REALISATIONS} realisations with other phases, which also determine "
+    "inertias and stiffness"
 )
 LOWER = "excite further below the antiresonance, above what friction holds"
 SURELY = 3.0

@@ -37,7 +37,7 @@ AMBIGUOUS = Cause(
 )
 TOO_FEW = Cause(
     "too few realisations",
-    "{realisations} realisations tell no variance to weigh a fit with; {fewest} are the fewest",
+    "{realisations} realisations give no variance for the weights of a fit; it needs {fewest}",
 )
 NOTHING_FITTED = Cause("no response fitted", "no response could be fitted")
 NO_FIT = Cause("fit failed", "{error}")
@@ -266,10 +266,10 @@ def _with_axis(told: Masses, source: Source, others: Sequence[Source], band: Ban
     bent = ""
     if axis.total_inertia.reason in UNKNOWN or axis.resonance.reason in UNKNOWN:
         bent = (
-            f"Odd distortion is {100 * odd:.0f} % of the output: friction bends the response, by "
-            "how much one amplitude does not tell. Repeat it at half the amplitude or at twice of "
-            "it; until then its numbers are those of this response, not of the axis, and none of "
-            "them goes to the bench."
+            f"Odd distortion is {100 * odd:.0f} % of the output: friction distorts the response, "
+            "and one amplitude does not determine how much. Repeat it at half or twice the "
+            "amplitude. Until then its numbers describe this response, not the axis, and the "
+            "bench file gets none of them."
         )
     return replace(told, axis=axis, bent=bent)
 

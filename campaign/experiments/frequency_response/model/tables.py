@@ -76,7 +76,7 @@ def fits_table(found: Sequence[FrequencyFit], masses: Masses) -> Table:
         ),
         tuple(rows),
         note="Condition number of the weighted Jacobian with columns of one length: large where "
-        "parameters are hardly told apart. Order of numerator and denominator by Schwarz' "
+        "parameters are hardly separated. Order of numerator and denominator by Schwarz' "
         "criterion. A function that leaves more than scatter is a misfit: what follows from it "
         "has no interval.",
     )
@@ -154,8 +154,8 @@ def masses_table(masses: Masses) -> Table | None:
     if masses.is_bent:
         rows = {"the response": drive, **rows}
         spring += (
-            " Of the response: at this excitation, by scatter alone. Of the axis: with what "
-            "friction may have in it, as other excitations or the odd distortion tell."
+            " Of the response: at this excitation, by scatter alone. Of the axis: with the "
+            "effect of friction, by other excitations or the odd distortion."
         )
     return Table(
         "one-inertia" if drive.rigid else "two-masses",
@@ -188,7 +188,7 @@ def correlations_table(masses: Masses, names: Collection[str]) -> Table | None:
         return None
     return Table(
         "correlations",
-        "How numbers of the two inertias go together",
+        "Correlation of the numbers of the two inertias",
         (
             Column("one", "Number"),
             Column("other", "and"),
