@@ -1,4 +1,4 @@
-"""Recordings in the formats of other programs: one file per format, or an installed plug-in."""
+"""Export of recordings for other programs: one file per format, or an installed plug-in."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from campaign.plugins import Kinds
 
 @cache
 def exports() -> Kinds[ExportKind]:
-    """Every format, by name."""
+    """All formats, by name."""
     return Kinds("export format", __name__, "EXPORT", ExportKind)

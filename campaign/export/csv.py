@@ -16,7 +16,7 @@ def _write(trial: TrialView, recording: Recording, path: Path) -> None:
     columns = {"time (s)": recording.time}
     for channel in recording.channels.values():
         columns[_heading(channel.name, channel.unit)] = channel.samples
-    # Without a format, floats are written with as many digits as reading them back takes.
+    # Without a format, floats are written with all digits that a lossless read needs.
     pd.DataFrame(columns).to_csv(
         path, index=False, na_rep="nan", lineterminator="\n", encoding="utf-8"
     )

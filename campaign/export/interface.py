@@ -12,13 +12,13 @@ from campaign.recording import Recording
 
 @dataclass(frozen=True)
 class ExportKind:
-    """A format as `campaign export --to NAME` finds it.
+    """An export format, selected by `campaign export --to NAME`.
 
     Attributes:
-        suffix: of its files, e.g. `.csv`.
-        write: writes a recording, all of it in SI and at full precision, into a new file. Raises
+        suffix: suffix of its files, e.g. `.csv`.
+        write: writes a complete recording in SI and at full precision into a new file. Raises
             UsageError when the format cannot hold it, or when a library is missing. A format with
-            metadata says there what is `damaged` of the trial's run.
+            metadata states there which parts of the trial's run are `damaged`.
     """
 
     name: str

@@ -1,8 +1,7 @@
 """MAT version 5, which MATLAB, Octave and SciPy read.
 
-Each channel is a variable, a column; beside them stand the structs `units` and `labels` with a
-field per variable, and `trial` with what was executed, how it ended, and what of its run is
-damaged.
+Each channel is a column variable. The structs `units` and `labels` have a field per variable. The
+struct `trial` contains the executed trial, its ending, and the damage of its run.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from campaign.recording import Recording
 from campaign.trial import canonical_json
 
 LARGEST = 2**31 - 1
-"""Bytes of a variable in version 5; version 7.3 would be HDF5, as the archive is."""
+"""Most bytes of a variable in version 5; version 7.3 would be HDF5, as the archive is."""
 
 _LONGEST = 63  # characters of a name
 _STRUCTS = ("units", "labels", "trial")
@@ -49,7 +48,7 @@ def _write(trial: TrialView, recording: Recording, path: Path) -> None:
 
 
 def check_size(name: str, samples: int) -> None:
-    """Raises UsageError when a series of so many samples does not fit."""
+    """Check that a series of this many samples fits. Raises UsageError."""
     if samples * 8 > LARGEST:
         raise UsageError(
             f"{name}: {samples} samples are more than a variable of a MAT file of version 5 holds "
@@ -58,7 +57,7 @@ def check_size(name: str, samples: int) -> None:
 
 
 def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """Each name as MATLAB accepts it: at most 63 letters, digits and `_`, and each once."""
+    """Convert names to valid, unique MATLAB names: at most 63 letters, digits and `_`."""
     used = {*taken, *_KEYWORDS.split()}
     valid = []
     for name in names:
@@ -82,7 +81,7 @@ def _about(trial: TrialView) -> dict[str, Any]:
         "role": executed.role.value,
         "repeat": float(executed.repeat),
         "point": _struct(executed.point),
-        "seed": np.uint64(executed.seed),  # a double has no room for its 63 bits
+        "seed": np.uint64(executed.seed),  # a double cannot hold its 63 bits
         "outcome": ending.outcome.value,
         "reason": _ascii(ending.reason),
         "damaged": _ascii("\n".join(map(in_words, trial.damaged))),
@@ -91,7 +90,7 @@ def _about(trial: TrialView) -> dict[str, Any]:
 
 
 def _struct(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """Swept values: numbers and text as they are, anything else as JSON."""
+    """Struct of swept values: numbers, booleans and text unchanged, anything else as JSON."""
     plain = [
         float(value)
         if isinstance(value, int | float) and not isinstance(value, bool)
@@ -104,7 +103,7 @@ def _struct(tree: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _ascii(text: str) -> str:
-    r"""Other letters as escapes such as `\xb0`: Octave cuts a text that has them."""
+    r"""Replace other letters by escapes such as `\xb0`, because Octave cuts a text at them."""
     return text.encode("ascii", "backslashreplace").decode("ascii")
 
 

@@ -19,17 +19,17 @@ from campaign.export.interface import ExportKind
 from campaign.plain_text import on_a_page
 
 TABLE = "trials.csv"
-"""The table of what was exported; its column `file` says which file a trial's recording is in."""
+"""Table of the exported trials; its column `file` is the name of the recording's file."""
 
 
 @dataclass(frozen=True)
 class ExportResult:
-    """What came of an export.
+    """Result of an export.
 
     Attributes:
-        files: how many recordings were written.
-        damaged: what of the run is damaged, as far as this export looked at it; `damaged.csv` has
-            it, and everything else is there.
+        files: number of exported recordings.
+        damaged: damage of the run that this export detected; `damaged.csv` lists it, and all other
+            data is exported.
     """
 
     folder: Path
@@ -44,20 +44,20 @@ def export_run(
     tests: Sequence[str] = (),
     numbers: Sequence[int] = (),
 ) -> ExportResult:
-    """Write the trials of a run into a new folder; all of them when none are chosen.
+    """Write the selected trials of a run, or all of them, into a new folder.
 
-    The folder appears when everything is in it; after an error there is none.
+    The folder appears when it is complete; after an error it does not exist.
 
     Args:
         run: an open archive.
         kind: the format.
-        folder: where to write; it must not be there yet, or be empty.
-        tests, numbers: what to choose; a trial needs to be among one of them.
+        folder: output folder; it must be new or empty.
+        tests, numbers: selected tests and trial numbers; a trial in either is exported.
 
-    A channel or a trial that is damaged is left out; `damaged.csv` lists it, and so does each file
-    of a format that has a place for it.
+    Damaged channels and trials are omitted; `damaged.csv` lists them, and so does each file of a
+    format with metadata.
 
-    Raises UsageError when there is something in the folder, or a test or trial is not in the run.
+    Raises UsageError when the folder is not empty, or a test or trial is not in the run.
     """
     trials = _chosen(run, tests, numbers)
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
@@ -89,10 +89,9 @@ def _chosen(run: RunView, tests: Sequence[str], numbers: Sequence[int]) -> list[
 def _write(
     run: RunView, trials: Sequence[TrialView], kind: ExportKind, part: Path
 ) -> tuple[int, tuple[Damage, ...]]:
-    """Write recordings and tables; how many recordings, and what is damaged.
+    """Write recordings and tables; return the number of recordings and the damage.
 
-    Each file names all damage. What is only found in reading samples is known after the last of
-    them: then they are written once more.
+    Each file names all damage. If the samples show further damage, all files are written again.
     """
     files, damaged = _write_recordings(run, trials, kind, part, run.damaged)
     if damaged != run.damaged:
@@ -113,28 +112,28 @@ def _write_recordings(
     part: Path,
     known: tuple[Damage, ...],
 ) -> tuple[dict[int, str], tuple[Damage, ...]]:
-    """The file of each trial that has one, and what is damaged of the run and of their samples."""
+    """Write recordings; return file names by trial number, and the damage of run and samples."""
     files: dict[int, str] = {}
     damaged = list(run.damaged)
     for view in trials:
-        recording, found = sound_part(run.path, view.archived)
-        damaged += found
+        recording, damage = sound_part(run.path, view.archived)
+        damaged += damage
         if recording is None or not recording.channels:
-            continue  # damaged, or it failed before its first sample
+            continue  # damaged, or failed before its first sample
         files[view.number] = f"{view.name}{kind.suffix}"
         kind.write(replace(view, damaged=known), recording, part / files[view.number])
     return files, tuple(dict.fromkeys(damaged))
 
 
 def _publish(part: Path, folder: Path) -> None:
-    part.chmod(0o777 & ~_umask())  # a temporary folder is its owner's alone
+    part.chmod(0o777 & ~_umask())  # only its owner can access a temporary folder
     if folder.is_dir():
         folder.rmdir()  # empty; Windows does not rename over it
     part.rename(folder)
 
 
 def _umask() -> int:
-    """The process' file mode mask, which can only be read by setting it."""
+    """File mode mask of the process; reading it requires setting it."""
     mask = os.umask(0o077)
     os.umask(mask)
     return mask

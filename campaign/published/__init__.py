@@ -1,5 +1,5 @@
-"""Published values, and which findings speak to which of them.
+"""Published values and their comparison with findings.
 
-`thesis.toml` holds the thesis' tables; `values` reads it, or a laboratory's own file of the same
-form; `scoreboard` holds findings against cells.
+`thesis.toml` contains the tables of the thesis; `values` reads it, or a laboratory's own file of
+the same form; `scoreboard` compares findings with cells.
 """

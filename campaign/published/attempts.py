@@ -1,7 +1,7 @@
-"""Published cells without a value: tried in vain, or not tried.
+"""Published cells without a value: trials failed, or were not executed.
 
-A trial that failed must not let its cells leave the board, or a method that diverges would make it
-look better. Nor does it cost the cells of other places in the sweep.
+The cells of a failed trial must stay on the board, or a method that diverges would improve it. A
+failed trial does not affect the cells of other sweep points.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ COMPENSATION = "compensation"
 def in_vain(places: Sequence[SweepPoint], conditions: Mapping[str, Value]) -> bool:
     """Whether trials were executed for a cell with these conditions, and some that it needs failed.
 
-    What the plan tells: a number of the sweep or of the options that is not the cell's excludes a
-    trial. A word does where the test has trials of the cell's own word; else it may stand for what
-    several trials say together, as *nominal* or *sum* do. A failed trial of another word counts:
-    what is compared with *no compensation* needs that, too.
+    A number of the sweep or of the options that differs from the cell's excludes a trial. A word
+    excludes a trial only if the test has trials with the cell's own word; otherwise the cell may
+    combine several trials, as *nominal* or *sum* do. A failed trial with another word counts: a
+    comparison with *no compensation* needs that trial, too.
     """
     near = [place for place in places if not _other_number(place, conditions)]
-    told = _words(near)
+    tested_words = _words(near)
     tried = any(
         all(
             words[name] == conditions[name]
             for name in words.keys() & conditions.keys()
-            if conditions[name] in told[name] or name == COMPENSATION
+            if conditions[name] in tested_words[name] or name == COMPENSATION
         )
         for words in (_words_of(place) for place in near)
     )
@@ -50,11 +50,11 @@ def _words_of(place: SweepPoint) -> dict[str, str]:
 
 
 def _words(places: Sequence[SweepPoint]) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
+    words: dict[str, set[str]] = {}
     for place in places:
         for name, word in _words_of(place).items():
-            found.setdefault(name, set()).add(word)
-    return found
+            words.setdefault(name, set()).add(word)
+    return words
 
 
 def _is_number(value: Any) -> bool:

@@ -1,7 +1,7 @@
 """Covariance of a calibration, for each reproduced number.
 
-`campaign calibrate` writes it (`[propagation]` of its result), a folder `calibration/` beside a
-bench keeps it, a run archives it, and the scoreboard adds it to what trials scatter.
+`campaign calibrate` writes it (`[propagation]` of its result) into a folder `calibration/` beside a
+bench. A run archives it, and the scoreboard adds it to the scatter of trials.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 from campaign.options import Options
 
 FOLDER = "calibration"
-"""Beside a bench file: holds a file of the same name, which is the result of its calibration."""
+"""Folder beside a bench file; its file of the same name is the result of the calibration."""
 LEVEL = 0.95
 
 
@@ -38,11 +38,11 @@ class PropagationTable(Options):
 
 @dataclass(frozen=True)
 class CalibrationPart:
-    """Uncertainty of reproduced numbers by a calibration; without cells it says nothing.
+    """Uncertainty of reproduced numbers by a calibration; empty if unknown.
 
     Attributes:
-        standard_uncertainty: cell path to 1 sigma, in the printed unit.
-        lost: cells of which the calibration does not even say that they can be found.
+        standard_uncertainty: 1 sigma by cell path, in the printed unit.
+        lost: paths of cells without a number somewhere within the calibration uncertainty.
     """
 
     standard_uncertainty: Mapping[str, float] = field(default_factory=dict)
@@ -56,7 +56,7 @@ class CalibrationPart:
         return float(stdtrit(self.freedom, 0.5 + 0.5 * LEVEL))
 
     def half_width(self, path: str) -> float | None:
-        """Of the cell's 95 % interval (Student's t), printed unit; None where nothing is known."""
+        """Half-width of the cell's 95 % interval (Student's t), printed unit; None if unknown."""
         sigma = self.standard_uncertainty.get(path)
         return None if sigma is None else self._student * sigma
 
@@ -65,25 +65,24 @@ NOTHING = CalibrationPart()
 
 
 def file_name(bench: str) -> str:
-    """Name of the calibration of a bench file: `benches/calibration/platform.toml`."""
+    """File name of a bench's calibration, e.g. `benches/calibration/platform.toml`."""
     path = PurePosixPath(bench)
     return str(path.parent / FOLDER / path.name)
 
 
 def calibration_part(sources: Mapping[str, str], fingerprint: str) -> CalibrationPart:
-    """What the archived files say of the bench with this fingerprint.
+    """Calibration of the bench with this fingerprint, from the archived files.
 
     Args:
-        sources: texts by name; those that are no calibration, or one without `[propagation]`, are
-            passed over.
+        sources: texts by file name; texts without a valid `[propagation]` are ignored.
     """
     for name, text in sources.items():
         if PurePosixPath(name).parent.name != FOLDER:
             continue
         try:
-            found = PropagationTable.model_validate(tomllib.loads(text).get("propagation"))
+            table = PropagationTable.model_validate(tomllib.loads(text).get("propagation"))
         except (tomllib.TOMLDecodeError, ValidationError):
             continue
-        if fingerprint and found.fingerprint == fingerprint:
-            return CalibrationPart(found.standard_uncertainty, found.freedom, frozenset(found.lost))
+        if fingerprint and table.fingerprint == fingerprint:
+            return CalibrationPart(table.standard_uncertainty, table.freedom, frozenset(table.lost))
     return NOTHING

@@ -15,21 +15,20 @@ from campaign.result import Finding, Value, same_value
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one test brings to the scoreboard.
+    """Findings and bench origin of one test, for the scoreboard.
 
     Attributes:
-        reproduces: the published tables the test stands for, by name.
-        given, fitted, seen: of its bench: cells (or rows, or tables) it was given, was fitted to,
-            and that were looked at while it was made.
-        known: conditions that hold for every finding which does not state them itself, such as
-            the `domain`.
-        cells: that these name, of the bench's own document, which need not be the one that the
-            run is compared with.
-        failed: whether something of the test was lost of which nobody can tell which cells it
-            costs: its analysis failed, or trials are damaged.
-        source: where its samples come from: `simulation`, `hardware`, `recording`; "" unknown.
-        provenance: whether its trials ran on the bench that was described, and which failed.
-        calibration: what that of the bench leaves open of its numbers.
+        reproduces: names of the published tables that the test reproduces.
+        given, fitted, seen: patterns of cells (or rows, or tables) that its bench was given, was
+            fitted to, and that were looked at during its design.
+        known: default conditions of every finding that does not state them, e.g. the `domain`.
+        cells: cells that these patterns cover, of the bench's own document, which may differ from
+            the document of the comparison.
+        failed: whether a loss affects cells that cannot be identified: the analysis failed, or
+            trials are damaged.
+        source: origin of its samples: `simulation`, `hardware`, `recording`; "" unknown.
+        provenance: whether its trials ran on the described bench, and which failed.
+        calibration: calibration uncertainty of its numbers.
     """
 
     test: str
@@ -46,7 +45,7 @@ class Evidence:
     calibration: CalibrationPart = NOTHING
 
     def is_described(self, finding: Finding) -> bool:
-        """Whether a finding is of the bench that was described, so that its calibration counts."""
+        """Whether a finding is of the described bench; only then its calibration applies."""
         conditions = {**self.known, **finding.conditions}
         altered = self.provenance.why_altered(conditions)
         return not altered and self.provenance.is_described(conditions)
@@ -61,11 +60,11 @@ def evidence_of(
     source: str = "",
     provenance: Provenance = NOTHING_ALTERED,
 ) -> Evidence:
-    """What a test on `bench` brings; None when nobody knows the bench.
+    """Evidence of a test on `bench`; None for an unknown bench.
 
-    A table may ask whether a number is from a simulation or from hardware: here that is whether
-    the bench's controller is continuous, or sampled as a real one is; of a bench that says nothing
-    of its controller nobody knows. Where the samples themselves come from is the `source`.
+    A table may require the `domain` simulation or hardware. It follows from the bench's controller:
+    continuous is simulation, sampled is hardware; without a controller the domain is unknown. The
+    origin of the samples is `source`.
     """
     if bench is None:
         return Evidence(test, reproduces, findings, source=source, provenance=provenance)
@@ -89,7 +88,7 @@ def evidence_of(
 
 
 def _named(document: str, patterns: Sequence[str]) -> tuple[Cell, ...]:
-    """The cells that a bench names, of a document that is at hand here."""
+    """Cells that a bench names, if its document is the packaged one."""
     return tuple(_covered(thesis(), patterns)) if document == THESIS else ()
 
 
@@ -101,13 +100,13 @@ def _covered(published: Published, patterns: Sequence[str]) -> Iterator[Cell]:
 
 
 def with_cells(test: Evidence, published: Published) -> Evidence:
-    """With the cells that its bench names in the document of this comparison."""
+    """Add the cells that its bench names in the document of this comparison."""
     patterns = (*test.given, *test.fitted, *test.seen)
     return replace(test, cells=(*test.cells, *_covered(published, patterns)))
 
 
 def concerns(finding: Finding, cell: Cell, known: Mapping[str, Value]) -> bool:
-    """Whether a finding is of the cell's quantity and states each of the cell's conditions."""
+    """Whether a finding has the cell's quantity and each of its conditions."""
     stated = {**known, **finding.conditions}
     return finding.quantity == cell.quantity and all(
         name in stated and same_value(stated[name], value)

@@ -12,8 +12,8 @@ from campaign.published.verdicts import GOOD, Verdict
 
 MOST_FITTED_FIRST = (
     Status.CALIBRATED,
-    Status.ALTERED,  # nobody knows what was done to that bench
-    Status.UNDESCRIBED,  # nor what was done to make that one
+    Status.ALTERED,  # the changes to that bench are unknown
+    Status.UNDESCRIBED,  # the origin of that bench is unknown
     Status.SELECTED,
     Status.RECOVERED,
     Status.RECOMPUTED,
@@ -23,22 +23,22 @@ MOST_FITTED_FIRST = (
     Status.NOT_REPRODUCIBLE,
 )
 NOBODY_FITTED = (Status.PREDICTED, Status.SIMULATED)
-"""What a bench says of itself, whatever the document says."""
+"""Statuses of values that the bench was not fitted to."""
 LIMITS = (2, 5, 10, 20)
-"""Percent of the published value."""
+"""Limits of a deviation, in percent of the published value."""
 ROUNDING = 1e-9
-"""Share by which a deviation of just a limit may exceed it."""
+"""Relative tolerance of a deviation at a limit, for rounding."""
 OF_THE_DOCUMENT = (Status.INCONSISTENT, Status.NOT_REPRODUCIBLE)
-"""What the document itself lets nobody reproduce: shown, and not counted."""
+"""Statuses of values that the document makes impossible to reproduce: shown, not counted."""
 
 
 @dataclass(frozen=True)
 class Count:
-    """How many published values of one status were compared, and how many of them hold.
+    """Number of published values of one status that were compared, and that were reproduced (good).
 
     Attributes:
-        numbers: those of which a deviation in percent means something.
-        within: how many of these deviate by no more than each of `LIMITS`.
+        numbers: count of values with a deviation in percent.
+        within: count of these with a deviation within each of `LIMITS`.
     """
 
     status: Status
@@ -50,15 +50,15 @@ class Count:
 
 @dataclass(frozen=True)
 class Headline:
-    """Each published value once.
+    """Counts of a scoreboard, each published value once.
 
     Attributes:
-        printed: how often a number is printed, and `repeats` how many of these repeat another.
-        excluded: how many values, by status, the document itself lets nobody reproduce.
-        counts: by status, the most fitted first; those that occur.
+        counts: by status, the most fitted first; only those that occur.
         missed: claims that were missed.
-        not_reached: values of which only a bound was found.
-        not_found: values that were tried in vain, and `not_run` those that were not tried.
+        not_reached: values with a bound only.
+        not_found, not_run: values without a number, with trials and without.
+        printed: count of printed numbers; `repeats` of these repeat another.
+        excluded: count, by status, of values that the document makes impossible to reproduce.
     """
 
     counts: tuple[Count, ...]
@@ -76,7 +76,7 @@ class Headline:
 
 
 def headline(scoreboard: Scoreboard) -> Headline:
-    """Count every published value once, with the line that counts for it."""
+    """Count every published value once, by its representative line (`once`)."""
     values = once(scoreboard.lines)
     lines = [line for line in values if line.status not in OF_THE_DOCUMENT]
     compared = [line for line in lines if is_compared(line)]
@@ -109,16 +109,16 @@ def _count(status: Status, lines: Sequence[Line]) -> Count:
 
 
 def is_compared(line: Line) -> bool:
-    """Whether a number was found for a value that the document lets somebody reproduce."""
+    """Whether a value has a reproduced number, and the document allows its reproduction."""
     return line.reproduced is not None and line.status not in OF_THE_DOCUMENT
 
 
 def once(lines: Iterable[Line]) -> tuple[Line, ...]:
     """One line per published value: the same quantity, conditions, domain and printed number.
 
-    A document that prints a number in three tables has measured it once. Of its lines the most
-    fitted one counts: a value that was fitted in one table is not predicted in another. One for
-    which nothing was found counts only when all are so.
+    A number that a document prints in three tables was measured once. The most fitted of its lines
+    counts: a value that was fitted in one table is not predicted in another. A line without a
+    result counts only if all are without one.
     """
     chosen: dict[Hashable, Line] = {}
     for line in lines:
@@ -136,8 +136,8 @@ def _value(cell: Cell) -> Hashable:
 
 def _rank(line: Line) -> tuple[int, int]:
     without = (Verdict.NOT_REACHED, Verdict.NOT_FOUND, Verdict.NOT_RUN)
-    found = without.index(line.verdict) + 1 if line.verdict in without else 0
+    lack = without.index(line.verdict) + 1 if line.verdict in without else 0
     place = len(MOST_FITTED_FIRST)
     if line.status is not None:
         place = MOST_FITTED_FIRST.index(line.status)
-    return found, place
+    return lack, place

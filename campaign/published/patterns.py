@@ -6,9 +6,9 @@ ANY = "*"
 
 
 def covers(pattern: str, path: str) -> bool:
-    """Whether `pattern` means the cell at `path`: the same names in order, or a beginning of them.
+    """Whether `pattern` matches the cell at `path`: the same names in order, or the first of them.
 
-    `*` stands for any one name. A pattern that says more than the path covers nothing.
+    `*` stands for any one name. A pattern that is longer than the path covers nothing.
     """
     wanted, names = pattern.split("/"), path.split("/")
     return len(wanted) <= len(names) and all(
@@ -17,6 +17,6 @@ def covers(pattern: str, path: str) -> bool:
 
 
 def overlap(one: str, other: str) -> bool:
-    """Whether there can be a cell that both patterns cover."""
+    """Whether both patterns can cover the same cell."""
     pairs = zip(one.split("/"), other.split("/"), strict=False)
     return all(ANY in pair or pair[0] == pair[1] for pair in pairs)

@@ -1,8 +1,8 @@
 """Whether trials ran on the described or calibrated bench.
 
-A status is what a bench says of itself, and that holds for one bench only. So the bench of every
-executed trial, as the archive keeps it, is held against the fingerprint that it states: whatever a
-hand edit, `--set` or a matrix changed on the way there shows, and only there.
+A bench states its own origin, and this statement applies to one bench only. Therefore the archived
+bench of every executed trial is compared with the fingerprint that it states. The comparison shows
+every change by a hand edit, `--set` or a matrix.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from campaign.result import Value
 from campaign.trial import Role, Tree, Trial, canonical_json
 
 BENCH = "bench."
-"""How a swept path of the bench begins, in the point of a trial."""
+"""Prefix of a swept path of the bench, in the point of a trial."""
 OF_A_TRUTH = (
     "the samples are of a truth, which was simulated in place of the bench that is stated; what the"
     " stated one was made from and fitted to says nothing of them"
 )
-"""Why a trial that simulated a truth is of no described bench, whatever its stated bench is."""
+"""Reason why a trial that simulates a truth is altered, for any stated bench."""
 DESCRIBED_TWICE = "its trials state different descriptions of their bench"
-"""Why a test has no one bench, whatever each of them is."""
+"""Reason why a test does not have one bench."""
 TOLERANCE = 1e-9
-"""Relative; between a point of the sweep and the same number in a finding's conditions."""
+"""Relative tolerance between a sweep point and the same number in a finding's conditions."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class SweepPoint:
     """The trials at one point of a test's sweep with one compensation.
 
     Attributes:
-        altered: why their bench is not the one described; "" when it is.
-        described: whether their bench says at all what it was made from.
-        numbers: those among their options (SI).
-        failed: whether one of them did not complete.
+        altered: reason why their bench is not the described one; "" when it is.
+        described: whether their bench states its origin.
+        numbers: numeric options of the trials (SI).
+        failed: whether they did not complete.
     """
 
     point: Mapping[str, Any]
@@ -51,19 +51,19 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What a test's trials ran on, place by place; where there is none, nothing is altered."""
+    """Benches of a test's trials by sweep point; without points nothing is altered."""
 
     places: tuple[SweepPoint, ...] = ()
 
     def why_altered(self, conditions: Mapping[str, Value]) -> str:
-        """Why a finding with these conditions is of no described bench; "" when it is.
+        """Reason why a finding with these conditions is of an altered bench; "" if it is not.
 
-        All trials count that the conditions do not exclude.
+        All trials that the conditions do not exclude count.
         """
         return next((place.altered for place in self._behind(conditions) if place.altered), "")
 
     def is_described(self, conditions: Mapping[str, Value]) -> bool:
-        """Whether every bench behind such a finding says what it was made from."""
+        """Whether every bench behind a finding with these conditions states its origin."""
         return all(place.described for place in self._behind(conditions))
 
     def _behind(self, conditions: Mapping[str, Value]) -> Sequence[SweepPoint]:
@@ -72,7 +72,7 @@ class Provenance:
 
     @property
     def seeds(self) -> frozenset[Value]:
-        """Draws of a random bench that were executed, where the test sweeps them."""
+        """Executed seeds of a random bench, if the test sweeps them."""
         return frozenset(place.point[SEED] for place in self.places if SEED in place.point)
 
 
@@ -87,19 +87,18 @@ def provenance_of(
     changed: str = "",
     failed: Collection[int] = (),
 ) -> Provenance:
-    """Hold the benches of a test's executed trials against the fingerprint that they state.
+    """Compare the benches of a test's executed trials with the fingerprints that they state.
 
     Args:
-        trials: those that were executed; only measurements count.
-        perturbs_bench: the experiment changes the bench by itself, on purpose. Then what counts is
-            the bench it began with: `described` with what the matrix put into it.
-        described: the test's bench before any sweep (SI); None when nobody kept it.
-        changed: why the test had more than one bench, whatever each of them is; "" when it had one.
+        trials: executed trials; only measurements count.
+        perturbs_bench: whether the experiment changes the bench on purpose. Then the initial bench
+            counts: `described` with the swept values of the matrix.
+        described: the test's bench before any sweep (SI); None if it is not archived.
+        changed: reason why the test had more than one bench; "" when it had one.
         failed: numbers of the trials that did not complete.
 
-    A sweep of the seed of the bench's scatter alters nothing where the bench's own is among the
-    draws: they say how draws lie apart. Any other seed in its place may have been chosen by what
-    it gives.
+    A sweep of the seed of the bench's scatter alters nothing if the bench's own seed is among the
+    draws. Any other seed instead may have been selected by its result.
     """
     measured = [trial for trial in trials if trial.role is Role.MEASUREMENT]
     if len({canonical_json(_description(trial.bench)) for trial in measured}) > 1:
@@ -114,7 +113,7 @@ def provenance_of(
         if described is not None and perturbs_bench:
             tree = _at_point(described, trial.point)
         if described is not None and len(drawn) > 1 and own in drawn:
-            tree = _with_seed(tree, own)  # several draws of its scatter are that bench
+            tree = _with_seed(tree, own)  # several draws of its scatter are the same bench
         key = canonical_json([tree, compensation, trial.truth])
         if key not in known:
             why, described_at_all = _why(tree, compensation)
@@ -123,19 +122,19 @@ def provenance_of(
         lost = trial.number in failed
         place = SweepPoint(dict(trial.point), compensation, *known[key], numbers, lost)
         places.setdefault(canonical_json([place.point, compensation, *known[key], lost]), place)
-    found = tuple(places.values())
-    if perturbs_bench and described is None and any(not place.altered for place in found):
-        # One of its trials is the unperturbed reference, and that is the bench described.
-        found = tuple(
-            place if place.altered == OF_A_TRUTH else replace(place, altered="") for place in found
+    points = tuple(places.values())
+    if perturbs_bench and described is None and any(not place.altered for place in points):
+        # One of its trials is the unperturbed reference: the described bench.
+        points = tuple(
+            place if place.altered == OF_A_TRUTH else replace(place, altered="") for place in points
         )
     if changed:
-        found = tuple(replace(place, altered=place.altered or changed) for place in found)
-    return Provenance(found)
+        points = tuple(replace(place, altered=place.altered or changed) for place in points)
+    return Provenance(points)
 
 
 def _why(tree: Mapping[str, Any], compensation: str) -> tuple[str, bool]:
-    """Why a bench is not the one described, and whether it says what it was made from."""
+    """Reason why a bench is not the described one ("" if it is); whether it states its origin."""
     try:
         bench = Bench.model_validate(tree, context={"si": True})
     except ValueError:
@@ -144,7 +143,7 @@ def _why(tree: Mapping[str, Any], compensation: str) -> tuple[str, bool]:
 
 
 def _at_point(tree: Mapping[str, Any], point: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A bench with the swept values of the bench put in."""
+    """The bench with the swept values of `point`."""
     for path, value in point.items():
         if path.startswith(BENCH):
             tree = _replaced(tree, path.removeprefix(BENCH).split("."), value)
@@ -152,7 +151,7 @@ def _at_point(tree: Mapping[str, Any], point: Mapping[str, Any]) -> Mapping[str,
 
 
 def _description(bench: Mapping[str, Any]) -> Any:
-    """What a bench says it was made from, and of which bench that is said."""
+    """Stated origin of a bench, and the fingerprint of the bench that it applies to."""
     known = bench.get("known")
     if not isinstance(known, Mapping):
         return None
@@ -190,5 +189,5 @@ def _same(swept: Any, told: Value) -> bool:
         return swept is told
     if isinstance(swept, int | float) and isinstance(told, int | float):
         return abs(swept - told) <= TOLERANCE * max(abs(swept), abs(told))
-    # A swept table goes by a name in the conditions: any place may be meant.
+    # The conditions contain only the name of a swept table, so that any point may match.
     return isinstance(swept, dict) or swept == told

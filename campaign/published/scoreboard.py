@@ -30,22 +30,22 @@ COLUMNS = (
     *("table", "row", "column", "unit", "published", "reproduced", "deviation_percent", "status"),
     *("low", "high", "verdict", "source", "place", "place_low", "place_high", "draws"),
 )
-"""Of `scoreboard.csv`: `Line.cells`."""
+"""Columns of `scoreboard.csv`: keys of `Line.cells`."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """One published cell with what the run found for it.
+    """One published cell with the reproduced number of the run.
 
     Attributes:
-        status: None for a cell without a number that the document does not mark either.
-        found: in the printed unit; None when no trial measured it.
-        test: which test found it; empty when none did.
-        source: where that test's samples come from.
-        why: a sentence on the status, where there is one to say.
-        draws: what each draw of a random bench found, in the printed unit, where there are
-            several; `found` is then their median, and where one more draw would lie.
-        place: the share of such draws that lie below the published value; None without draws.
+        status: None for a cell without a reproduced number and without a mark of the document.
+        found: reproduced number in the printed unit; None when no trial measured it.
+        test: name of the test that measured it; empty without one.
+        source: origin of that test's samples.
+        why: reason for the status as a sentence, or "".
+        draws: number of each draw of a random bench, in the printed unit, with several draws;
+            `found` is then their median and the prediction interval of one more draw.
+        place: share of these draws below the published value; None without draws.
     """
 
     cell: Cell
@@ -65,12 +65,12 @@ class Line:
 
     @property
     def deviation(self) -> float | None:
-        """Of reproduced from published in percent; None where that has no meaning."""
+        """Deviation of the reproduced from the published value in percent; None if undefined."""
         return None if self.found is None else deviation(self.cell, self.found, self.verdict)
 
     @property
     def cells(self) -> dict[str, str | float | None]:
-        """What a table of lines says of it, by name; numbers in the printed unit."""
+        """Cells of this line in a table, by column name; numbers in the printed unit."""
         cell, found, place = self.cell, self.found, self.place
         return {
             "table": cell.table,
@@ -96,13 +96,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Scoreboard:
-    """All cells of the tables that tests stand for, in the order of the published tables.
+    """All cells of the tables that the tests reproduce, in the order of the published tables.
 
     Attributes:
-        lines: one per cell, found or not.
-        further: cells that were found again, by another test or elsewhere in a sweep, which do not
-            count.
-        problems: sentences on what could not be compared.
+        lines: one per cell, with or without a reproduced number.
+        further: repeated results of a cell, from another test or sweep point; they do not count.
+        problems: sentences on numbers that cannot be compared.
     """
 
     lines: tuple[Line, ...] = ()
@@ -113,12 +112,12 @@ class Scoreboard:
         return tuple(line for line in self.lines if line.cell.table == table)
 
     def tables(self) -> tuple[str, ...]:
-        """Names of the tables with at least one line, in printed order."""
+        """Names of the tables with lines, in printed order."""
         return tuple(dict.fromkeys(line.cell.table for line in self.lines))
 
     @property
     def altered(self) -> tuple[str, ...]:
-        """Why lines are `altered`, each reason once, with the tests."""
+        """Reasons why lines are `altered`, each once, with its tests."""
         tests: dict[str, dict[str, None]] = {}
         for line in self.lines:
             if line.status is Status.ALTERED:
@@ -127,17 +126,17 @@ class Scoreboard:
 
     @property
     def misdescribed(self) -> bool:
-        """Whether a bench file that describes its bench anew would change a status."""
+        """Whether a new description in a bench file would change the status of a line."""
         altered = (line.why for line in self.lines if line.status is Status.ALTERED)
         return any(why != OF_A_TRUTH for why in altered)
 
 
 def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
-    """Compare every published cell of the tables that tests stand for with their findings.
+    """Compare every published cell of the tables that the tests reproduce with their findings.
 
-    Every cell is a line: a cell that was not run, or that a failed trial should have found, must
-    not leave the board. When several tests found a cell, or one test at several places of its
-    sweep, the first in the order of the protocol counts; a number goes before a bound.
+    Every cell is a line: a cell without a run, or with a failed trial, must stay on the board. If
+    several tests, or several sweep points of a test, have a result for a cell, the first in
+    protocol order counts. A number takes precedence over a bound.
     """
     lines: list[Line] = []
     further: list[Line] = []
@@ -154,7 +153,7 @@ def score(published: Published, evidence: Sequence[Evidence]) -> Scoreboard:
 
 
 def to_csv(lines: Iterable[Line], columns: Sequence[str] = COLUMNS) -> str:
-    """Lines with these of their `cells`, unrounded."""
+    """CSV text of the lines with these `columns` of `Line.cells`, unrounded."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -173,23 +172,23 @@ def _exact(value: str | float | None) -> str:
 def _unknown_tables(published: Published, evidence: Sequence[Evidence]) -> Iterator[str]:
     for test in evidence:
         for name in test.reproduces:
-            # Figures are named for the reader; few of them have printed numbers.
+            # A figure name informs the reader; few figures have printed numbers.
             if name not in published and not name.startswith("figure "):
                 yield f"{test.test} reproduces {name!r}, which is no published table"
 
 
 def _without(cell: Cell, tests: Sequence[Evidence]) -> Line:
-    """The line of a cell for which no test found anything."""
+    """Line of a cell without a result."""
     why = next(filter(None, (_why_not(cell, test) for test in tests)), "")
     status = None if cell.status is None else Status(cell.status)
     return Line(cell, Verdict.NOT_FOUND if why else Verdict.NOT_RUN, status, why=why)
 
 
 def _why_not(cell: Cell, test: Evidence) -> str:
-    """Why a test found nothing for a cell that it tried; "" where it did not try."""
+    """Reason why a test has no result for a cell that it tried; "" if it did not try."""
     ours = {name: test.known[name] for name in test.known.keys() & cell.conditions.keys()}
     if not all(same_value(value, cell.conditions[name]) for name, value in ours.items()):
-        return ""  # a bench with a sampled controller, and a column of simulations
+        return ""  # e.g. a bench with a sampled controller and a column of simulations
     if any(concerns(finding, cell, test.known) for finding in test.findings):
         return f"{test.test}: the analysis found no number"
     if test.failed:
@@ -200,9 +199,9 @@ def _why_not(cell: Cell, test: Evidence) -> str:
 
 
 def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterator[Line]:
-    """What each test found, place by place: the first number, or else the first bound.
+    """Line of each test and sweep point: the first number, or else the first bound.
 
-    Several draws of a random bench are one place, and all of them together what was found there.
+    Several draws of a random bench are one sweep point with one combined result.
     """
     for test in tests:
         places: dict[str, list[Finding]] = {}
@@ -212,19 +211,19 @@ def _found(cell: Cell, tests: Sequence[Evidence], problems: list[str]) -> Iterat
                 places.setdefault(place, []).append(finding)
         for findings in places.values():
             lines = [_line(cell, test, [finding], problems) for finding in findings]
-            told = sorted((line for line in lines if line is not None), key=_is_bound)  # stable
-            if told and len({finding.conditions.get(SEED) for finding in findings}) > 1:
-                yield _line(cell, test, _one_of_each(findings), problems) or told[0]
-            elif told:
-                yield told[0]
+            own = sorted((line for line in lines if line is not None), key=_is_bound)  # stable
+            if own and len({finding.conditions.get(SEED) for finding in findings}) > 1:
+                yield _line(cell, test, _one_of_each(findings), problems) or own[0]
+            elif own:
+                yield own[0]
 
 
 def _one_of_each(findings: Iterable[Finding]) -> list[Finding]:
-    """Of every draw its first number, or else its first bound: two of one draw are no two draws."""
-    found: dict[object, Finding] = {}
+    """First number of every draw, or else its first bound: one draw must not count twice."""
+    by_seed: dict[object, Finding] = {}
     for finding in sorted(findings, key=lambda each: each.lower_bound):  # stable
-        found.setdefault(finding.conditions.get(SEED), finding)
-    return list(found.values())
+        by_seed.setdefault(finding.conditions.get(SEED), finding)
+    return list(by_seed.values())
 
 
 def _is_bound(line: Line) -> bool:
@@ -234,9 +233,9 @@ def _is_bound(line: Line) -> bool:
 def _line(
     cell: Cell, test: Evidence, findings: Sequence[Finding], problems: list[str]
 ) -> Line | None:
-    """What one finding, or those of several draws, say of a cell; None for no number."""
+    """Line of a cell from one finding, or from those of several draws; None without a number."""
     try:
-        # One draw that is left of several is a selection, too.
+        # A single remaining draw of several is a selection, too.
         several = len(findings) > 1 or (
             len(test.provenance.seeds) > 1 and SEED in findings[0].conditions
         )
@@ -249,7 +248,7 @@ def _line(
             lost = cell.path in test.calibration.lost
         value = reproduced(finding, cell.unit, part, lost=lost)
         draws = tuple(reproduced(each, cell.unit).value for each in findings) if several else ()
-    except ValueError:  # a plug-in's odd unit
+    except ValueError:  # unsuitable unit of a plug-in
         finding = findings[0]
         problems.append(
             f"{test.test}: {finding.quantity} in {finding.unit!r} cannot be compared with"
@@ -257,7 +256,7 @@ def _line(
         )
         return None
     draws = tuple(draw for draw in draws if math.isfinite(draw))
-    # A place among those that are left, or among bounds, would be none among all.
+    # A share of the remaining draws, or of bounds, is not the share of all draws.
     whole = finding.known.origin is not Origin.NOT_DETERMINED
     place = place_in(draws, cell.value, half_digit(cell)) if draws and whole else None
     verdict, (status, why) = judge(cell, value), status_of(cell, finding, test)

@@ -14,22 +14,22 @@ from campaign.units import convert
 
 
 class Status(StrEnum):
-    """Where a reproduced number comes from. The first that applies."""
+    """Origin of a reproduced number; the first that applies."""
 
-    INCONSISTENT = "inconsistent"  # the document contradicts itself there
-    NOT_REPRODUCIBLE = "not reproducible"  # nobody could reproduce it; the reason is given
-    ALTERED = "altered"  # the bench is not the one that was calibrated or described
-    UNDESCRIBED = "undescribed"  # the bench does not say what it was made from
+    INCONSISTENT = "inconsistent"  # the document contradicts itself
+    NOT_REPRODUCIBLE = "not reproducible"  # cannot be reproduced; the reason is given
+    ALTERED = "altered"  # the bench is not the calibrated or described one
+    UNDESCRIBED = "undescribed"  # the bench does not state its origin
     CALIBRATED = "calibrated"  # the bench was fitted to it
-    RECOVERED = "recovered"  # the bench was given this value and the experiment found it again
+    RECOVERED = "recovered"  # an input of the bench that the experiment estimates
     RECOMPUTED = "recomputed"  # derived from other published cells
-    SELECTED = "selected"  # it was looked at while the bench's structure was chosen
+    SELECTED = "selected"  # it was looked at when the bench's structure was selected
     PREDICTED = "predicted"  # the bench was fitted, but not to this
     SIMULATED = "simulated"  # nothing was fitted
 
 
 def status_of(cell: Cell, finding: Finding, test: Evidence) -> tuple[Status, str]:
-    """The status of a number that was found, and what there is to say of it."""
+    """Status of a reproduced number, and its reason ("" without one)."""
     if cell.status:
         return Status(cell.status), cell.reason
     altered = test.provenance.why_altered({**test.known, **finding.conditions})
@@ -49,15 +49,14 @@ def status_of(cell: Cell, finding: Finding, test: Evidence) -> tuple[Status, str
 
 
 def _repeats(cell: Cell, patterns: Sequence[str]) -> bool:
-    """Whether the patterns cover anything whose condition the cell repeats."""
+    """Whether the patterns overlap with any of the tables or cells that the cell repeats."""
     return any(overlap(pattern, again) for pattern in patterns for again in cell.repeats)
 
 
 def _is_among(cell: Cell, finding: Finding, test: Evidence, patterns: Sequence[str]) -> bool:
     """Whether the patterns cover the cell, or another one with the same value of the same quantity.
 
-    A number that the bench was fitted to stays fitted when another table prints it again: whoever
-    writes a document may give a table any name.
+    A number that the bench was fitted to stays fitted when another table, of any name, repeats it.
     """
     return any(covers(pattern, cell.path) for pattern in patterns) or any(
         any(covers(pattern, other.path) for pattern in patterns)
@@ -67,7 +66,7 @@ def _is_among(cell: Cell, finding: Finding, test: Evidence, patterns: Sequence[s
 
 
 def _print_alike(cell: Cell, other: Cell) -> bool:
-    """Whether two cells print one number of a quantity, and state conditions of the same names."""
+    """Whether two cells have the same printed number, quantity and names of conditions."""
     named = (cell.conditions.keys() ^ other.conditions.keys()) - {"domain"}
     if named or cell.quantity != other.quantity:
         return False

@@ -1,8 +1,8 @@
 """Published values of a source document, and their file.
 
-`campaign/published/thesis.toml` holds the thesis' tables; a laboratory may hand in its own file of
-the same form (`docs/published-values.md`). A table's rows and columns each add conditions, a
-quantity, a unit; a cell is the sum of its table, its row and its column.
+`campaign/published/thesis.toml` contains the tables of the thesis; a laboratory may provide its own
+file of the same form (`docs/published-values.md`). A cell combines conditions, quantity and unit of
+its table, its row and its column.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from campaign.units import to_si
 
 T = TypeVar("T")
 THESIS = "thesis"
-"""What a protocol or a bench calls the packaged document."""
+"""Name of the packaged document in a protocol or a bench."""
 Relation = Literal["equal", "near", "at most", "at least", "rank", "mark"]
 NO_SIZE = ("rank", "mark")
-"""Relations of printed numbers of which no percent can be told."""
+"""Relations of printed numbers without a deviation in percent."""
 Mark = Literal["inconsistent", "not reproducible"]
 
 
@@ -108,7 +108,7 @@ class TableOptions(Part):
     @field_validator("cells", mode="before")
     @classmethod
     def _empty_cells(cls, cells: Any) -> Any:
-        """TOML has no null, so an empty text is an empty cell."""
+        """Convert empty texts to None, because TOML has no null."""
         if not isinstance(cells, dict):
             return cells
         return {
@@ -160,7 +160,7 @@ class PublishedOptions(Options):
 
     @property
     def cited(self) -> str:
-        """`A. Author: Title, Institution, 2010`, as far as it is known."""
+        """Citation such as `A. Author: Title, Institution, 2010`, without unknown parts."""
         where = ", ".join(
             filter(None, (self.source, self.institution, str(self.year) if self.year else ""))
         )
@@ -172,15 +172,15 @@ class Cell:
     """One published number.
 
     Attributes:
-        table, row, column: where it stands, e.g. `5.8`, `lugre`, `stabilization_error`.
+        table, row, column: e.g. `5.8`, `lugre`, `stabilization_error`.
         value: as printed, in `unit`.
-        conditions: what a finding must state to be this number; numbers SI.
+        conditions: conditions that a matching finding must state; numbers in SI.
         decimals: printed digits after the point, None when unknown.
-        status: `inconsistent`, `not reproducible` or None; `reason` says why.
-        notes: what else to know about it.
+        status: `inconsistent`, `not reproducible` or None; `reason` is the reason.
+        notes: further remarks.
         repeats: tables or cells that were measured at the same condition, or that it follows from.
-        symbol: the document's sign for its row, or for its column.
-        domain: where the document has it from, "simulation" or "hardware"; "" when it does not say.
+        symbol: the document's symbol for its row, or for its column.
+        domain: origin in the document, "simulation" or "hardware"; "" when not stated.
     """
 
     table: str
@@ -211,13 +211,13 @@ class Cell:
 
 
 def heading_of(table: str) -> str:
-    """`Table 5.8`, `Figure 5.14`, `Text 4.2.3`, by the name of a published table."""
+    """Heading of a published table: `Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
     return table.capitalize() if " " in table else f"Table {table}"
 
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """One published table with its cells in printed order."""
+    """One published table; cells in printed order."""
 
     name: str
     title: str
@@ -227,12 +227,12 @@ class PublishedTable:
 
     @property
     def heading(self) -> str:
-        """`Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
+        """Heading, e.g. `Table 5.8`, `Figure 5.14`, `Text 4.2.3`."""
         return heading_of(self.name)
 
     @property
     def slug(self) -> str:
-        """For anchors and file names: `table-5.8`, `figure-5.14`, `text-4.2.3`."""
+        """Name in anchors and files: `table-5.8`, `figure-5.14`, `text-4.2.3`."""
         return self.heading.lower().replace(" ", "-")
 
 
@@ -241,20 +241,20 @@ Published = Mapping[str, PublishedTable]
 
 @cache
 def thesis() -> Published:
-    """The packaged published values, by table name, in printed order."""
+    """Tables of the packaged document by name, in printed order."""
     path = files("campaign") / "published" / "thesis.toml"
     return read_published(path.read_text(encoding="utf-8"), "thesis.toml")
 
 
 def published_values(own: str | None = None, name: str = "published.toml") -> Published:
-    """The thesis' tables, and those of a laboratory's `own` file (its text), which win by name."""
+    """Tables of the thesis; those of a laboratory's `own` file (text) replace the same names."""
     return {**thesis(), **read_published(own, name)} if own else thesis()
 
 
 def read_published(text: str, name: str) -> Published:
-    """Tables of a TOML text by name, in file order; `name` is the file's, for messages.
+    """Tables of a TOML text by name, in file order; `name` is the file name in messages.
 
-    Raises UsageError naming every mistake.
+    Raises UsageError that lists every error.
     """
     try:
         options = PublishedOptions.model_validate(tomllib.loads(text))
@@ -295,7 +295,7 @@ def _cell(table: TableOptions, row: str, column: str, value: float) -> Cell:
         parts, (None, table.rows, table.columns), ("", row, column), strict=True
     ):
         conditions |= {key: _condition(text) for key, text in part.conditions.items()}
-        # A row such as `mean` that states conditions of its own is no value of the others' one.
+        # The name of a row such as `mean`, with conditions of its own, is no value of a condition.
         if names and not part.conditions:
             conditions[names.condition] = _named_value(name, names.unit)
     marks = tuple(table.marks(row, column))
@@ -325,12 +325,12 @@ def _innermost(values: Iterable[T | None]) -> T | None:
 
 
 def _check_unit(unit: str) -> None:
-    if unit != "dB":  # a level has no factor to SI; findings state it in dB too
+    if unit != "dB":  # a level has no SI factor; findings state it in dB, too
         to_si(f"1 {unit}")
 
 
 def _condition(given: str | int | float | bool) -> Value:
-    """A number with a unit in SI; any other text, number or truth as it stands."""
+    """A number with a unit in SI; any other text, number or boolean unchanged."""
     if not isinstance(given, str):
         return given
     try:
@@ -340,7 +340,7 @@ def _condition(given: str | int | float | bool) -> Value:
 
 
 def _named_value(name: str, unit: str) -> Value:
-    """What a row's or column's name says: a number (in `unit`, to SI) or a word."""
+    """Value of a row's or column's name: a number (converted from `unit` to SI) or a word."""
     try:
         float(name)
     except ValueError:

@@ -13,44 +13,44 @@ from campaign.result import Finding
 from campaign.units import convert
 
 NARROW = 0.10
-"""Half-width, as a share of the published value, up to which an interval decides something."""
+"""Largest half-width of an interval that permits a decision, as a share of the published value."""
 LOST = Cause("lost by calibration", "not found within the uncertainty of the bench's calibration")
 CLAIMS = ("at most", "at least")
-"""Relations of published cells that say on which side of a number a value lies."""
+"""Relations of published cells that are one-sided."""
 
 
 class Verdict(StrEnum):
-    """What came of one published number in a run."""
+    """Outcome of the comparison with one published number."""
 
     AGREES = "agrees"  # it rounds to the printed digits
-    COMPATIBLE = "compatible"  # its interval contains the printed value, and is narrow
-    UNDECIDED = "undecided"  # its interval contains the printed value and more, or it is not known
+    COMPATIBLE = "compatible"  # its interval contains the printed value and is narrow
+    UNDECIDED = "undecided"  # its interval permits no decision, or it is not determined
     DIFFERS = "differs"
     MET = "met"  # a claim of "at most" or "at least"
     MISSED = "missed"
-    NOT_REACHED = "not reached"  # only a bound was found: the value lies beyond what was tried
-    NOT_FOUND = "not found"  # it was tried, and a trial failed or the analysis found no number
-    NOT_RUN = "not run"  # nobody tried it
+    NOT_REACHED = "not reached"  # only a bound: the value lies beyond the tested range
+    NOT_FOUND = "not found"  # trials were executed; one failed, or the analysis has no number
+    NOT_RUN = "not run"  # no trial was executed for it
 
 
 GOOD = frozenset({Verdict.AGREES, Verdict.COMPATIBLE, Verdict.MET})
-"""Verdicts by which a published number is reproduced."""
+"""Verdicts that count as reproduced."""
 
 
 @dataclass(frozen=True)
 class ReproducedNumber:
-    """A number that was found, in the unit of the published one.
+    """A reproduced number, in the unit of the published one.
 
     Attributes:
-        low, high: its 95 % interval, systematic parts and what the calibration leaves open of its
-            bench included; None where it is open or unknown. Of a bound only the side that it
-            bounds. What scatters within one trial is no interval by itself.
-        kind: `at least` and `at most` are bounds: `value` is where what was tried ends, `low` or
-            `high` the same less what the bench's constants may be off by.
-        origin: where it comes from; one that is `not determined` decides nothing.
-        reason: why it has no interval, or what is not in the one that it has.
-        calibration_alone: whether the analysis gives no interval, and this one is of the
-            calibration.
+        low, high: 95 % interval with systematic parts and the calibration uncertainty of the bench;
+            None where it is open or unknown. A bound has only its own side. The scatter within one
+            trial alone is no interval.
+        kind: `at least` and `at most` are bounds: `value` is the end of the tested range, `low` or
+            `high` includes the uncertainty of the bench's constants.
+        origin: a number that is `not determined` decides nothing.
+        reason: why it has no interval, or which part the interval does not include.
+        calibration_alone: whether the interval is of the calibration only, because the analysis
+            gives none.
     """
 
     value: float
@@ -71,7 +71,7 @@ class ReproducedNumber:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Its interval; infinite where that is open."""
+        """Ends of the interval; infinite where it is open."""
         return (
             -math.inf if self.low is None else self.low,
             math.inf if self.high is None else self.high,
@@ -85,12 +85,12 @@ class ReproducedNumber:
 def reproduced(
     finding: Finding, unit: str, calibration: float | None = None, *, lost: bool = False
 ) -> ReproducedNumber:
-    """A finding in `unit`; ValueError when it measures something else.
+    """Convert a finding to `unit`. Raises ValueError for a different dimension.
 
     Args:
-        calibration: half-width of the 95 % interval that the calibration of the bench leaves, in
-            `unit`; half-widths add in squares. None where nobody has worked it out.
-        lost: whether the calibration does not even say that it can be found.
+        calibration: half-width of the 95 % interval from the calibration of the bench, in `unit`;
+            half-widths add in squares. None where it is unknown.
+        lost: whether the calibration uncertainty includes benches without this number.
     """
     known = finding.known
     value = float(convert(finding.value, finding.unit, unit))
@@ -112,7 +112,7 @@ def reproduced(
 
 
 def judge(cell: Cell, found: ReproducedNumber) -> Verdict:
-    """The verdict on a published cell for which something was found."""
+    """Verdict on a published cell with a reproduced number."""
     if found.is_bound:
         return Verdict.MISSED if _excludes(found, cell) else Verdict.NOT_REACHED
     if not found.is_determined:
@@ -122,7 +122,7 @@ def judge(cell: Cell, found: ReproducedNumber) -> Verdict:
     low, high = found.ends
     narrow = 0.5 * (high - low) <= NARROW * abs(cell.value)
     if rounds_to_print(cell, found.value):
-        # What may lie far off, too, agrees by luck, or by whoever chose it.
+        # With a wide interval, the agreement may result from chance or from a selection.
         by_luck = found.has_interval and not narrow
         return Verdict.UNDECIDED if by_luck else Verdict.AGREES
     if not found.has_interval or cell.relation == "rank":
@@ -133,7 +133,7 @@ def judge(cell: Cell, found: ReproducedNumber) -> Verdict:
 
 
 def _claim(cell: Cell, found: ReproducedNumber) -> Verdict:
-    """The verdict on "at most" or "at least": of the whole interval, or of a number without one."""
+    """Verdict on "at most" or "at least", from the whole interval, or from a number without one."""
     low, high = found.ends if found.has_interval else (found.value, found.value)
     if cell.relation == "at most":
         met, missed = high <= cell.value, low > cell.value
@@ -145,8 +145,9 @@ def _claim(cell: Cell, found: ReproducedNumber) -> Verdict:
 
 
 def _excludes(bound: ReproducedNumber, cell: Cell) -> bool:
-    """Whether a bound alone says that a claim is not met. None says that one is met: the value
-    itself, a threshold for one, was never seen.
+    """Whether a bound alone shows that a claim is missed.
+
+    No bound shows that a claim is met: the value itself, e.g. a threshold, was not observed.
     """
     if bound.low is not None:
         return cell.relation == "at most" and bound.low > cell.value
@@ -154,22 +155,22 @@ def _excludes(bound: ReproducedNumber, cell: Cell) -> bool:
 
 
 def rounds_to_print(cell: Cell, value: float) -> bool:
-    """Whether a number in the cell's unit is the printed one, as far as that has digits."""
+    """Whether a number in the cell's unit rounds to the printed digits."""
     if cell.decimals is None:
         return math.isclose(value, cell.value, rel_tol=1e-12)
     return abs(value - cell.value) <= half_digit(cell)
 
 
 def half_digit(cell: Cell) -> float:
-    """Half of the last printed digit, and the bits that are lost on the way to it; 0 unknown."""
+    """Half of the last printed digit, plus floating-point rounding; 0 if digits are unknown."""
     return 0.0 if cell.decimals is None else 0.5 * 10.0**-cell.decimals * (1 + 1e-9)
 
 
 def deviation(cell: Cell, found: ReproducedNumber, verdict: Verdict) -> float | None:
-    """Percent of the published value by which the reproduced one is off.
+    """Deviation of the reproduced number in percent of the published value.
 
-    None where percent mean nothing: of a rank or a mark, of a claim that is not missed, of a bound,
-    of what is not determined, of a printed 0.
+    None for a rank, a mark, a claim that is not missed, a bound, a number that is not determined,
+    and a printed 0.
     """
     claim = cell.relation in CLAIMS and verdict is not Verdict.MISSED
     number = found.is_determined and not found.is_bound

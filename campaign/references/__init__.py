@@ -1,1 +1,1 @@
-"""Reference values, pairs of them with what was found, and what a family of pairs comes to."""
+"""Reference values, their pairs with findings, and the verdicts of a family of pairs."""

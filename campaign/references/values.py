@@ -1,8 +1,8 @@
 """Reference values of another program: a CSV file with a row for each number.
 
-Columns `quantity`, `value` and `unit` are needed. `low` and `high` are the ends of a 95 % interval.
-`test` names the test that a row is for. Any other column is a condition, such as `direction` or
-`frequency [Hz]`: a finding must state the same; an empty cell asks for nothing.
+Columns `quantity`, `value` and `unit` are required. `low` and `high` are the ends of a 95 %
+interval. `test` names the test of a row. Any other column is a condition, such as `direction` or
+`frequency [Hz]`: a finding must state the same value; an empty cell is no condition.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from campaign.units import same_dimension, to_si
 NEEDED = ("quantity", "value", "unit")
 OWN = (*NEEDED, "low", "high", "test")
 CONDITION = re.compile(r"(?P<name>[^\[\]]+?)\s*(\[(?P<unit>[^\[\]]*)\])?")
-"""Head of a condition's column: a name, and the unit of its numbers in brackets."""
+"""Heading of a condition's column: a name, and the unit of its numbers in brackets."""
 SMALLEST, LARGEST = 1e-100, 1e100
-"""Sizes of numbers, in any unit."""
+"""Limits of the absolute value of a number, in any unit."""
 NO_INTERVAL = Cause("reference without interval", "the file states no interval (low, high)")
 
 
@@ -36,10 +36,10 @@ class ReferenceValue:
     """A row of the file.
 
     Attributes:
-        conditions: SI; a finding states each of them alike.
-        units: of conditions that have one in the file, by name.
-        test: the test that it is for; "" for any.
-        place: of the row, in words.
+        conditions: conditions that a matching finding must state, in SI.
+        units: units of conditions that have one in the file, by name.
+        test: name of its test; "" for any.
+        place: location of the row, e.g. `line 3`.
     """
 
     estimate: Estimate
@@ -49,7 +49,7 @@ class ReferenceValue:
     place: str
 
     def speaks_of(self, test: str, finding: Finding) -> bool:
-        """Whether a finding of a test is of the same quantity under these conditions."""
+        """Whether a test's finding has this quantity and these conditions."""
         return (
             self.test in ("", test)
             and self.estimate.name == finding.quantity
@@ -61,12 +61,12 @@ class ReferenceValue:
         )
 
     def in_unit_of(self, finding: Finding) -> Estimate:
-        """Its number in the unit of a finding that it speaks of."""
+        """The number in the unit of a matching finding."""
         return in_unit(self.estimate, finding.unit)
 
 
 def read_values(path: Path) -> tuple[ReferenceValue, ...]:
-    """The values of a file. Raises UsageError that names file, line and column."""
+    """Read the values of a file. Raises UsageError that names file, line and column."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file, strict=True))
@@ -84,28 +84,28 @@ def read_values(path: Path) -> tuple[ReferenceValue, ...]:
             f"{path}, line 1: {what}; the first line names columns, separated by commas: "
             f"{', '.join(OWN)}, and conditions such as direction or frequency [Hz]"
         )
-    found: dict[str, ReferenceValue] = {}
+    values: dict[str, ReferenceValue] = {}
     for line, row in enumerate(rows[1:], start=2):
         if not any(map(str.strip, row)):
             continue
         try:
             value = _value(heads, row, f"line {line}")
             about = repr((value.estimate.name, dict(sorted(value.conditions.items())), value.test))
-            if about in found:
+            if about in values:
                 raise ValueError(
-                    f"it repeats {found[about].place}: quantity, conditions and test are the same"
+                    f"it repeats {values[about].place}: quantity, conditions and test are the same"
                 )
         except ValueError as error:
             raise UsageError(f"{path}, line {line}: {error}") from None
-        found[about] = value
-    if not found:
+        values[about] = value
+    if not values:
         raise UsageError(f"{path}: it has no row below the names of the columns")
-    return tuple(found.values())
+    return tuple(values.values())
 
 
 @dataclass(frozen=True)
 class _Head:
-    """Name of a column, and the unit in its brackets; None without any."""
+    """Heading of a column: its name, and the unit in brackets or None."""
 
     name: str
     unit: str | None = None
@@ -116,7 +116,7 @@ class _Head:
         return cls(text) if match is None else cls(match["name"], match["unit"])
 
     def condition(self, cell: str) -> Value:
-        """A word or a number of the cell (SI). Raises ValueError."""
+        """Value of a cell: a word, a boolean or a number (SI). Raises ValueError."""
         if self.unit is not None:
             return to_si(f"{_number(self.name, cell)} {self.unit}")
         try:
@@ -143,11 +143,11 @@ def _value(heads: Sequence[_Head], row: Sequence[str], place: str) -> ReferenceV
 
 
 def _estimate(told: Mapping[str, str]) -> Estimate:
-    """Raises ValueError."""
+    """Estimate from the cells of a row. Raises ValueError."""
     if "quantity" not in told:
         raise ValueError("quantity is empty")
     unit = told.get("unit", "")
-    to_si(f"1 {unit}")  # it is a unit
+    to_si(f"1 {unit}")  # checks the unit
     value = _number("value", told.get("value", ""))
     ends = [_number(name, told[name]) for name in ("low", "high") if name in told]
     what = (told["quantity"], value, unit)

@@ -14,18 +14,18 @@ from campaign.reason import NONE, Cause, Reason
 from campaign.result import Value
 
 WRONG_MODEL = Cause("contradicted model", "{side} is of a model that the data contradict: {why}")
-"""The interval is that of the closest curve of its kind, whose residuals are no noise. On the bench
-`platform`, whose Stribeck exponent is about 0.9, viscous friction fitted with the exponent held at
-2 scatters between runs by 1.5 times its standard error."""
+"""The interval belongs to the closest curve of a wrong model, and its residuals are no noise. On
+the bench `platform` (Stribeck exponent about 0.9), viscous friction fitted with the exponent held
+at 2 scatters between runs by 1.5 times its standard error."""
 
 
 class Verdict(StrEnum):
-    """What a pair comes to."""
+    """Outcome of a pair."""
 
-    DIFFERENT = "different"  # declared: the family of all pairs leaves no doubt worth 5 %
-    BEYOND_BOUND = "beyond a bound"  # a bound excludes that they are equal; no test is made of it
-    NOT_SHOWN = "no difference shown"  # which does not say that there is none
-    NOT_JUDGED = "not judged"  # and `reason` says why
+    DIFFERENT = "different"  # declared at a false discovery rate of 5 % in the family of all pairs
+    BEYOND_BOUND = "beyond a bound"  # a bound excludes equality; no test is made
+    NOT_SHOWN = "no difference shown"  # a difference may exist
+    NOT_JUDGED = "not judged"  # see `reason`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +33,9 @@ class JudgedNumber:
     """A number beside its reference.
 
     Attributes:
-        conditions: SI, as the reference or the finding states them.
-        reference, other: SI.
-        reason: why it is not judged.
+        conditions: as the reference or the finding states them, in SI.
+        reference, other: in SI.
+        reason: why the pair is not judged.
         adjusted: p value adjusted for the family; None without a p value.
     """
 
@@ -61,35 +61,35 @@ class JudgedNumber:
         """A pair with its difference, not yet judged.
 
         Args:
-            shared: sources of systematic parts that are the same for both.
-            doubt: why it is not judged although both have intervals.
+            shared: sources of systematic parts that are common to both.
+            doubt: reason not to judge the pair although both have intervals.
             more: further fields.
 
-        Raises ValueError for units that do not go together.
+        Raises ValueError for incompatible units.
         """
-        found = difference_of(reference, other, shared)
-        beyond = found.difference.kind in BOUNDS and excludes_zero(found.difference)
+        pair = difference_of(reference, other, shared)
+        beyond = pair.difference.kind in BOUNDS and excludes_zero(pair.difference)
         return cls(
             reference=reference,
             other=other,
-            found=found,
+            found=pair,
             verdict=Verdict.BEYOND_BOUND if beyond else Verdict.NOT_JUDGED,
-            reason=found.reason or doubt or _of_wrong_model(reference, other),
+            reason=pair.reason or doubt or _of_wrong_model(reference, other),
             **more,
         )
 
     def not_judged(self, reason: Reason) -> Self:
-        """The same pair, which takes part in no family."""
+        """The same pair, excluded from the family."""
         return replace(self, verdict=Verdict.NOT_JUDGED, reason=reason)
 
     @property
     def testable(self) -> bool:
-        """Whether it takes part in the family."""
+        """Whether the pair is part of the family."""
         return self.found.p is not None and not self.reason
 
     @property
     def outcome(self) -> str:
-        """Its verdict, or why there is none."""
+        """Its verdict, or the reason for no verdict."""
         return str(self.reason if self.verdict is Verdict.NOT_JUDGED else self.verdict)
 
 
@@ -104,9 +104,9 @@ def _of_wrong_model(reference: Estimate, other: Estimate) -> Reason:
 
 
 def with_verdicts(pairs: Sequence[J]) -> tuple[J, ...]:
-    """The pairs with their verdicts: one family, whatever they are of.
+    """Judge all pairs as one family, of any quantities.
 
-    No difference is declared that the pair's own interval leaves open.
+    No difference is declared if the pair's own interval contains zero.
     """
     tested = (pair.found.p for pair in pairs if pair.testable)
     p = iter(adjusted([each for each in tested if each is not None]))
@@ -120,6 +120,6 @@ def _with(pair: J, p: float) -> J:
 
 
 def excludes_zero(estimate: Estimate) -> bool:
-    """Whether its interval, or its bound, does."""
+    """Whether the interval, or the bound, of the estimate excludes zero."""
     low, high = estimate.combined
     return (low is not None and low > 0) or (high is not None and high < 0)

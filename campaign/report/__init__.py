@@ -1,5 +1,5 @@
-"""The report room: an archived run and its analyses become one HTML page, CSV tables and figures.
+"""Report of an archived run and its analyses: one HTML page, CSV tables and figures.
 
-It runs no trial and reads no network: everything on the page comes from the archive, from the
-published values and from the templates. The same archive always gives the same bytes.
+A report runs no trial and needs no network. Its content comes from the archive, the published
+values and the templates. The same archive always results in the same bytes.
 """

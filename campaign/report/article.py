@@ -25,10 +25,11 @@ def write_article(
     templates: Path | None = None,
     formats: Sequence[Format] = (),
 ) -> Path:
-    """Write what `make` makes into the folder `output`; the page's path.
+    """Write the article that `make` returns into the folder `output`; return the page's path.
 
-    name: of the article's files. `templates` and `formats`: as of a report. The same archives give
-    the same bytes. Raises UsageError when `output` is another page of ours, or cannot be written.
+    name: stem of the article's files. `templates` and `formats`: as for a report. The same archives
+    result in the same bytes. Raises UsageError when `output` has another page of campaign, or
+    cannot be written.
     """
     page = f"{name}.html"
     refuse_other(output, page)
@@ -45,5 +46,5 @@ def write_article(
 
 
 def article_html(article: Article, templates: Templates) -> str:
-    """The text of the page."""
+    """HTML text of the page."""
     return templates.fill("article.html", {"article": article, "colours": variables()})

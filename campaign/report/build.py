@@ -37,13 +37,13 @@ from campaign.report.previous_report import Formats, all_formats, made_before, r
 from campaign.report.processes import Workers
 
 FAILED = 200
-"""Most failed trials that are listed; the archive has them all."""
+"""Maximum number of listed failed trials; the archive has all."""
 DAMAGED = 200
-"""Most damage that is listed on the page; `tables/damaged.csv` has all."""
+"""Maximum number of listed damages on the page; `tables/damaged.csv` has all."""
 
 
 def _nothing(_: Document) -> None:
-    """Nobody wants to know."""
+    """Do nothing: default of `when_found`."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Report:
     """A finished report.
 
     Attributes:
-        path: of `report.html`.
-        problems: analyses that failed and numbers that could not be compared, one line each.
-        damaged: what of the run is damaged, as far as the report looked at it; all else is there.
-        layout: what the page shows, for other formats.
-        notice: what the page says of the damage; None without any.
-        files: names of all that was written, within the folder.
-        left_out: what an earlier report in the folder had and this one could not make, and why.
+        path: path of `report.html`.
+        problems: failed analyses and numbers that could not be compared, one line each.
+        damaged: damage of the run that the report detected; all other data is in the report.
+        layout: content of the page, for other formats.
+        notice: notice of damage on the page; None without any.
+        files: names of all written files in the folder.
+        left_out: omitted formats of an earlier report in the folder, with the reasons.
     """
 
     path: Path
@@ -87,18 +87,16 @@ def build_report(
 ) -> Report:
     """Write `report.html`, `report.json`, `tables/` and `figures/` of `run` into `output`.
 
-    The same archive gives the same bytes. A template in `templates` wins over the packaged one of
-    the same name. `measure_anew`: as for `analyse_run`. `formats`: what is written besides.
-    `trials`: those that get a page of their own, as `chosen_trials` has them. Processes that are
-    `at_work` analyse and draw with the experiments that are installed, whatever `experiments` are.
-    `zoom`: the page's lines can be zoomed into by who has scripts; nothing else is different.
-    `command`: what the page says to type for the report; made from the run's name when empty.
-    Formats and trials' pages that an earlier report of the run left in `output` are made anew.
-    `when_found` is told what was found while the drawings of it are made. `references`: files of
-    reference values, with what is in them.
+    The same archive results in the same bytes. A template in `templates` replaces the packaged one
+    of the same name. `measure_anew`: as for `analyse_run`. `formats`: further formats. `trials`:
+    trials with a page of their own, from `chosen_trials`. Processes `at_work` analyse and draw with
+    the installed experiments, independent of `experiments`. `zoom`: whether the page has zoom by a
+    script; nothing else changes. `command`: shown command for the report; default: from the run's
+    name. Formats and pages of trials of an earlier report in `output` are made again. `when_found`
+    receives the document while its drawings are made. `references`: values by file.
 
-    Raises UsageError when `output` is no report of ours or cannot be written, when a template is
-    wrong, or when one of the formats cannot be made; an older report is then left as it was.
+    Raises UsageError when `output` is no report of campaign or cannot be written, when a template
+    has an error, or when one of the formats fails; an older report then remains unchanged.
     """
     before = made_before(output, run)
     kinds = all_formats(formats, before)
@@ -129,29 +127,29 @@ def build_report(
 
 
 def _write_formats(kinds: Formats, report: Report, folder: Path) -> dict[str, set[str]]:
-    """The files that each format has added, by its name."""
+    """Write all formats; return the added files by name of the format."""
     layout, run = report.layout, report.layout.document.run
     pieces = tuple(outline(layout, report.notice)) if kinds.all else ()
     bibtex, pdfs = citation_of(run).bibtex, layout.folder.pdfs
     written = WrittenPage("report", slug(run.header.name), pieces, folder, pdfs, bibtex)
     added: dict[str, set[str]] = {}
     for each in kinds.all:
-        there = _files(written.folder)
+        before = _files(written.folder)
         try:
             each.write(written)
         except UsageError as error:
             if each in kinds.asked:
                 raise
             kinds.leave_out(each.name, error)
-            for name in _files(written.folder) - there:
+            for name in _files(written.folder) - before:
                 (written.folder / name).unlink()
         else:
-            added[each.name] = _files(written.folder) - there
+            added[each.name] = _files(written.folder) - before
     return added
 
 
 def _files(folder: Path) -> set[str]:
-    """Names of all but hidden files."""
+    """Paths within the folder of all files that are not hidden."""
     return {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
@@ -174,9 +172,9 @@ def render(
     when_found: Callable[[Document], None] = _nothing,
     references: Files = NO_FILES,
 ) -> tuple[str, Folder, Report]:
-    """The page's text, the other files, and what there is to say of them; nothing is written.
+    """Make the page's text, the other files and the report, without writing.
 
-    `trials`: those that will have a page of their own. `command`: what to type for the report.
+    `trials`: trials with a page of their own. `command`: shown command for the report.
     """
     from markupsafe import Markup
 
@@ -192,7 +190,7 @@ def render(
     )
 
     def begin_to_draw(drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
-        # Sheets are kept as PDF where they are drawn.
+        # For PDF figures, this process must draw, because it keeps the sheets.
         begun = draw_on_demand(drawings) if keeps_pdf() else at_work.draw(drawings)
         when_found(document)
         return begun

@@ -1,7 +1,7 @@
-"""Untrusted text as LaTeX, without commands.
+"""Conversion of untrusted text to LaTeX without commands.
 
-What is written needs pdfLaTeX, LuaLaTeX or XeLaTeX with the T1 encoding and nothing else. A letter
-that T1 has not is named by its code point, so that no text of a run stops the typesetting.
+The result needs only pdfLaTeX, LuaLaTeX or XeLaTeX with the T1 encoding. A letter that is not in T1
+is replaced by its code point, so that no text of a run stops the typesetting.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _COMMANDS = {
     "|": r"\textbar{}",
     '"': r"\textquotedbl{}",
     "`": r"\textasciigrave{}",
-    # Behind a line's end these two are taken for its arguments, wherever the text began.
+    # After the end of a line, LaTeX takes a bracket or an asterisk as its argument.
     "[": "{[}",
     "]": "{]}",
     "*": "{*}",
@@ -67,14 +67,14 @@ _MATHS = {
     "µ": r"\mu",
 }
 _GREEK = "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
-"""The letters that have a command of their name."""
+"""Letters with a command of their name."""
 _LIKE_LATIN = dict(zip("ΑΒΕΖΗΙΚΜΝΟΡΤΧο", "ABEZHIKMNOPTXo", strict=True))
-"""Greek letters that mathematics has no command for, because it writes them as Latin ones."""
+"""Greek letters without a command, because they look like Latin letters."""
 _T1 = frozenset(
     "ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÐÑÒÓÔÕÖØÙÚÛÜÝÞßàáâãäåæçèéêëìíîïðñòóôõöøùúûüýþÿ"
     "ĂăĄąĆćČčĎďĐđĘęĚěĞğİıŁłŃńŇňŊŋŐőŒœŔŕŘřŚśŞşŠšŢţŤťŮůŰűŸŹźŻżŽž"
 )
-"""Letters beyond ASCII that the T1 encoding has."""
+"""Letters of the T1 encoding beyond ASCII."""
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ", "0123456789+-n")
 _LOWERED = str.maketrans("₀₁₂₃₄₅₆₇₈₉₊₋", "0123456789+-")
 _SYMBOLS = {
@@ -83,25 +83,25 @@ _SYMBOLS = {
     "Ts": r"T_\mathrm{s}",
     "vs": r"v_\mathrm{s}",
 }
-"""Symbols of the LuGre model, where they stand as words."""
+"""Symbols of the LuGre model, as separate words."""
 _WORDS = re.compile(rf"(?<!\w)(?:{'|'.join(_SYMBOLS)})(?!\w)(?<!vs(?=\.))")
 _PIECES = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ]+|[₀₁₂₃₄₅₆₇₈₉₊₋]+|.", re.DOTALL)
-"""The digits of one exponent belong together; all else is taken letter by letter."""
+"""Pieces of a text: the digits of one exponent or index, or else one letter."""
 
 
 LONGEST, PART = 24, 8
-"""Letters of a word that is left whole, and of the parts of a longer one."""
+"""Maximum length of a word without breaks, and length of the parts of a longer one."""
 
 
 def latex(text: str) -> str:
-    """`text` within a paragraph, a caption or a cell: one line, in which nothing is a command."""
+    """Convert text for a paragraph, a caption or a cell: one line without commands of its own."""
     line = unicodedata.normalize("NFC", " ".join(text.split()))
-    done, told = 0, ""
+    done, written = 0, ""
     for match in _WORDS.finditer(line):
-        told += _letters(line[done : match.start()])
-        told += rf"\ensuremath{{{_SYMBOLS[match[0]]}}}"
+        written += _letters(line[done : match.start()])
+        written += rf"\ensuremath{{{_SYMBOLS[match[0]]}}}"
         done = match.end()
-    return told + _letters(line[done:])
+    return written + _letters(line[done:])
 
 
 def _letters(line: str) -> str:
@@ -109,7 +109,7 @@ def _letters(line: str) -> str:
 
 
 def breakable(text: str) -> str:
-    """The same, but lines may break within a long word, such as a digest or a path."""
+    """Convert as `latex`, with permitted breaks in long words such as a digest or a path."""
     return " ".join(r"\allowbreak{}".join(map(latex, _parts(word))) for word in text.split())
 
 
@@ -173,31 +173,31 @@ _NUMBER = re.compile(
 
 
 def cell_numbers(text: str) -> str:
-    r"""A cell of numbers, each set by siunitx: `3.87 ± 0.12` is `\num{3.87 \pm 0.12}`."""
-    done, told = 0, []
+    r"""Convert a cell, numbers for siunitx: `3.87 ± 0.12` is `\num{3.87 \pm 0.12}`."""
+    done, tex = 0, []
     for match in _NUMBER.finditer(text):
         number = (match["all"] or match["one"]).replace("−", "-").replace("±", r"\pm")
         power = (match["of_all"] or match["of_one"] or "").translate(_RAISED)
-        told += [_between(text[done : match.start()]), rf"\num{{{number}{power and ' e' + power}}}"]
+        tex += [_between(text[done : match.start()]), rf"\num{{{number}{power and ' e' + power}}}"]
         done = match.end()
-    return "".join((*told, _between(text[done:])))
+    return "".join((*tex, _between(text[done:])))
 
 
 def _between(text: str) -> str:
-    """Words between numbers, with the spaces around them."""
+    """Convert words between numbers, with the spaces around them."""
     before, after = text[:1] == " ", text[-1:] == " " and bool(text.strip())
     return " " * before + latex(text) + " " * after
 
 
 def column_head(text: str) -> str:
-    r"""The head of a column, a unit at its end set by siunitx: `Error (\unit{\milli\radian})`."""
+    r"""Convert a heading, its unit for siunitx: `Error (\unit{\milli\radian})`."""
     match = re.fullmatch(r"(.*) \(([^()]*)\)", text)
     shown = unit(match[2]) if match else ""
     return f"{breakable(match[1])} ({shown})" if match and shown else breakable(text)
 
 
 def unit(text: str) -> str:
-    """A unit as the page writes it (`N·m/rad`), for siunitx; "" for what is none it knows."""
+    """Convert a unit of the page (`N·m/rad`) for siunitx; "" for an unknown one."""
     macros = []
     for place, part in enumerate(text.split("/")):
         for factor in part.split("·"):
@@ -209,7 +209,7 @@ def unit(text: str) -> str:
 
 
 def _factor(text: str) -> str | None:
-    """One factor of a unit; None for an unknown one."""
+    """Convert one factor of a unit for siunitx; None for an unknown one."""
     name, power = (text[:-1], _POWERS[text[-1]]) if text[-1:] in _POWERS else (text, "")
     if name in _UNITS:
         return rf"\{_UNITS[name]}{power}"

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 WRITTEN = ".campaign-figures"
-"""Of a folder of figures: SHA-256 and name of each file that was written there, a line each."""
+"""Marker file of a folder of figures: a line with SHA-256 and name for each written file."""
 
 
 ALL = "all"
-"""Instead of `TEST/KEY`: every figure."""
+"""Selects every figure, instead of `TEST/KEY`."""
 
 
 def write_figures(
@@ -48,13 +48,13 @@ def write_figures(
 ) -> tuple[tuple[Path, ...], tuple[Damage, ...]]:
     """Write the SVG and the CSV file of the figure `TEST/KEY`, or of all, into the folder `output`.
 
-    The whole report is laid out for it: colours, names and what stands beside a curve follow from
-    all of it, so that the bytes are those of the report's own files.
+    The layout of the whole report is made, because it determines colours, names and published
+    values. The bytes are those of the report's own files.
 
-    column: drawn 88 or 180 mm wide in place of that, with PDF files; names end with it.
+    column: width of a journal's column, 88 or 180 mm, with PDF files; file names end with it.
 
-    Returns the paths of the drawings, and what of the run is damaged. Raises UsageError when the
-    run has no such figure, when a file of that name is somebody's own, or when the folder cannot be
+    Returns the paths of the drawings, and the damage of the run. Raises UsageError when the run has
+    no such figure, when a file of that name is not from campaign, or when the folder cannot be
     written.
     """
     document = document_of(run, experiments, measure_anew=measure_anew)
@@ -89,12 +89,12 @@ def write_figures(
 
 
 def sheet_of(tests: Sequence[AnalysedTest], compared: Published, wanted: str) -> Canvas:
-    """A figure of a run as matplotlib draws it, with what is published beside it.
+    """Matplotlib figure of a run, with its published values.
 
-    wanted: `TEST/KEY`; a test's name for its most telling figure; a key that one figure alone has;
-        "" for the figure on top of the report.
+    wanted: `TEST/KEY`; a test's name for its leading figure; a unique key; "" for the figure on top
+        of the report.
 
-    Raises UsageError when no figure, or more than one, is meant.
+    Raises UsageError when `wanted` selects no figure, or several.
     """
     drawings = {f"{name}/{key}": each for (name, key), each in drawings_of(tests, compared).items()}
     meant = [name for name in drawings if name.partition("/")[2] == wanted]
@@ -113,7 +113,7 @@ def sheet_of(tests: Sequence[AnalysedTest], compared: Published, wanted: str) ->
 
 
 def _write(output: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, none of them in place of one that was not written here."""
+    """Write files into a folder without replacing a file that campaign did not write."""
     new = {f"{_digest(data)}  {name}": data for name, data in files.items()}
     marker = output / WRITTEN
     try:
@@ -130,7 +130,7 @@ def _write(output: Path, files: Mapping[str, bytes]) -> None:
                     " name another folder with --output, or move it away"
                 )
         output.mkdir(parents=True, exist_ok=True)
-        # What is written stands here before it is: whatever happens, it is known for ours.
+        # The marker lists files before they are written, so that after a crash they are known.
         replace_file(marker, "".join(f"{line}\n" for line in dict.fromkeys((*ours, *new))).encode())
         for line, data in new.items():
             replace_file(output / line.partition("  ")[2], data)

@@ -13,17 +13,17 @@ from campaign.errors import UsageError
 from campaign.plain_text import on_a_page
 
 MARKER = ".campaign-report"
-"""A file that says the folder is a report and may be replaced by a newer one.
+"""File that marks the folder as a report, which a newer one may replace.
 
-Its first line is for people; each further one has the SHA-256 of a file that was written, and its
-name. Whatever else is in the folder, or was changed there, is somebody's own.
+Its first line is for users; each further line has SHA-256 and name of a written file. All other or
+changed files in the folder belong to the user.
 """
 EDITED = ".edited"
-"""What the name of a file ends with that somebody had changed, once there is a new one."""
+"""Suffix of a file that the user changed, if there is a new one of the same name."""
 
 
 def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:
-    """Write texts by their names, in folders or not."""
+    """Write texts by file name, which may include a subfolder."""
     for name, text in files:
         path = folder / name
         path.parent.mkdir(exist_ok=True)
@@ -31,7 +31,7 @@ def write_files(folder: Path, files: Iterable[tuple[str, str]]) -> None:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """The whole file or the old one, also when somebody interrupts."""
+    """Replace a file atomically, also in case of an interrupt."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.write_bytes(data)
@@ -41,7 +41,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def refuse_other(output: Path, page: str) -> None:
-    """Raises UsageError when `output` is there, and no folder with that page."""
+    """Raise UsageError when `output` exists and is no folder with `page`."""
     _refuse_foreign(output)
     if (output / MARKER).is_file() and not (output / page).is_file():
         raise UsageError(
@@ -51,11 +51,11 @@ def refuse_other(output: Path, page: str) -> None:
 
 @contextmanager
 def replaced_folder(output: Path) -> Iterator[Path]:
-    """An empty folder beside `output` that takes its place when the block ends without an error.
+    """Empty folder beside `output` that replaces it when the block ends without an error.
 
-    An older report at `output` stays until then, and stays for good when the block fails. Files
-    that somebody has put into it, or changed, are carried over. Raises UsageError when `output` is
-    something other than a report, or cannot be written.
+    An older report at `output` stays until then, and remains when the block fails. Files that the
+    user added or changed are copied. Raises UsageError when `output` is no report, or cannot be
+    written.
     """
     _refuse_foreign(output)
     new = output.with_name(f".{output.name}.new-{os.getpid()}")
@@ -68,9 +68,9 @@ def replaced_folder(output: Path) -> Iterator[Path]:
         yield new
         written = _digests(new)
         _carry_over(output, new)
-        told = "This folder is written by campaign; what you put here yourself stays.\n"
+        head = "This folder is written by campaign; what you put here yourself stays.\n"
         lines = (f"{digest}  {name}\n" for name, digest in written.items())
-        (new / MARKER).write_text(told + "".join(lines), encoding="utf-8")
+        (new / MARKER).write_text(head + "".join(lines), encoding="utf-8")
         _swap(new, output, old)
     except OSError as error:
         raise UsageError(f"{output}: the report cannot be written: {error.strerror}") from None
@@ -80,7 +80,7 @@ def replaced_folder(output: Path) -> Iterator[Path]:
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file but the marker, by its path in the folder, sorted."""
+    """SHA-256 of each file except the marker, by path in the folder, sorted."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MARKER)
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
@@ -89,7 +89,7 @@ def _digests(folder: Path) -> dict[str, str]:
 
 
 def _carry_over(output: Path, new: Path) -> None:
-    """Copy what in the older report is not as it was written; of a former version nobody knows."""
+    """Copy files of the older report that the user added or changed; none without digests."""
     marker = output / MARKER
     lines = marker.read_text(encoding="utf-8").splitlines()[1:] if marker.is_file() else []
     if not lines:

@@ -1,7 +1,7 @@
 """Colors, dashes and markers: distinct in greyscale and for color-blind readers.
 
-Each colour has a light page's and a dark page's value; both reach the 3:1 contrast that WCAG 2.1
-(1.4.11) asks of graphics, and text colours the 4.5:1 of 1.4.3.
+Each colour has values for the light and the dark page. Both have the 3:1 contrast that WCAG 2.1
+(1.4.11) requires of graphics, and text colours the 4.5:1 of 1.4.3.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from campaign.published.status import Status
 
 @dataclass(frozen=True)
 class Look:
-    """How a series is drawn.
+    """Look of a series in drawings.
 
     Attributes:
-        name: of its CSS variable on the page.
+        name: name of its CSS variable on the page.
         light, dark: colour on the light and on the dark page.
         dash: on and off lengths in line widths; empty for a solid line.
-        marker: matplotlib's sign for it.
+        marker: its marker in matplotlib.
     """
 
     name: str
@@ -34,7 +34,7 @@ PAPER = Look("paper", "#ffffff", "#191c20", (), "")
 INK = Look("ink", "#1c1f23", "#e6e8ea", (), "")
 MUTED = Look("muted", "#5b626a", "#a3abb3", (), "")
 HAIRLINE = Look("hairline", "#d9dde1", "#383e45", (), "")
-"""Grid lines and table rules: they carry no information of their own."""
+"""Grid lines and table rules, which have no information of their own."""
 
 _BLUE = ("#0067b0", "#5cb3f2")
 _ORANGE = ("#c9540a", "#ff9a56")
@@ -61,10 +61,10 @@ SERIES = {
     "alternative": Look("s-alternative", *_CYAN, (2.2, 1.2), "d"),
     "reference": Look("s-reference", MUTED.light, MUTED.dark, (1.2, 1.6), "x"),
 }
-"""The series the program itself draws: the same look in every figure of every report."""
+"""Looks of the program's own series, the same in every figure of every report."""
 
 _COLOURS = (_BLUE, _ORANGE, _GREEN, _RED, _GREY, _PINK, _BROWN, _INDIGO)
-"""The first five are told apart by every eye: few charts have more lines."""
+"""The first five are distinct also for color-blind readers; few charts have more lines."""
 _DASHES = (
     (),
     (5.5, 1.8),
@@ -79,14 +79,14 @@ _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "d")
 
 
 def _other(place: int) -> Look:
-    """The look of a series without one of its own: no two of 64 share dash and marker."""
+    """Look of a further series: no two of 64 share dash and marker."""
     round_, within = divmod(place, len(_COLOURS))
     marker = _MARKERS[(within + round_) % len(_MARKERS)]
     return Look(f"s-other-{within + 1}", *_COLOURS[within], _DASHES[within], marker)
 
 
 OTHERS = tuple(_other(place) for place in range(len(_COLOURS) * len(_MARKERS)))
-"""For any other series, in the order in which a report first names them."""
+"""Looks of other series, in the order of their first occurrence in a report."""
 
 STATUS = {
     Status.SIMULATED: Look("st-simulated", *_BLUE, (), "o"),
@@ -100,20 +100,20 @@ STATUS = {
     Status.INCONSISTENT: Look("st-inconsistent", *_RED, (), "X"),
     Status.NOT_REPRODUCIBLE: Look("st-not-reproducible", *_GREY, (), "x"),
 }
-"""Colour and sign of each status, on the scoreboard and beside every number."""
+"""Colour and marker of each status, on the scoreboard and beside every number."""
 
 
 def looks(series: Iterable[str]) -> dict[str, Look]:
-    """A look for each series of one figure, in the order they appear in it."""
+    """Look of each series of one figure, in the order of occurrence."""
     return looks_of_page([series])
 
 
 def looks_of_page(figures: Iterable[Iterable[str]]) -> dict[str, Look]:
-    """A look for each series of all figures of a page, the same in all of them.
+    """Look of each series of a page, the same in all figures.
 
-    figures: the names of each figure's series, in the order of the page. A series that has no look
-    of its own takes the first one that nothing beside it has, in any figure: two that are never
-    seen together may look alike.
+    figures: names of each figure's series, in the order of the page. A series without a look of its
+    own gets the first one that no other series in the same figures has. Two series that never share
+    a figure may have the same look.
     """
     chosen: dict[str, Look] = {}
     beside: dict[str, dict[str, None]] = {}
@@ -129,10 +129,10 @@ def looks_of_page(figures: Iterable[Iterable[str]]) -> dict[str, Look]:
 
 
 def _unlike(taken: Sequence[Look]) -> Look:
-    """A look that cannot be mistaken for any of those beside it, by colour nor in grey.
+    """Look that differs from all `taken` ones in colour and in dash, thus also in grey.
 
-    Where no colour is left, the dash is unlike; where no dash is, dash and marker together; past 64
-    series looks repeat.
+    Without a free colour, only the dash differs; without a free dash, the pair of dash and marker.
+    After 64 series, looks repeat.
     """
     colours, dashes = {look.light for look in taken}, {look.dash for look in taken}
     pairs = {(look.dash, look.marker) for look in taken}
@@ -143,7 +143,7 @@ def _unlike(taken: Sequence[Look]) -> Look:
 
 
 def variables() -> dict[str, tuple[str, str]]:
-    """CSS variable to its colour on the light and on the dark page, sorted."""
+    """Colour on the light and on the dark page by CSS variable, sorted."""
     all_looks = (PAPER, INK, MUTED, HAIRLINE, *SERIES.values(), *OTHERS, *STATUS.values())
     return {look.name: (look.light, look.dark) for look in sorted(all_looks, key=lambda a: a.name)}
 

@@ -1,7 +1,7 @@
 """Imports shared by analysis and drawing processes, made while a run opens.
 
-Imported by nobody else: it has every experiment of the program imported, and draws something, as
-the first drawing of a process looks for its fonts.
+No other module imports this one. It imports every experiment of the program, and draws a figure,
+because the first drawing of a process searches for fonts.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from campaign.report.drawing.figures import draw
 from campaign.result import Axis, Curve, Figure, Panel
 
 for _name in experiments():
-    if experiments().plug_in(_name) is None:  # what others have installed may do anything
+    if experiments().plug_in(_name) is None:  # a plug-in may have side effects
         experiments()[_name]
 
 _LINE = Curve(np.arange(2.0), np.arange(2.0))

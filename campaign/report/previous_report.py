@@ -1,8 +1,8 @@
 """Extra files of an existing report, to be made again.
 
-Who asked once for a PDF or for a trial's page keeps it: a report that is written again without the
-option makes those files from the same analysis as its page, so that none is of an older one. A file
-that was removed by hand is not made again.
+A report that is written again keeps its PDF and its pages of trials without the options for them.
+These files are made from the same analysis as the page, so that none is outdated. Files that the
+user removed are not made again.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from campaign.report.formats.interface import Format
 from campaign.report.page.names import trial_file
 
 MADE = ".campaign-made.json"
-"""Of the report's folder: of which run it is, the files of each format, the trials with a page."""
+"""File in the report's folder with the run, the files of each format, the trials with a page."""
 
 
 @dataclass(frozen=True)
 class MadeBefore:
-    """What an earlier report of the same run has made besides, as far as it is still there.
+    """Existing extra files of an earlier report of the same run.
 
     Attributes:
-        formats: names, as `--format` takes them.
-        trials: numbers of those with a page of their own.
+        formats: names, as for `--format`.
+        trials: numbers of the trials with a page.
     """
 
     formats: tuple[str, ...] = ()
@@ -39,12 +39,12 @@ class MadeBefore:
 
 @dataclass
 class Formats:
-    """The formats of a report, those that were asked for and those that it had before.
+    """Formats of a report: requested ones, and those of the earlier report.
 
     Attributes:
-        asked: one of these that cannot be made costs the whole report.
-        again: one of these costs itself.
-        left_out: why one of `again` is not made, a line each.
+        asked: requested formats; if one fails, the whole report fails.
+        again: earlier formats; if one fails, only this one is omitted.
+        left_out: reasons why formats of `again` are omitted, a line each.
     """
 
     asked: tuple[Format, ...]
@@ -56,12 +56,12 @@ class Formats:
         return (*self.asked, *self.again)
 
     def leave_out(self, name: str, error: UsageError) -> None:
-        """The earlier report's files of a format stay out of the new one: they would be stale."""
+        """Record an omitted format; the earlier report's files of it would be outdated."""
         self.left_out.append(f"{name}, which the earlier report had, is left out: {error}")
 
 
 def made_before(output: Path, run: RunReader) -> MadeBefore:
-    """What the report of `run` in the folder `output` has; nothing of another run, or of none."""
+    """Extra files of the report in `output`; empty if it is of another run, or no report."""
     try:
         tree = json.loads((output / MADE).read_bytes())
     except (OSError, ValueError, RecursionError):
@@ -79,24 +79,24 @@ def made_before(output: Path, run: RunReader) -> MadeBefore:
 
 
 def all_formats(asked: Sequence[Format], before: MadeBefore) -> Formats:
-    """Those that were asked for, and those of the earlier report that this machine can make."""
-    found = Formats(tuple(asked))
+    """Requested formats, and those of the earlier report that this machine can make."""
+    all_ = Formats(tuple(asked))
     names = {each.name for each in asked}
     for name in before.formats:
         if name not in names:
             try:
-                found.again += chosen_formats([name])
+                all_.again += chosen_formats([name])
             except UsageError as error:
-                found.leave_out(name, error)
-    return found
+                all_.leave_out(name, error)
+    return all_
 
 
 def remember(
     folder: Path, run: RunReader, formats: Mapping[str, Collection[str]], trials: Collection[int]
 ) -> None:
-    """Write down what a new report has besides its page; nothing where there is nothing.
+    """Record the extra files of a new report, if any.
 
-    formats: by name, the files that each has added.
+    formats: added files by name of the format.
     """
     if formats or trials:
         tree: dict[str, Any] = {
@@ -109,10 +109,10 @@ def remember(
 
 
 def _is_there(output: Path, files: object) -> bool:
-    """Whether a format's own files are all there; figures that it added are no document."""
+    """Whether all of a format's files exist; files in subfolders (figures) count only if alone."""
     names = [each for each in files if isinstance(each, str)] if isinstance(files, list) else []
     own = [name for name in names if "/" not in name] or names
     try:
         return bool(own) and all((output / name).is_file() for name in own)
-    except (OSError, ValueError):  # no name that a file could have
+    except (OSError, ValueError):  # no valid file name
         return False

@@ -1,9 +1,9 @@
 """Analysis and drawing of tests in several processes.
 
-What comes back is what one process would have made, to the byte. A process that dies, or that
-cannot be begun, costs time: what it should have done is then done here.
+The results are identical, to the byte, to those of one process. If a process dies or cannot start,
+the calling process does its work, which takes more time.
 
-Little is imported here: processes are at work while whoever begins them still imports the rest.
+This module imports little, so that processes start while the caller still imports the rest.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ if TYPE_CHECKING:
     from campaign.report.page.drawings import Drawable, Key
 
 WORTHWHILE = 200
-"""Trials from which on more processes than one take less time than they cost to begin."""
+"""Number of trials above which several processes save more time than their start takes."""
 PRELOADED = ("campaign.report.preload",)
-"""What every process needs, imported once for all of them."""
+"""Modules for every process, imported only once."""
 LARGE = 50_000_000
-"""Bytes of a sealed run from which on it probably has as many trials."""
+"""Bytes above which a sealed run probably has `WORTHWHILE` trials."""
 
 
 def choose_processes(run: RunReader) -> int:
-    """How many processes are worth while for a run on this machine."""
+    """Number of useful processes for a run on this machine."""
     many = len(run.trials) >= WORTHWHILE
     return min(os.cpu_count() or 1, len(run.header.tests)) if many else 1
 
 
 def begin_early(path: Path) -> None:
-    """Have what processes need imported while the run is opened, where it looks worth their while.
+    """Start the imports of processes while the run is opened, if the run is large.
 
-    A guess that was wrong costs a moment of another core, and none where there is but one.
+    A wrong guess only takes some time of another core; with a single core nothing is started.
     """
     large = path.is_file() and path.stat().st_size >= LARGE
     if large and (os.cpu_count() or 1) > 1:
@@ -55,7 +55,7 @@ def begin_early(path: Path) -> None:
 
 @dataclass
 class Workers:
-    """Processes that have a run open; none of them, and all is done where it is needed.
+    """Pool of processes with an open run; without a pool, the caller does the work.
 
     `measure_anew`: as for `analyse_run`.
     """
@@ -66,26 +66,26 @@ class Workers:
 
     @cached_property
     def found(self) -> Mapping[str, TestAnalysis]:
-        """What the analysis of each test finds, by test; it is waited for where it is asked for.
+        """Analysis of each test, by test; access to an item waits for it.
 
-        Analysing begins when this is first asked for. Only with the experiments of this
-        installation: an object that somebody made cannot be told to another process.
+        The first access starts the analyses. They use the experiments of this installation only,
+        because a process cannot receive other experiment objects.
         """
         tests = {str(test.get("name", "")): test for test in self.run.header.tests}
-        # The most trials first, so that none is left with a long one at the end.
+        # Tests with most trials first, so that no process ends with a long one.
         names = sorted(tests, key=lambda name: -len(self.run.trials_of(name)))
         return _Awaited(
             self._begun({name: (_find, tests[name], self.measure_anew) for name in names})
         )
 
     def draw(self, drawings: Mapping[Key, Drawable]) -> Callable[[Key], DrawingFiles | None]:
-        """Begin to draw; what is returned waits for a drawing, and has none that cannot be made."""
+        """Start the drawings; the returned function waits for one, and returns None on failure."""
         longest_first = sorted(drawings.items(), key=lambda item: -item[1].work)
         begun = self._begun({key: (_draw, drawing) for key, drawing in longest_first})
         return lambda key: _result(begun[key]) if key in begun else None
 
     def _begun(self, work: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Future[Any]]:
-        """Each function with its arguments; nothing once a process has died."""
+        """Submit functions with their arguments; stop when a process has died."""
         begun: dict[Any, Future[Any]] = {}
         if self.pool is not None:
             with suppress(BrokenProcessPool):
@@ -96,15 +96,15 @@ class Workers:
 
 @dataclass(frozen=True, eq=False)
 class _Awaited(Mapping[str, "TestAnalysis"]):
-    """What processes find; what one died of is missing."""
+    """Analyses of the processes; those of a process that died are missing."""
 
     begun: Mapping[str, Future[Any]]
 
     def __getitem__(self, name: str) -> TestAnalysis:
-        found: TestAnalysis | None = _result(self.begun[name])
-        if found is None:
+        analysis: TestAnalysis | None = _result(self.begun[name])
+        if analysis is None:
             raise KeyError(name)
-        return found
+        return analysis
 
     def __iter__(self) -> Iterator[str]:
         return (name for name, future in self.begun.items() if _result(future) is not None)
@@ -114,7 +114,7 @@ class _Awaited(Mapping[str, "TestAnalysis"]):
 
 
 def _result(future: Future[Any]) -> Any:
-    """What a process made; None when it died of it."""
+    """Result of a process; None if it died."""
     try:
         return future.result()
     except BrokenProcessPool:
@@ -123,14 +123,14 @@ def _result(future: Future[Any]) -> Any:
 
 @contextmanager
 def workers(run: RunReader, count: int, *, measure_anew: bool = False) -> Iterator[Workers]:
-    """So many processes, for as long as the block lasts; fewer than two are none.
+    """Pool of `count` processes for the block, or no pool for fewer than two.
 
-    They begin to analyse at once.
+    The analyses start at once.
     """
     if count < 2:
         yield Workers(run, measure_anew=measure_anew)
         return
-    # What was read and checked here is handed over: reading it again takes ten times as long.
+    # The processes receive the data read and checked here; another read takes ten times as long.
     handed = run, known_heaps()
     with processes.process_pool(count, PRELOADED, _begin, handed) as pool:
         at_work = Workers(run, pool, measure_anew)
@@ -139,7 +139,7 @@ def workers(run: RunReader, count: int, *, measure_anew: bool = False) -> Iterat
 
 
 _run: RunReader | None = None
-"""Of a process of the pool: the run that it works on."""
+"""Run of a process of the pool."""
 
 
 def _begin(handed: tuple[RunReader, Mapping[Looked, bool]]) -> None:
@@ -161,5 +161,5 @@ def _find(test: Tree, measure_anew: bool) -> TestAnalysis:
 def _draw(drawing: Drawable) -> DrawingFiles | None:
     try:
         return drawing.made()
-    except Exception:  # noqa: BLE001 - it is drawn again where that is told
+    except Exception:  # noqa: BLE001 - the caller draws it again and reports the error
         return None

@@ -1,1 +1,1 @@
-"""What a report says, as data in a reader's units: no markup, no drawing."""
+"""Content of a report as data in display units, without markup and drawing."""

@@ -10,15 +10,15 @@ from campaign.archive import RunReader
 from campaign.report.latex_text import latex
 
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-"""As every bibliography style knows them."""
+"""Month macros of bibliography styles."""
 
 
 @dataclass(frozen=True)
 class Citation:
-    """What to write into one's own paper.
+    """Citation of a run in a paper.
 
     Attributes:
-        sentence: for a list of references that is written by hand.
+        sentence: entry for a list of references in plain text.
         bibtex: an entry for BibTeX and biblatex, under the run's name.
     """
 
@@ -27,10 +27,10 @@ class Citation:
 
 
 def citation_of(run: RunReader) -> Citation:
-    """Title, operator, day, program and, as what identifies the archive, its SHA-256.
+    """Citation with title, operator, day, program, and the SHA-256 of the archive.
 
-    The program is the one that executed the run. A run in progress has no archive yet, and its
-    citation says so: the digest is then of the journal as it stands.
+    The program is the one that executed the run. A run in progress has no archive yet; its citation
+    says so and has the SHA-256 of the current journal.
     """
     header = run.header
     title = run_title(run)
@@ -55,10 +55,10 @@ def citation_of(run: RunReader) -> Citation:
 
 
 def _whole(text: str) -> str:
-    """A field whose letters stay as large as they are, and that is not taken for several names."""
+    """A field that keeps its letter case and is not split into several names."""
     return f"{{{{{_field(text)}}}}}"
 
 
 def _field(text: str) -> str:
-    """Text within a field: BibTeX counts braces, escaped ones too."""
+    """Text within a field, without escaped braces, because BibTeX counts them."""
     return latex(text).replace(r"\{", r"\textbraceleft{}").replace(r"\}", r"\textbraceright{}")

@@ -15,7 +15,7 @@ from campaign.trial import Role, canonical_json
 
 
 def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterator[tuple[str, str]]:
-    """Kind, bench, sweep, and options that acted, in words and in the units of the protocol."""
+    """Kind, bench, sweep and effective options as text, in the units of the protocol."""
     units = units or TestUnits(test)
     yield "Experiment", test.kind
     if test.bench:
@@ -31,21 +31,21 @@ def conditions_of(test: AnalysedTest, units: TestUnits | None = None) -> Iterato
     points = _points(test)
     for path, values in points.items():
         yield f"{path_words(path)} (swept)", units.words(path, values)
-    told = points.keys() | _without_effect(test)
-    told |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
+    skip = points.keys() | _without_effect(test)
+    skip |= {units.listed_by(path) for path, values in points.items() if _lists(test, units, path)}
     for path, value in test.options.items():
-        if path not in told and value is not None and value != []:
+        if path not in skip and value is not None and value != []:
             yield path_words(path), _names(value) or units.value(path, value)
 
 
 def _names(value: Any) -> str:
-    """Of tables that have names only these; what is in them stands in a table of its own."""
+    """Names of named tables, whose content is in a table of its own; else ""."""
     named = isinstance(value, dict) and value and all(isinstance(v, dict) for v in value.values())
     return ", ".join(value) if named else ""
 
 
 def _points(test: AnalysedTest) -> dict[str, list[Any]]:
-    """What tells the measurements apart: dotted path to its different values (SI), as they come."""
+    """Swept values: distinct values (SI) by dotted path, in order of occurrence."""
     trials = [archived.trial for archived in test.trials]
     points: dict[str, dict[str, Any]] = {}
     for trial in [each for each in trials if each.role is Role.MEASUREMENT] or trials:
@@ -55,7 +55,7 @@ def _points(test: AnalysedTest) -> dict[str, list[Any]]:
 
 
 def _lists(test: AnalysedTest, units: TestUnits, path: str) -> bool:
-    """Whether an option only lists what the sweep of the experiment's own says again."""
+    """Whether an option lists the same values as the experiment's own sweep."""
     listed, swept = test.options.get(units.listed_by(path)), _points(test)[path]
     if not isinstance(listed, list) or len(listed) != len(swept):
         return False
@@ -69,19 +69,19 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _without_effect(test: AnalysedTest) -> frozenset[str]:
-    """Options that did nothing in any trial; empty where the experiment does not know them."""
+    """Options without effect in all trials; empty without a readable experiment."""
     trees = [trial.trial.options for trial in test.trials] or [test.options]
     if test.experiment is None:
         return frozenset()
     try:
-        found = [options_of(test.experiment, tree).without_effect() for tree in trees]
-    except ValueError:  # of another version of the experiment
+        inactive = [options_of(test.experiment, tree).without_effect() for tree in trees]
+    except ValueError:  # another version of the experiment
         return frozenset()
-    return frozenset.intersection(*found)
+    return frozenset.intersection(*inactive)
 
 
 def summary_of(test: AnalysedTest) -> str:
-    """The conditions in a line: what ran, where, and how often."""
+    """The conditions in one line: kind, bench, number of trials, source."""
     parts: Sequence[str] = (
         test.kind.replace("_", " "),
         f"bench {test.bench.name}" if test.bench else "",

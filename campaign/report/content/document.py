@@ -37,16 +37,15 @@ ANEW = "the program that made this page, whatever is archived"
 
 @dataclass(frozen=True)
 class Document:
-    """What a report says; nothing in it knows a page.
+    """Content of a report, independent of the page.
 
     Attributes:
         tests: in the protocol's order.
-        published: the values that the run's protocol compares with, by table.
-        truths: by test, what is true beside what it found, or what its compensations hold, where
-            that is known.
-        references: what bench files, and files of reference values, state of what was found.
-        damaged: what of the run is damaged, as far as the report looked at it.
-        measured_by: whose code found what each recording says by itself.
+        published: published values of the run's protocol, by table.
+        truths: table of true values, or of compensation values, by test, if known.
+        references: comparison of findings with bench files and files of reference values.
+        damaged: damage of the run that the report detected.
+        measured_by: program that computed the metrics of the recordings.
     """
 
     run: RunReader
@@ -67,19 +66,19 @@ class Document:
 
     @property
     def command(self) -> str:
-        """What repeats this run, where its protocol lies."""
+        """Command that repeats this run, in the folder of its protocol."""
         return shlex.join(_command_words(self.run))
 
     @property
     def backend(self) -> str:
-        """What executed the trials, and the options that it had, in words."""
+        """Backend of the trials with its options, as text."""
         header = self.run.header
         options = (f"{name}: {text}" for name, text in tree_settings(header.backend_options))
         return ", ".join([header.backend or "not stated", *options])
 
     @property
     def seeds(self) -> str:
-        """The seeds of its trials, in a few words."""
+        """Seeds of the trials as a short text."""
         seeds = sorted({trial.trial.seed for trial in self.trials})
         if len(seeds) <= 4:
             return ", ".join(str(seed) for seed in seeds)
@@ -87,9 +86,9 @@ class Document:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """The documents whose numbers are compared with."""
-        found = (self.published[name].source for name in self.scoreboard.tables())
-        return tuple(dict.fromkeys(found))
+        """Source documents of the compared published values."""
+        documents = (self.published[name].source for name in self.scoreboard.tables())
+        return tuple(dict.fromkeys(documents))
 
     @property
     def failed(self) -> tuple[ArchivedTrial, ...]:
@@ -98,12 +97,12 @@ class Document:
 
     @property
     def lost(self) -> int:
-        """How many trials cannot be read: they were executed, or nobody knows whether they were."""
+        """Number of trials that cannot be read: executed ones, and ones that perhaps were."""
         return len(lost_trials(self.run)) + hidden_trials(self.run)
 
     @property
     def not_executed(self) -> int:
-        """How many planned trials were not executed."""
+        """Number of planned trials that were not executed."""
         return max(0, len(self.run.plan) - len(self.trials) - self.lost)
 
 
@@ -116,13 +115,13 @@ def document_of(
     shown: Collection[int] = (),
     files: Files = NO_FILES,
 ) -> Document:
-    """Analyse a run and say what there is to say of it.
+    """Analyse a run and collect the content of its report.
 
-    `measure_anew`, `found`: as for `analyse_run`. `shown`: trials that have pages of their own,
-    with all of their samples. `files`: of reference values.
+    `measure_anew`, `found`: as for `analyse_run`. `shown`: trials with a page of their own, which
+    needs all samples. `files`: files of reference values.
     """
-    trials = tuple(run.trials)  # held: a page asks for them in many places
-    happened = incidents(run)  # before what is found is waited for
+    trials = tuple(run.trials)  # kept, because a page reads them often
+    happened = incidents(run)  # before the wait for analyses
     published = published_of(run)
     tests = analyse_run(run, experiments, measure_anew=measure_anew, found=found)
     _, of_pages = readable(run.path, [t for t in trials if t.trial.number in shown])
@@ -146,7 +145,7 @@ def document_of(
 
 
 def _measured_by(trials: Iterable[ArchivedTrial]) -> str:
-    """Whose code found what each recording says by itself, when it was executed."""
+    """Program that computed the metrics of the recordings during the run."""
     return "; ".join(sorted({trial.measured_by for trial in trials if trial.measured_by}))
 
 

@@ -32,7 +32,7 @@ ONE_EACH = Cause(
 
 @dataclass(frozen=True)
 class Drift:
-    """RMS of one channel over the measuring window, trial by trial, in the channel's SI unit."""
+    """RMS of one channel over the measuring window, per trial, in the channel's SI unit."""
 
     test: str
     label: str
@@ -43,7 +43,7 @@ class Drift:
 
 
 def drifts_of(run: RunReader) -> tuple[list[Drift], list[str], list[Damage]]:
-    """One drift per test with checks, why there is none, and what of the trials is damaged."""
+    """Drift per test with checks, problems of tests without a drift, damage of the trials."""
     drifts: list[Drift] = []
     problems: list[str] = []
     damaged: list[Damage] = []
@@ -59,8 +59,8 @@ def drifts_of(run: RunReader) -> tuple[list[Drift], list[str], list[Damage]]:
             and not t.not_kept
         )
         try:
-            drift, _, found = without_damaged(run.path, same, partial(_drift, test))
-            damaged += found
+            drift, _, damage = without_damaged(run.path, same, partial(_drift, test))
+            damaged += damage
         except (ArchiveError, KeyError, ValueError) as error:
             if isinstance(error, ArchiveError):
                 damaged.append(Damage.of(run.path, error))
@@ -72,7 +72,7 @@ def drifts_of(run: RunReader) -> tuple[list[Drift], list[str], list[Damage]]:
 
 
 def _comparable(item: ArchivedTrial) -> bool:
-    """A check, or the measurement that it repeats."""
+    """Whether a trial is a check, or the measurement that checks repeat."""
     trial = item.trial
     return trial.role is Role.CHECK or (trial.role is Role.MEASUREMENT and trial.repeat == 1)
 
@@ -95,7 +95,7 @@ def _window(trial: ArchivedTrial) -> Recording:
 
 
 def _telling(recording: Recording, task: Task) -> str:
-    """What a change of the bench shows in: the error where the hull moves, else the current."""
+    """Channel that shows a change of the bench: the error if the base moves, else the current."""
     wanted = [MOTOR_CURRENT, DRIVE_TORQUE, GYRO_RATE, RELATIVE_RATE]
     if task.base_acceleration.shape != "zero":
         wanted.insert(0, POINTING_ERROR)
@@ -104,7 +104,7 @@ def _telling(recording: Recording, task: Task) -> str:
 
 
 def drift_table(drift: Drift) -> Table:
-    """Each trial, its RMS, and how far that is from the first."""
+    """Table of each trial's RMS and its change from the first."""
     rows: list[dict[str, Value]] = [
         {
             "trial": item.trial.number,
@@ -129,7 +129,7 @@ def drift_table(drift: Drift) -> Table:
 
 
 def drift_figure(drift: Drift) -> Figure:
-    """The change over the number of the trial."""
+    """Figure of the change over the trial number."""
     numbers = np.array([float(item.trial.number) for item in drift.trials])
     changes = [_change(rms, drift.rms[0]) for rms in drift.rms]
     y = np.array([np.nan if change is None else change for change in changes])
@@ -153,7 +153,7 @@ def drift_figure(drift: Drift) -> Figure:
 
 
 def _largest_words(drift: Drift, changes: Array) -> str:
-    """`; the largest, -1.2 %, is trial 14`, of the changes as they are drawn, shape (n,)."""
+    """`; the largest, -1.2 %, is trial 14`; `changes` as drawn, shape (n,)."""
     if not np.any(np.abs(changes) > 0):
         return ""
     at = int(np.nanargmax(np.abs(changes)))

@@ -25,17 +25,16 @@ FROM = {
     "recording": "from recordings",
 }
 MANY = 6
-"""Most tests whose key numbers stand on top; of more, that many are chosen: nobody reads those of
-twenty tests in a minute."""
+"""Most tests whose key numbers are on the first screen; of more tests, this many are selected."""
 CLOSE = (5, 10)
-"""Percent of the published value that the first screen counts by, two of `LIMITS`."""
+"""Deviation limits on the first screen, in percent of the published value; two of `LIMITS`."""
 INTERVALS = (
     "± and brackets behind a number: 95 % interval, systematic parts of known size included."
 )
 ROOM, FEWEST = 18, 2
-"""Key numbers that it has room for, and how many it has of each test, however many there are."""
+"""Total number of key numbers on the first screen, and minimum for each test."""
 ENOUGH = 4
-"""Key numbers from which on a test is as telling as any."""
+"""Number of key numbers with an interval above which the rank does not increase."""
 
 
 @dataclass(frozen=True)
@@ -92,21 +91,21 @@ class FirstScreen:
 
     @property
     def shown(self) -> tuple[Answer, ...]:
-        """The main tests, or all where they are few, each with the first of its numbers."""
+        """Answers of the main tests, or of all if few, each with its first key numbers."""
         chosen = [each for each in self.answers if not self.main or each.test in self.main]
         most = max(FEWEST, ROOM // max(1, sum(bool(each.numbers) for each in chosen)))
         return tuple(replace(each, numbers=each.numbers[:most]) for each in chosen)
 
     @property
     def left_out(self) -> str:
-        """That there are more key numbers than are shown; "" where there are not."""
+        """Sentence on key numbers that are not shown; "" if all are."""
         shown = sum(len(each.numbers) for each in self.shown)
         every = sum(len(each.numbers) for each in self.answers)
         return f"{shown} of {every}; the report's sections have all." if shown < every else ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Those of the tests that are shown, each once with the tests that it is of."""
+        """Remarks of the shown tests, each once with the titles of its tests."""
         shown = [each for each in self.shown if each.numbers]
         titles: dict[str, list[str]] = {}
         for each in shown:
@@ -126,7 +125,7 @@ def opening_of(
     references: References,
     damaged: Sequence[Damage] = (),
 ) -> FirstScreen:
-    """The opening of a run's report; `damaged` is all damage that the report met."""
+    """First screen of a run's report; `damaged` is all damage that the report detected."""
     units = units_of(tests, run.header)
     return FirstScreen(
         tuple(
@@ -144,27 +143,26 @@ def opening_of(
 
 
 def _main(tests: Sequence[AnalysedTest]) -> tuple[str, ...]:
-    """Of many tests one of each of the kinds that tell most, in the protocol's order.
+    """Select one test of each kind, at most `MANY`, in the protocol's order; () for few tests.
 
-    Those that reproduce printed numbers go first, then those that have more key numbers with an
-    interval, up to `ENOUGH`: what a computation without noise comes to is known to all digits, and
-    of nothing but itself.
+    Tests that reproduce printed numbers go first, then those with more key numbers with an
+    interval, up to `ENOUGH`. The exact result of a noise-free computation has no interval.
     """
     if len(tests) <= MANY:
         return ()
-    told: dict[str, list[tuple[tuple[bool, int], str]]] = {}
+    by_kind: dict[str, list[tuple[tuple[bool, int], str]]] = {}
     for test in tests:
         if test.result.key_numbers and not test.problem:
             printed = any(not name.startswith("figure") for name in test.reproduces)
             rank = printed, min(ENOUGH, _tells(test))
-            told.setdefault(test.kind, []).append((rank, test.name))
-    best = [max(own, key=lambda each: each[0]) for own in told.values()]
+            by_kind.setdefault(test.kind, []).append((rank, test.name))
+    best = [max(own, key=lambda each: each[0]) for own in by_kind.values()]
     chosen = [name for _, name in sorted(best, key=lambda each: each[0], reverse=True)[:MANY]]
     return tuple(test.name for test in tests if test.name in chosen)
 
 
 def _tells(test: AnalysedTest) -> int:
-    """How many of its key numbers have an interval."""
+    """Number of key numbers with an interval."""
     return sum(shows_interval(each.known) for each in test.result.key_numbers)
 
 
@@ -194,7 +192,7 @@ def _answer(
 
 
 def _nothing(test: AnalysedTest) -> str:
-    """Why an analysis that went through found nothing; "" where it found something."""
+    """Reason why an analysis without error has an empty result; "" if it has a result."""
     if not test.result.is_empty:
         return ""
     if test.trials and len(test.failed) == len(test.trials):
@@ -203,32 +201,32 @@ def _nothing(test: AnalysedTest) -> str:
 
 
 def _held(truth: Table) -> str:
-    """How many intervals hold the true value, and which quantities are off all the same."""
-    told = held(truth.rows)
-    return "; ".join((*([f"{told} of the simulated bench"] if told else []), *biases(truth.rows)))
+    """Count of intervals that contain the true value, and the biases."""
+    count = held(truth.rows)
+    return "; ".join((*([f"{count} of the simulated bench"] if count else []), *biases(truth.rows)))
 
 
 # The figure on top --------------------------------------------------------------------------------
 
 
 def leading_figure(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
-    """Test and key of the figure on top of the page; None without any."""
+    """Test and key of the leading figure; None without any."""
     main = _main(tests)
     shown = [test for test in tests if not main or test.name in main]
     return _stated(tests) or _telling(shown) or _telling(tests)
 
 
 def most_telling(result: Result) -> Figure | None:
-    """The most telling figure of a result; None without any."""
+    """Figure that the result declares as leading, or else the first; None without any."""
     named = (figure for figure in result.figures if figure.key == result.telling)
     return next(named, next(iter(result.figures), None))
 
 
 def _stated(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
-    """Test and key of the figure that the protocol puts on top; None where it names none."""
+    """Test and key of the figure that the protocol puts on top; None if it names none."""
     named = ((test, test.leading_figure) for test in tests)
-    there = ((t.name, key) for t, key in named if any(f.key == key for f in t.result.figures))
-    return next(there, None)
+    matches = ((t.name, key) for t, key in named if any(f.key == key for f in t.result.figures))
+    return next(matches, None)
 
 
 def _without_stated(tests: Sequence[AnalysedTest]) -> Iterator[str]:
@@ -242,15 +240,17 @@ def _without_stated(tests: Sequence[AnalysedTest]) -> Iterator[str]:
 
 
 def _telling(tests: Sequence[AnalysedTest]) -> tuple[str, str] | None:
-    """Test and key of the figure that tells most.
+    """Test and key of the most informative figure.
 
-    One that draws intervals goes before one that does not; then the one whose test has more key
-    numbers with an interval. Of equal ones the first of the protocol.
+    Figures with intervals go first, then those of tests with more key numbers with an interval.
+    Among equal ones the first of the protocol wins.
     """
-    found = [(test, figure) for test in tests if (figure := most_telling(test.result)) is not None]
-    if not found:
+    figures = [
+        (test, figure) for test in tests if (figure := most_telling(test.result)) is not None
+    ]
+    if not figures:
         return None
-    test, figure = max(found, key=lambda pair: (_has_intervals(pair[1]), _tells(pair[0])))
+    test, figure = max(figures, key=lambda pair: (_has_intervals(pair[1]), _tells(pair[0])))
     return test.name, figure.key
 
 
@@ -259,11 +259,11 @@ def _has_intervals(figure: Figure) -> bool:
     return any(curve.low is not None or curve.high is not None for curve in curves)
 
 
-# What was asked, and what others found ------------------------------------------------------------
+# Sentences on the run -----------------------------------------------------------------------------
 
 
 def _asked(run: RunReader, tests: Sequence[AnalysedTest]) -> str:
-    """`3 tests, 35 trials on the bench platform, simulated.`"""
+    """Sentence such as `3 tests, 35 trials on the bench platform, simulated.`"""
     if not tests:
         return "The protocol has no test."
     trials, count = len(run.plan), "1 test" if len(tests) == 1 else f"{len(tests)} tests"
@@ -277,31 +277,31 @@ def _asked(run: RunReader, tests: Sequence[AnalysedTest]) -> str:
     if run.header.truth.plants:
         words.append("; the simulated bench is another one than plan and analysis use")
     if changes := run.header.overrides:
-        told = (f"{path} = {value}" for path, value in sorted(changes.items()))
-        words.append(f". Changed on the command line: {', '.join(told)}")
+        settings = (f"{path} = {value}" for path, value in sorted(changes.items()))
+        words.append(f". Changed on the command line: {', '.join(settings)}")
     return "".join(words) + "."
 
 
 def _compared(scoreboard: Scoreboard) -> str:
-    """How many published values are reproduced; those not fitted apart from the others."""
-    found = headline(scoreboard)
-    if not found.compared:
+    """Sentence on the reproduced published values; those not fitted are counted separately."""
+    summary = headline(scoreboard)
+    if not summary.compared:
         return ""
-    free = [count for count in found.counts if count.status in NOBODY_FITTED]
-    others = [count for count in found.counts if count.status not in NOBODY_FITTED]
+    free = [count for count in summary.counts if count.status in NOBODY_FITTED]
+    others = [count for count in summary.counts if count.status not in NOBODY_FITTED]
     shares = [
         f"{sum(each.good for each in counts)} of {sum(each.compared for each in counts)} {which}"
         for counts, which in ((free, "not fitted"), (others, "others" if free else ""))
         if counts
     ]
-    what = "published value" if found.compared == 1 else "published values"
+    what = "published value" if summary.compared == 1 else "published values"
     fitted = "" if free else ", none of which is a prediction"
     near = [
-        f"{sum(each.within[LIMITS.index(limit)] for each in found.counts)} within {limit} %"
+        f"{sum(each.within[LIMITS.index(limit)] for each in summary.counts)} within {limit} %"
         for limit in CLOSE
     ]
-    numbers = sum(each.numbers for each in found.counts)
+    numbers = sum(each.numbers for each in summary.counts)
     close = f" Of {numbers} numbers, {' and '.join(near)}." if numbers else ""
-    return f"{found.compared} {what} compared. Reproduced: {' and '.join(shares)}".rstrip() + (
+    return f"{summary.compared} {what} compared. Reproduced: {' and '.join(shares)}".rstrip() + (
         f"{fitted}.{close}"
     )

@@ -1,9 +1,9 @@
 """True, stated and identified values of compensations.
 
-`campaign identify` leaves a twin beside a compensation, which holds what was identified. Both have
-a model of all friction together, so that what is true of a number is a sum over the interfaces, or
-the number of one of them: the table says which. Published values and how their document came to
-them stand beside both, where the bench says that it was made from a document.
+`campaign identify` adds a twin to a compensation, with the identified values. Both model the total
+friction. A true value is therefore a sum over the interfaces, or the number of one interface; the
+table states which. If the bench was made from a document, published values and the remarks on them
+stand beside both.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ CURVE = {
     "viscous_friction": "N m s/rad",
 }
 UNITS = {**BRISTLES, INERTIA: "kg m^2", **CURVE}
-"""SI of a rotary axis, in the order of the rows: first what a curve of sliding does not tell."""
+"""SI units of a rotary axis, in row order: first quantities that a sliding curve does not show."""
 OF_ONE = (STRONGEST, "stribeck_velocity", "stribeck_exponent")
-"""Quantities of one interface; of all others a compensation has the sum."""
+"""Quantities of one interface; for all others a compensation has the sum."""
 DIRECTIONS = ("positive", "negative")
 SAME = 1e-4
-"""Share by which numbers may differ that are one, written by its parts and as a whole."""
+"""Relative tolerance between a sum of parts and the same number written as a whole."""
 LEVEL = 0.95
 
 
 @dataclass(frozen=True)
 class HeldValue:
-    """A number of a compensation, as it is stated and as its twin holds it (SI)."""
+    """A number of a compensation, stated and identified by its twin (SI)."""
 
     compensation: str
     quantity: str
@@ -71,21 +71,21 @@ class HeldValue:
 def held_tables(
     run: RunReader, tests: Iterable[AnalysedTest], published: Published
 ) -> dict[str, Table]:
-    """By test, what its compensations hold; where several hold the same, the first has the table.
+    """Table of compensation values, by test; of equal tables only the first is kept.
 
-    Only of a run on `sim`, and of compensations with a twin.
+    Applies to runs on `sim` and compensations with a twin.
     """
     if run.header.backend != SIMULATED:
         return {}
     benches = Benches(run.header.truth.plants)
-    told: list[tuple[HeldValue, ...]] = []
+    shown: list[tuple[HeldValue, ...]] = []
     tables = {}
     for test in tests:
         tried = {each.trial.task.compensation for each in test.trials}
         numbers = () if test.bench is None else held_by(test.bench, tried)
-        if not numbers or numbers in told:
+        if not numbers or numbers in shown:
             continue
-        told.append(numbers)
+        shown.append(numbers)
         with axis_terms(test.sides):
             table = _table(numbers, test, benches, published)
         if table is not None:
@@ -94,22 +94,22 @@ def held_tables(
 
 
 def held_by(bench: Bench, tried: Container[str]) -> tuple[HeldValue, ...]:
-    """What was identified of those compensations that were tried; what several hold alike is one.
+    """Identified values of the executed compensations; equal values of several are merged.
 
-    Of these the narrowest interval counts: a sum of parts knows less than what they were made of.
+    The merged value has the narrowest interval: a sum of parts is less certain than the total.
     """
-    found: list[HeldValue] = []
+    values: list[HeldValue] = []
     for name in bench.compensation:
         for each in _of_twin(bench, name) if identified_name(name) in tried else ():
-            place = next((n for n, other in enumerate(found) if _alike(each, other)), None)
+            place = next((n for n, other in enumerate(values) if _alike(each, other)), None)
             if place is None:
-                found.append(each)
+                values.append(each)
                 continue
-            narrow = min(found[place], each, key=lambda held: held.found.half_width)
-            both = f"{found[place].compensation}, {name}"
-            found[place] = replace(narrow, compensation=both)
+            narrow = min(values[place], each, key=lambda held: held.found.half_width)
+            both = f"{values[place].compensation}, {name}"
+            values[place] = replace(narrow, compensation=both)
     order = list(UNITS)
-    return tuple(sorted(found, key=lambda each: order.index(each.quantity)))  # stable
+    return tuple(sorted(values, key=lambda each: order.index(each.quantity)))  # stable
 
 
 def _alike(one: HeldValue, other: HeldValue) -> bool:
@@ -141,12 +141,12 @@ def _of_twin(bench: Bench, name: str) -> Iterator[HeldValue]:
         if value is None or sigma is None:
             continue
         half = NORMAL_95 * sigma
-        found = Estimate(quantity, value, UNITS[quantity], value - half, value + half, LEVEL)
-        yield HeldValue(name, quantity, conditions, _number(stated, quantity, conditions), found)
+        estimate = Estimate(quantity, value, UNITS[quantity], value - half, value + half, LEVEL)
+        yield HeldValue(name, quantity, conditions, _number(stated, quantity, conditions), estimate)
 
 
 def _as_bench(bench: Bench, name: str) -> Bench | None:
-    """The bench as a compensation knows it; None where it is not of all friction at the load."""
+    """Bench with the parameters of a compensation; None if these are not friction at the load."""
     options = bench.compensation[name]
     if options.method == "observer":
         inertia = bench.axis.inertia if options.inertia is None else options.inertia
@@ -159,23 +159,23 @@ def _as_bench(bench: Bench, name: str) -> Bench | None:
 
 
 def _number(bench: Bench, quantity: str, conditions: Mapping[str, str]) -> float | None:
-    """What is true of a bench with such friction; the damping of bristles alone, too."""
+    """True value of a bench; for bristle damping, the sum of the bristles' own damping."""
     if quantity != DAMPING:
         return true_value(bench, quantity, conditions)
-    found = []
+    dampings = []
     for options in bench.friction.values():
         own = getattr(options, DAMPING, None)
         if own is None:
             return None
         torque, rate = at_load(options, bench)
-        found.append(torque * rate * own)
-    return math.fsum(found) if found else None
+        dampings.append(torque * rate * own)
+    return math.fsum(dampings) if dampings else None
 
 
 def _uncertainty(
     bench: Bench, identified: Bench, twin: str, quantity: str, conditions: Mapping[str, str]
 ) -> float | None:
-    """Of a twin's number (1 sigma), its parts as if independent; None where one was not found."""
+    """1 sigma of a twin's number with independent parts; None if that of a part is unknown."""
     if quantity == INERTIA:
         return bench.known_uncertainty(f"compensation.{twin}.inertia")
     key = STRONGEST if quantity == AT_REST else quantity
@@ -188,7 +188,7 @@ def _uncertainty(
         sigma = bench.known_uncertainty(f"compensation.{twin}.friction.{name}.{way}{key}")
         if sigma is not None:
             parts.append(sigma)
-        elif getattr(identified.friction[name], key, None):  # what it leaves to others is zero
+        elif getattr(identified.friction[name], key, None):  # a zero needs no uncertainty
             return None
     return math.hypot(*parts) if parts else None
 
@@ -212,7 +212,7 @@ def _table(
     ]
     if not any(row["true"] is not None for row in rows):
         return None
-    found = [cell for cell in cells if cell is not None]
+    shown = [cell for cell in cells if cell is not None]
     columns = [
         Column("quantity", "Quantity"),
         Column("direction", "Direction"),
@@ -228,25 +228,25 @@ def _table(
     ]
     note = f"{held(rows)} (last column). " if held(rows) else ""
     note += "The parts of a sum count as independent. "
-    if found:
+    if shown:
         note += (
-            f"What the document, or a remark on it, says of its numbers: {' '.join(_how(found))}"
+            f"What the document, or a remark on it, says of its numbers: {' '.join(_how(shown))}"
         )
     return Table(
         key="truth",
         title="What compensations hold: published, stated, identified and true",
-        columns=tuple(c for c in columns if found or c.name not in ("published", "printed_in")),
+        columns=tuple(c for c in columns if shown or c.name not in ("published", "printed_in")),
         rows=tuple(rows),
         note=note.rstrip(),
     )
 
 
 def _row(number: HeldValue, cell: PublishedCell | None, simulated: Sequence[Bench]) -> Row:
-    """Without a true value where the simulated benches have none, or several."""
+    """Row of a number; no true value if the simulated benches have none, or several."""
     true = {_number(bench, number.quantity, number.conditions) for bench in simulated}
     value = true.pop() if len(true) == 1 else None
     unit = axis_unit(UNITS[number.quantity])
-    # Bristles' own damping is true of what their stiffness at rest is.
+    # The bristles' own damping applies to the same interfaces as their stiffness at rest.
     like = AT_REST if number.quantity == DAMPING else number.quantity
     return {
         "quantity": quantity_words(number.quantity),
@@ -266,17 +266,17 @@ def _row(number: HeldValue, cell: PublishedCell | None, simulated: Sequence[Benc
 def _printed(
     number: HeldValue, published: Published, known: Mapping[str, Value]
 ) -> PublishedCell | None:
-    """What is published of a number: of one bristle for all friction, of all or of one of them."""
+    """Published cell of a number; for the stiffness at rest, that of the bristle stiffness."""
     quantity = STRONGEST if number.quantity == AT_REST else number.quantity
     conditions = {**number.conditions, "statistic": "mean"}
     return cell_of(quantity, conditions, published.values(), known)
 
 
 def _how(cells: Sequence[PublishedCell]) -> Iterator[str]:
-    """Sentences: what the document says, or is to be known, of how it came to its numbers."""
-    said: dict[tuple[str, str], dict[str, None]] = {}
+    """Sentences with the reasons and remarks on published cells, grouped by table."""
+    remarks: dict[tuple[str, str], dict[str, None]] = {}
     for cell in cells:
         for reason in filter(None, (cell.reason, *cell.notes)):
-            said.setdefault((heading_of(cell.table), reason), {})[cell_name(cell)] = None
-    for (heading, reason), names in said.items():
+            remarks.setdefault((heading_of(cell.table), reason), {})[cell_name(cell)] = None
+    for (heading, reason), names in remarks.items():
         yield f"{heading}, {', '.join(names)}: {reason}."

@@ -1,6 +1,6 @@
 """Incidents of a run: decisions, operator steps, attempts, faults, drift.
 
-The journal and the trials tell it; nothing is left for the reader of a plain simulated run.
+The source is the journal and the trials; a plain simulated run has no incidents.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ BY_THE_BACKEND = Cause("one number of a backend", "the backend says one number o
 
 @dataclass(frozen=True)
 class Incidents:
-    """All there is to say of it; without figure and table, the page has no such section."""
+    """Incidents of a run; the page has no such section without figures and tables."""
 
     figures: tuple[Figure, ...]
     tables: tuple[Table, ...]
@@ -35,22 +35,22 @@ class Incidents:
 
 
 def incidents(run: RunReader) -> Incidents:
-    """What the journal and the trials of a run say of it."""
-    told = run.story
+    """Incidents from the journal and the trials of a run."""
+    story = run.story
     drifts, problems, damaged = drifts_of(run)
     loops, loop_problems = low_margin_table(run)
-    found = [
-        _decisions(told),
-        _steps(told),
-        attempts_table(told),
-        _stages(told),
+    tables = [
+        _decisions(story),
+        _steps(story),
+        attempts_table(story),
+        _stages(story),
         _faults(run),
         loops,
     ]
-    found += [drift_table(drift) for drift in drifts]
+    tables += [drift_table(drift) for drift in drifts]
     return Incidents(
         tuple(drift_figure(drift) for drift in drifts),
-        tuple(table for table in found if table.rows),
+        tuple(table for table in tables if table.rows),
         (*problems, *loop_problems),
         tuple(damaged),
     )
@@ -89,7 +89,7 @@ def _steps(told: Lines) -> Table:
 
 
 def attempts_table(told: Lines) -> Table:
-    """Every attempt of the trials that took more than one."""
+    """Table of all attempts of trials with more than one."""
     often = Counter(entry.trial for entry in told.attempts)
     rows: list[dict[str, Value]] = [
         {
@@ -136,17 +136,17 @@ def _stages(told: Lines) -> Table:
 
 
 def _faults(run: RunReader) -> Table:
-    """Trials with a fault, or with what the backend measured of its own work."""
+    """Table of trials with a fault or with telemetry of the backend."""
     rows: list[dict[str, Value]] = []
     names: dict[str, None] = {}
     for trial in run.trials:
         ending = trial.ending
         if ending.fault is None and not ending.telemetry:
             continue
-        telling = scalars(ending.telemetry)
-        names |= dict.fromkeys(telling)
+        numbers = scalars(ending.telemetry)
+        names |= dict.fromkeys(numbers)
         fault = ending.fault.value if ending.fault else ""
-        rows.append({"trial": trial.trial.number, "fault": fault, "why": ending.reason, **telling})
+        rows.append({"trial": trial.trial.number, "fault": fault, "why": ending.reason, **numbers})
     columns = (
         Column("trial", "Trial", exact=True),
         Column("fault", "Fault"),
@@ -162,11 +162,11 @@ def _label(name: str) -> str:
 
 
 def scalars(telemetry: Mapping[str, object], prefix: str = "") -> dict[str, Value]:
-    """The numbers, words and truths of nested tables by dotted name; lists are left out."""
-    found: dict[str, Value] = {}
+    """Scalars of nested tables by dotted name; lists are omitted."""
+    values: dict[str, Value] = {}
     for name, value in telemetry.items():
         if isinstance(value, Mapping):
-            found |= scalars(value, f"{prefix}{name}.")
+            values |= scalars(value, f"{prefix}{name}.")
         elif value is None or isinstance(value, str | int | float | bool):
-            found[prefix + name] = value
-    return found
+            values[prefix + name] = value
+    return values

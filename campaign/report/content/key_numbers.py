@@ -1,4 +1,4 @@
-"""Key numbers of each test as a reader is shown them."""
+"""Key numbers of each test as text."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ class KeyNumber:
 def shown_key_numbers(
     test: AnalysedTest, units: TestUnits, lines: Sequence[Line], truth: Table | None
 ) -> tuple[str, tuple[KeyNumber, ...]]:
-    """The conditions that all key numbers of a test share, and the numbers.
+    """Shared conditions of a test's key numbers, and the numbers.
 
-    lines: of the scoreboard. truth: the test's table of true values.
+    lines: lines of the scoreboard. truth: the test's table of true values.
     """
-    found = test.result.key_numbers
+    findings = test.result.key_numbers
     draws = len(draws_of(each.trial for each in test.trials))
-    every = [finding.conditions for finding in found]
+    every = [finding.conditions for finding in findings]
     shared: dict[str, Value] = {}
-    if len(found) > 1:
+    if len(findings) > 1:
         shared = {n: v for n, v in every[0].items() if all(n in c and c[n] == v for c in every)}
     wanted = test.experiment.key_numbers if test.experiment else ()
-    plain = {pair for each in wanted for pair in each.where.items()}  # what is meant without a word
+    plain = {pair for each in wanted for pair in each.where.items()}  # not shown: always the same
     own = [line for line in lines if line.test == test.name]
     with axis_terms(test.sides):
         numbers = tuple(
             _shown(test, finding, _where(rest, units), _published(finding, own, test), truth)
-            for finding, each in zip(found, every, strict=True)
+            for finding, each in zip(findings, every, strict=True)
             for rest in [{name: v for name, v in each.items() if name not in shared}]
         )
         rest = {name: v for name, v in shared.items() if (name, v) not in plain}
@@ -76,12 +76,12 @@ def shown_key_numbers(
 def _shown(
     test: AnalysedTest, finding: Finding, where: str, line: Line | None, truth: Table | None
 ) -> KeyNumber:
-    """As the scoreboard has it, if it is held against a published value; else as the test's tables.
+    """Text as in the scoreboard if compared with a published value, else as in the test's tables.
 
-    So that a verdict and the interval that it rests on stand together.
+    Thus a verdict stands beside the interval that it is based on.
     """
     quantity = quantity_words(finding.quantity)
-    # Of several draws the tables have each number, not their median.
+    # With several draws, the tables have each number, not the median.
     same = (
         f for f in test.result.findings if (f.quantity, f.unit) == (finding.quantity, finding.unit)
     )
@@ -97,13 +97,13 @@ def _shown(
 
 
 def _where(conditions: Mapping[str, Value], units: TestUnits) -> str:
-    told = sorted(conditions.items(), key=lambda pair: pair[0] not in WITHOUT_NAME)
-    told = [(n, v) for n, v in told if SAID_BY.get(n) not in conditions]
+    pairs = sorted(conditions.items(), key=lambda pair: pair[0] not in WITHOUT_NAME)
+    pairs = [(n, v) for n, v in pairs if SAID_BY.get(n) not in conditions]
     texts = (
         WITHOUT_NAME[name](str(value))
         if name in WITHOUT_NAME
         else conditions_text({name: value}, units)
-        for name, value in told
+        for name, value in pairs
     )
     return ", ".join(filter(None, texts)).replace("_", " ")
 
@@ -118,24 +118,24 @@ WITHOUT_NAME: dict[str, Callable[[str], str]] = {
     "compensation": _compensation,
     "model": model_label,
 }
-"""Conditions whose value is clear without their name, and what it is called."""
+"""Conditions whose value is clear without their name, with the function for its text."""
 SAID_BY = {"bench.gear.preload.torque": "average_friction"}
-"""Conditions that are the same number as another one."""
+"""Conditions that repeat the number of another condition."""
 
 
 def _published(finding: Finding, lines: Sequence[Line], test: AnalysedTest) -> Line | None:
-    """The published value that it is held against; doubtful cells are none."""
+    """Line of the published value of a finding, without inconsistent cells; None without one."""
     known = test.evidence().known if lines else {}
     sound = (line for line in lines if line.status is not Status.INCONSISTENT)
     return next((line for line in sound if concerns(finding, line.cell, known)), None)
 
 
 def _true(finding: Finding, display: str, truth: Table | None) -> str:
-    """The value beside which the test's own table holds it."""
+    """True value as text from the row of the finding in `truth`; "" without one."""
     rows = () if truth is None else truth.rows
     for row in rows:
         if row["found"] == finding.known and isinstance(value := row["true"], float):
-            told = number(convert(value, finding.unit, display), SHORT)
+            text = number(convert(value, finding.unit, display), SHORT)
             outside = " (outside)" if row["inside"] == "no" else ""
-            return f"{told} {pretty_unit(display)}".rstrip() + outside
+            return f"{text} {pretty_unit(display)}".rstrip() + outside
     return ""

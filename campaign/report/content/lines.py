@@ -1,4 +1,4 @@
-"""The scoreboard as text: its lines, and what it comes to."""
+"""The scoreboard as text: lines, tables, summary."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SIGNS = {
 
 @dataclass(frozen=True)
 class ShownLine:
-    """A published cell beside what the run found, as text."""
+    """A published cell and its reproduced number, as text."""
 
     table: str
     name: str
@@ -51,7 +51,7 @@ class ShownLine:
 
 
 def shown_line(line: Line) -> ShownLine:
-    """A line of the scoreboard as text."""
+    """Convert a line of the scoreboard to text."""
     cell = line.cell
     look = None if line.status is None else STATUS[line.status]
     notes = (cell.reason, *cell.notes, _not_in_the_interval(line))
@@ -75,26 +75,26 @@ def shown_line(line: Line) -> ShownLine:
 
 
 def _not_in_the_interval(line: Line) -> str:
-    """What is not in its interval, or why it has none."""
-    found = line.found
-    if found is not None and found.calibration_alone and found.reason:
-        return f"the interval is of the calibration alone: {found.reason}"
-    if found is None or found.reason not in OF_ONE_TRIAL:
+    """Text on what the interval does not include, or why there is no interval; else ""."""
+    value = line.found
+    if value is not None and value.calibration_alone and value.reason:
+        return f"the interval is of the calibration alone: {value.reason}"
+    if value is None or value.reason not in OF_ONE_TRIAL:
         return ""
-    if found.has_interval:
+    if value.has_interval:
         return "one trial: the interval is of the calibration, without the scatter between trials"
     return "no interval: one trial, and no calibration of its bench"
 
 
 @dataclass(frozen=True)
 class ScoredTable:
-    """A published table at a glance: its numbers, and how many of them were reproduced.
+    """Summary of a published table: its numbers, and the count of reproduced ones.
 
     Attributes:
-        anchor: where on the page its numbers stand in full; "" nowhere.
-        tests: which tests found them.
-        compared, good: how many have a number beside them, and of how many that one holds; without
-            those that the document itself lets nobody reproduce.
+        anchor: anchor of its complete numbers on the page; "" without one.
+        tests: names of the tests that measured them.
+        compared, good: counts of compared and of reproduced numbers, without those that the
+            document makes impossible to reproduce.
     """
 
     table: str
@@ -110,11 +110,11 @@ def scored_tables(
     scoreboard: Scoreboard, published: Published, anchors: Mapping[str, str]
 ) -> tuple[ScoredTable, ...]:
     """The published tables of the scoreboard, in its order."""
-    found = []
+    tables = []
     for name in scoreboard.tables():
         lines = scoreboard.of_table(name)
         compared = [line for line in lines if is_compared(line)]
-        found.append(
+        tables.append(
             ScoredTable(
                 table=name,
                 title=published[name].title,
@@ -125,24 +125,24 @@ def scored_tables(
                 good=sum(line.verdict in GOOD for line in compared),
             )
         )
-    return tuple(found)
+    return tuple(tables)
 
 
 def cell_name(cell: Cell) -> str:
-    """A cell within its table in words, as short as it can be said."""
+    """Short name of a cell within its table."""
     row, column = cell.row, cell.column
     if cell.symbol and cell.quantity in (row, column):
         row = cell.symbol if row == cell.quantity else row
         column = cell.symbol if column == cell.quantity else column
     elif cell.symbol:
         row = f"{row} {cell.symbol}"
-    # A column that only repeats what the whole table is about says nothing.
-    told = [row] if column in (cell.quantity, "value") else [row, column]
-    return " · ".join(part.replace("_", " ") for part in told)
+    # A column that only repeats the quantity of the table adds nothing.
+    parts = [row] if column in (cell.quantity, "value") else [row, column]
+    return " · ".join(part.replace("_", " ") for part in parts)
 
 
 def place_words(line: Line) -> str:
-    """`above 26 % (14 to 42 %) of 39 draws`; empty without draws."""
+    """Place among draws, e.g. `above 26 % (14 to 42 %) of 39 draws`; empty without draws."""
     if line.place is None or line.place.low is None or line.place.high is None:
         return ""
     share, low, high = (
@@ -152,21 +152,21 @@ def place_words(line: Line) -> str:
 
 
 def _found(line: Line) -> str:
-    """What was found, with its interval, or as the bound that it is."""
-    found, decimals = line.found, line.cell.decimals or 0
-    if found is None:
+    """Reproduced number with its interval, or as a bound."""
+    value, decimals = line.found, line.cell.decimals or 0
+    if value is None:
         return "–"
-    if found.is_bound:
-        sign = {"at least": "≥", "at most": "≤"}[found.kind]
-        end = found.low if found.high is None else found.high
+    if value.is_bound:
+        sign = {"at least": "≥", "at most": "≤"}[value.kind]
+        end = value.low if value.high is None else value.high
         return f"{sign} {number(end, decimals=decimals)}"
-    if found.low is None and found.high is None:
-        return number(found.value, decimals=decimals)
-    return interval(found.value, found.low, found.high)
+    if value.low is None and value.high is None:
+        return number(value.value, decimals=decimals)
+    return interval(value.value, value.low, value.high)
 
 
 def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
-    """Status, its CSS name, its sign and how many lines have it; those that occur."""
+    """Status, CSS name, sign and count of lines, for each status that occurs."""
     counts = {s: sum(line.status is s for line in scoreboard.lines) for s in Status}
     return tuple(
         (str(status), STATUS[status].name, SIGNS[STATUS[status].marker], count)
@@ -176,24 +176,24 @@ def statuses(scoreboard: Scoreboard) -> tuple[tuple[str, str, str, int], ...]:
 
 
 def contradictions(scoreboard: Scoreboard) -> tuple[tuple[str, tuple[str, ...], str], ...]:
-    """Per table and reason: the cells where the document contradicts itself."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Cells where the document contradicts itself, as (table, cells, reason)."""
+    groups: dict[tuple[str, str], list[str]] = {}
     for line in scoreboard.lines:
         if line.status is Status.INCONSISTENT:
-            found.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
-    return tuple((table, tuple(cells), reason) for (table, reason), cells in found.items())
+            groups.setdefault((line.cell.table, line.cell.reason), []).append(cell_name(line.cell))
+    return tuple((table, tuple(cells), reason) for (table, reason), cells in groups.items())
 
 
 def agreement(scoreboard: Scoreboard) -> str:
-    """What the whole scoreboard comes to, in a few sentences; each published value counts once."""
-    found = headline(scoreboard)
-    if not found.compared:
+    """Summary of the scoreboard in a few sentences; each published value counts once."""
+    counts = headline(scoreboard)
+    if not counts.compared:
         return "No published number was measured in this run."
-    return " ".join(_sentences(found))
+    return " ".join(_sentences(counts))
 
 
 def closeness(scoreboard: Scoreboard) -> Table | None:
-    """How many published values deviate by how much, by status; None where none is a number."""
+    """Table of values within each deviation limit, by status; None without any deviation."""
     counts = headline(scoreboard).counts
     if not any(count.numbers for count in counts):
         return None
@@ -220,7 +220,7 @@ def closeness(scoreboard: Scoreboard) -> Table | None:
 
 
 def _cell_in_words(line: Line) -> str:
-    """`Figure 5.14 (stribeck velocity · rank)`."""
+    """Name of a cell with its table, e.g. `Figure 5.14 (stribeck velocity · rank)`."""
     return f"{heading_of(line.cell.table)} ({cell_name(line.cell)})"
 
 
@@ -244,7 +244,7 @@ def _sentences(found: Headline) -> Iterator[str]:
 
 
 def _bridge(found: Headline) -> str:
-    """How the numbers that are printed come to those that are compared."""
+    """Sentence that accounts for the printed numbers that are not compared."""
     excluded = sum(count for _, count in found.excluded)
     without = found.printed - found.repeats - excluded - found.compared
     less = (

@@ -27,7 +27,7 @@ NOTE = (
 
 
 def low_margin_table(run: RunReader) -> tuple[Table, list[str]]:
-    """A row per low or unstable loop of each test, and the problems met; no rows in most runs."""
+    """Table of loops with low margin or instability, and problems; most runs have no rows."""
     rows: list[dict[str, Value]] = []
     problems: list[str] = []
     benches: dict[str, Bench] = {}

@@ -12,31 +12,31 @@ from campaign.protocol.overrides import parse_overrides
 from campaign.units import split_quantity
 
 Written = Mapping[str, Mapping[str, str]]
-"""By test: dotted path of an option or of the matrix to the unit that its text has."""
+"""By test: unit in the text of an option or of the matrix, by dotted path."""
 
 
 def written_units(header: RunHeader) -> Written:
-    """Units as the run's protocol and its `--set` wrote them; those it cannot tell are missing."""
-    found: dict[str, dict[str, str]] = {}
+    """Units as written in the run's protocol and its `--set`; without unreadable ones."""
+    by_test: dict[str, dict[str, str]] = {}
     for text in header.sources.values():
         for test in _tests(text):
-            units = found.setdefault(str(test.get("name", "")), {})
+            units = by_test.setdefault(str(test.get("name", "")), {})
             matrix = test.get("matrix")
             units |= _units({k: v for k, v in test.items() if k != "matrix"})
             units |= _swept_units(matrix if isinstance(matrix, dict) else {})
     settings, _ = parse_overrides([f"{path}={value}" for path, value in header.overrides.items()])
     for setting in settings:
         name, *keys = map(str, setting.keys)
-        units, value = found.setdefault(name, {}), setting.value
+        units, value = by_test.setdefault(name, {}), setting.value
         if keys[:1] == ["matrix"]:
             units |= _swept_units(_nested(keys[1:], value))
         else:
             units |= _units(_nested(keys, value))
-    return found
+    return by_test
 
 
 def _tests(text: str) -> Iterator[Mapping[str, Any]]:
-    """The tests of a source; a bench, a CSV file and what this program cannot read have none."""
+    """Tests of a source; none for a bench, a CSV file and an unreadable text."""
     try:
         tests = tomllib.loads(text).get("test")
     except (ValueError, RecursionError):
@@ -45,22 +45,22 @@ def _tests(text: str) -> Iterator[Mapping[str, Any]]:
 
 
 def _units(tree: Mapping[str, Any]) -> dict[str, str]:
-    """Dotted path to unit, of all values in a tree that have one; a list has that of its first."""
-    found: dict[str, str] = {}
+    """Unit by dotted path of all values with a unit in a tree; the first unit of a list counts."""
+    units: dict[str, str] = {}
     for path, value in leaves_of(tree):
         for name, unit in _units_of(path, value):
-            found.setdefault(name, unit)
-    return found
+            units.setdefault(name, unit)
+    return units
 
 
 def _swept_units(matrix: Mapping[str, Any]) -> dict[str, str]:
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for path, _, value in flatten(matrix):
         if isinstance(value, Mapping):
             value = [value[key] for key in sorted(RANGE_KEYS & value.keys())]
         for name, unit in _units_of(path, value):
-            found.setdefault(name, unit)
-    return found
+            units.setdefault(name, unit)
+    return units
 
 
 def _units_of(path: str, value: Any) -> Iterator[tuple[str, str]]:
@@ -85,7 +85,7 @@ def _nested(keys: Sequence[str], value: Any) -> dict[str, Any]:
 
 
 def leaves_of(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of all that is no table."""
+    """Dotted path and value of all entries that are no tables."""
     for name, value in tree.items():
         if isinstance(value, Mapping):
             yield from leaves_of(value, f"{prefix}{name}.")

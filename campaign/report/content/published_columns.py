@@ -1,8 +1,8 @@
 """Published values as columns beside findings of a table.
 
-A column says of which quantity its numbers are, and a row holds the conditions of each. A published
-cell of that quantity whose conditions the row meets stands beside it: a column of its own, the last
-of the CSV file, and on the page before the number that it is to be compared with.
+A column has a quantity, and a row has the conditions of its number. A published cell of the same
+quantity and conditions is added to the row, in a column of its own. This column is the last of the
+CSV file; on the page it stands before the number to compare.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from campaign.result import Column, Finding, Table, Value, bare
 from campaign.units import convert
 
 NUMBERS = ("equal", "near")
-"""Relations of cells that are numbers, not claims about one."""
+"""Relations of cells that are numbers and not claims."""
 
 
 def with_published(
     table: Table, published: Sequence[PublishedTable], known: Mapping[str, Value]
 ) -> Table:
-    """With a last column of what is printed of each row; as it is where nothing is.
+    """Add a last column of published values; the same table if no row has any.
 
     Args:
-        published: what its test reproduces. Of several cells that speak to a row the first counts.
-        known: conditions that hold for every row which does not state them itself.
+        published: tables that its test reproduces. The first matching cell of a row counts.
+        known: default conditions of every row that does not state them.
     """
     column = next((each for each in table.columns if each.quantity), None)
     if column is None:
@@ -39,10 +39,10 @@ def with_published(
         cell_of(column.quantity, {n: bare(v) for n, v in row.items()}, published, known)
         for row in table.rows
     ]
-    found = [cell for cell in cells if cell is not None]
-    if not found:
+    matches = [cell for cell in cells if cell is not None]
+    if not matches:
         return table
-    decimals = max(cell.decimals or 0 for cell in found)
+    decimals = max(cell.decimals or 0 for cell in matches)
     added = Column(
         PUBLISHED, "Published", column.unit, column.display, exact=True, decimals=decimals
     )
@@ -54,12 +54,12 @@ def with_published(
         table,
         columns=(*table.columns, added),
         rows=tuple(rows),
-        note=" ".join(filter(None, (table.note, *_sources(found)))),
+        note=" ".join(filter(None, (table.note, *_sources(matches)))),
     )
 
 
 def as_compared(table: Table) -> Table:
-    """As the page has it: what is published before what it is compared with."""
+    """Move the published column before the column to compare, for the page."""
     published = [each for each in table.columns if each.name == PUBLISHED]
     others = [each for each in table.columns if each.name != PUBLISHED]
     place = next((n for n, each in enumerate(others) if each.quantity), None)
@@ -74,7 +74,7 @@ def cell_of(
     published: Iterable[PublishedTable],
     known: Mapping[str, Value],
 ) -> PublishedCell | None:
-    """The first published number of a quantity under these conditions; None without any."""
+    """First published number of a quantity under these conditions; None without any."""
     finding = Finding(quantity, math.nan, "", conditions)
     return next(
         (
@@ -88,7 +88,7 @@ def cell_of(
 
 
 def value_in(cell: PublishedCell, unit: str) -> float | None:
-    """A published number in another unit; None where that is one of something else."""
+    """A published number in another unit; None for an incompatible unit."""
     try:
         return float(convert(cell.value, cell.unit, unit))
     except ValueError:
@@ -96,7 +96,7 @@ def value_in(cell: PublishedCell, unit: str) -> float | None:
 
 
 def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:
-    """Sentences: where these are printed, and which of them the document itself puts in doubt."""
+    """Sentences on the tables of these cells, and on cells with a mark of the document."""
     headings = dict.fromkeys(heading_of(cell.table) for cell in cells)
     yield f"Published: {', '.join(headings)}."
     doubtful: dict[str, list[str]] = {}
@@ -104,5 +104,5 @@ def _sources(cells: Sequence[PublishedCell]) -> Iterator[str]:
         if cell.status:
             doubtful.setdefault(cell.status, []).append(cell_name(cell))
     for status, names in doubtful.items():
-        told = f"{status[:1].upper()}{status[1:]} among them"
-        yield f"{told}: {', '.join(dict.fromkeys(names))}."
+        head = f"{status[:1].upper()}{status[1:]} among them"
+        yield f"{head}: {', '.join(dict.fromkeys(names))}."

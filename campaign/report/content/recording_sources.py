@@ -11,24 +11,24 @@ from campaign.importing.description import ChannelSource, RecordingDescription
 from campaign.text import number
 
 LISTED = 4
-"""Most files, rates and remarks that are told one by one."""
+"""Maximum number of files, rates and remarks in a list."""
 DIGEST = 12
-"""Characters of a SHA-256 by which a file is told from others; the archive has all of it."""
+"""Number of shown characters of a SHA-256; the archive has all of it."""
 
 
 def recorded_from(test: AnalysedTest) -> Iterator[tuple[str, str]]:
-    """Files, rates, channels with their columns, and remarks; nothing of what was executed here."""
-    told = list(_described(test))
-    if not told:
+    """Files, rates, channels with columns, and remarks of imported trials; empty without these."""
+    descriptions = list(_described(test))
+    if not descriptions:
         return
-    files = {file.sha256: file.name for each in told for file in each.files}
+    files = {file.sha256: file.name for each in descriptions for file in each.files}
     named = [f"{name} (SHA-256 {digest[:DIGEST]}…)" for digest, name in files.items()]
     yield "Recorded in", _listed(named, "files")
-    rates = dict.fromkeys(f"{number(each.sample_rate, 5)} Hz" for each in told)
+    rates = dict.fromkeys(f"{number(each.sample_rate, 5)} Hz" for each in descriptions)
     yield "Sampled at", _listed(list(rates), "rates")
-    channels = dict.fromkeys(_channel(made) for each in told for made in each.channels)
+    channels = dict.fromkeys(_channel(made) for each in descriptions for made in each.channels)
     yield "Channels", "; ".join(channels)
-    remarks = list(dict.fromkeys(remark for each in told for remark in each.remarks))
+    remarks = list(dict.fromkeys(remark for each in descriptions for remark in each.remarks))
     if remarks:
         yield "What was made of it", _listed(remarks, "remarks", "; ")
 
@@ -40,7 +40,7 @@ def _described(test: AnalysedTest) -> Iterator[RecordingDescription]:
                 yield RecordingDescription.model_validate(
                     archived.trial.recording, context={"si": True}
                 )
-            except ValidationError:  # of another version of this program
+            except ValidationError:  # from another version of this program
                 continue
 
 
@@ -54,5 +54,5 @@ def _channel(made: ChannelSource) -> str:
 
 
 def _listed(items: Sequence[str], what: str, between: str = ", ") -> str:
-    told = between.join(items[:LISTED])
-    return told if len(items) <= LISTED else f"{told} … ({len(items)} {what})"
+    text = between.join(items[:LISTED])
+    return text if len(items) <= LISTED else f"{text} … ({len(items)} {what})"

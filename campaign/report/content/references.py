@@ -1,10 +1,10 @@
 """Stated and external reference values beside findings of each test.
 
-A bench file says how well its numbers are known, `campaign identify` writes that: then a later run
-shows whether the rig, its friction above all, still is what it was. Only where samples do not come
-from that very bench: of hardware, of recordings, and of a simulated truth. What is stated holds for
-the bench that it was said of; where a test changes that bench, nothing is compared. A file of
-reference values is held against every run. All pairs of a report are one family of decisions.
+A bench file states the uncertainty of its numbers (`campaign identify` writes it), so that a later
+run shows whether the rig, its friction above all, has changed. This requires samples that were not
+simulated with the same bench: hardware, recordings, a simulated truth. Stated values apply only to
+their own bench; if a test changes that bench, nothing is compared. A file of reference values is
+compared with every run. All pairs of a report are one family of decisions.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from campaign.trial import Trial
 from campaign.units import same_dimension
 
 NAMED = 3
-"""Most changes that one sentence names."""
+"""Maximum number of changes in a sentence."""
 AGAIN = Cause("said by others", "{others}")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where reference values come from, in the words of a table.
+    """Texts of a table on the source of reference values.
 
     Attributes:
-        column: head of their column.
-        differ: what a number does that differs: `differ from what the bench file states`.
-        before: what it differs from.
-        said: a sentence on who states them.
+        column: heading of their column.
+        differ: predicate of different numbers, e.g. `differ from what the bench file states`.
+        before: noun phrase for the reference in this predicate.
+        said: sentence on the origin of the values.
     """
 
     key: str
@@ -62,11 +62,11 @@ class Source:
 
 @dataclass(frozen=True)
 class ReferenceComparison:
-    """What a source states beside what a test found, and what that comes to in a sentence.
+    """Comparison of a source's values with the findings of a test.
 
     Attributes:
-        told: without its full stop; "" where nothing could be tested.
-        pairs: with the name of each.
+        told: summary without full stop; "" if nothing could be tested.
+        pairs: judged pairs with their names.
     """
 
     table: Table
@@ -79,9 +79,9 @@ class References:
     """All comparisons of a report's tests with reference values.
 
     Attributes:
-        stated: by test, with its bench file.
-        files: by test, with each file of values.
-        problems: rows of files that no finding is of.
+        stated: by test, comparison with its bench file.
+        files: by test, comparison with each file of values.
+        problems: sentences on rows of files without a matching finding.
     """
 
     stated: Mapping[str, ReferenceComparison]
@@ -94,18 +94,18 @@ Found = tuple[AnalysedTest, Source, Sequence[JudgedNumber]]
 
 
 def compared_with(run: RunReader, tests: Iterable[AnalysedTest], files: Files) -> References:
-    """Each test's findings beside the numbers that its bench file and `files` state of them."""
+    """Compare each test's findings with its bench file and with `files`."""
     tests = tuple(tests)
     units = units_of(tests, run.header) if tests else {}
-    found: list[Found] = []
+    comparisons: list[Found] = []
     for test in tests:
         with axis_terms(test.sides):
-            found += filter(None, [_stated(run, test)])
-            found += (_of_file(p, values, units[test.name]) for p, values in files.items())
-    verdicts = iter(with_verdicts([pair for _, _, pairs in found for pair in pairs]))
+            comparisons += filter(None, [_stated(run, test)])
+            comparisons += (_of_file(p, values, units[test.name]) for p, values in files.items())
+    verdicts = iter(with_verdicts([pair for _, _, pairs in comparisons for pair in pairs]))
     stated: dict[str, ReferenceComparison] = {}
     others: dict[str, tuple[ReferenceComparison, ...]] = {}
-    for test, source, pairs in found:
+    for test, source, pairs in comparisons:
         own = [next(verdicts) for _ in pairs]
         if not own:
             continue
@@ -182,7 +182,7 @@ def _of_file(path: Path, values: Sequence[ReferenceValue], units: TestUnits) -> 
 
 
 def _spoken_of(value: ReferenceValue, units: TestUnits) -> list[Finding]:
-    """What a row is of; a condition in another unit than it is measured in is none."""
+    """Findings that match a row; none if a condition has a unit of another dimension."""
     for name, unit in value.units.items():
         shown = units.of(name)
         if shown is not None and not same_dimension(shown.si, unit):
@@ -195,17 +195,17 @@ def _spoken_of(value: ReferenceValue, units: TestUnits) -> list[Finding]:
 
 
 def _unused(units: Mapping[str, TestUnits], files: Files) -> Iterator[str]:
-    """Rows that no finding is of: nothing of a file is left out without a word."""
+    """Report rows without a matching finding, so that no row is dropped silently."""
     for path, values in files.items():
         for value in values:
             if any(_spoken_of(value, own) for own in units.values()):
                 continue
-            told = f"{path.name}, {value.place}: "
+            row = f"{path.name}, {value.place}: "
             if value.test and value.test not in units:
-                yield f"{told}there is no test {value.test}; there are {', '.join(units)}"
+                yield f"{row}there is no test {value.test}; there are {', '.join(units)}"
             else:
                 yield (
-                    f"{told}no test found {value.estimate.name} in "
+                    f"{row}no test found {value.estimate.name} in "
                     f"{value.estimate.unit or 'a unit of no dimension'} under these conditions; "
                     "`findings` in report.json has all that was found, with its conditions in SI"
                 )
@@ -215,13 +215,13 @@ def _unused(units: Mapping[str, TestUnits], files: Files) -> Iterator[str]:
 
 
 def _to_compare(known: Sequence[Finding]) -> list[Finding]:
-    """Of repeated measurements the mean, which tells a smaller change than any of them."""
+    """Replace repeated measurements by their mean, which resolves smaller changes."""
     means = [each for each in known if each.conditions.get("statistic") == "mean"]
     return [each for each in known if each in means or not any(_is_in(each, m) for m in means)]
 
 
 def _is_in(finding: Finding, mean: Finding) -> bool:
-    """Whether a mean is of this number, too: it holds wherever all of the mean's conditions do."""
+    """Whether a mean includes this number: the finding has all conditions of the mean."""
     where = {name: value for name, value in mean.conditions.items() if name != "statistic"}
     return finding.quantity == mean.quantity and where.items() <= finding.conditions.items()
 
@@ -237,7 +237,7 @@ def _pair(reference: Estimate, finding: Finding, known: Sequence[Finding]) -> Ju
 def _compared(
     pairs: Sequence[JudgedNumber], source: Source, units: TestUnits
 ) -> ReferenceComparison:
-    told = _told_of(pairs, source, units)
+    summary = _told_of(pairs, source, units)
     table = Table(
         key=source.key,
         title=source.title,
@@ -253,12 +253,12 @@ def _compared(
         ),
         rows=tuple(_row(pair, units) for pair in pairs),
         note=(
-            f"{told or 'None of these numbers can be tested'}. {source.said}. "
+            f"{summary or 'None of these numbers can be tested'}. {source.said}. "
             f"A difference is declared where at most {RATE:.0%} of all that this report declares "
             "are expected to be false (Benjamini and Hochberg)."
         ),
     )
-    return ReferenceComparison(table, told, tuple((pair, _name(pair, units)) for pair in pairs))
+    return ReferenceComparison(table, summary, tuple((pair, _name(pair, units)) for pair in pairs))
 
 
 def _row(pair: JudgedNumber, units: TestUnits) -> Mapping[str, Cell]:
@@ -275,22 +275,22 @@ def _row(pair: JudgedNumber, units: TestUnits) -> Mapping[str, Cell]:
 
 
 def _told_of(pairs: Sequence[JudgedNumber], source: Source, units: TestUnits) -> str:
-    """Which numbers are not what was stated, or that all are; "" where nothing could be judged."""
+    """Summary of different numbers, or that no number differs; "" if nothing could be judged."""
     changed = [pair for pair in pairs if pair.verdict is Verdict.DIFFERENT]
     tested = sum(pair.testable for pair in pairs)
     beyond = sum(pair.verdict is Verdict.BEYOND_BOUND for pair in pairs)
-    told = []
+    parts = []
     if changed:
         named = "; ".join(_told(pair, units) for pair in changed[:NAMED])
         more = f"; {len(changed) - NAMED} more" if len(changed) > NAMED else ""
-        told.append(f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}")
+        parts.append(f"{len(changed)} of {tested} numbers {source.differ}: {named}{more}")
     elif tested:
         numbers = "1 number does" if tested == 1 else f"{tested} numbers do"
-        told.append(f"{numbers} not differ from {source.before}, as far as the intervals show")
+        parts.append(f"{numbers} not differ from {source.before}, as far as the intervals show")
     if beyond:
         lie = "1 number lies" if beyond == 1 else f"{beyond} numbers lie"
-        told.append(f"{lie} beyond a bound, of which no test is made")
-    return "; ".join(told)
+        parts.append(f"{lie} beyond a bound, of which no test is made")
+    return "; ".join(parts)
 
 
 def _told(pair: JudgedNumber, units: TestUnits) -> str:
@@ -308,5 +308,5 @@ def _name(pair: JudgedNumber, units: TestUnits) -> str:
 
 
 def _signed(share: float) -> str:
-    """In percent."""
+    """A share as text in percent with its sign."""
     return f"{'+' if share > 0 else ''}{number(100.0 * share, 2)}"

@@ -1,4 +1,4 @@
-"""Problems of a run in plain sentences."""
+"""Problems of a run as sentences."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ ENDED = {
     RunStatus.INCOMPLETE: "The archive has no end of the run: it is in progress, or it was killed",
 }
 SOUGHT = (Outcome.LIMIT, Outcome.DIVERGED)
-"""How a loop that becomes unstable ends its trial."""
+"""Outcomes of a trial with an unstable loop."""
 LONGEST = 200
-"""characters of a reason."""
+"""Maximum number of characters of a reason."""
 METHOD = "compensation"
-"""What a matrix calls the choice of a method."""
+"""Path of the method in a matrix."""
 _NUMBER = re.compile(r"[-+\d.]+")
 
 
 def wrong_with(
     run: RunReader, tests: Sequence[AnalysedTest], damaged: Sequence[Damage]
 ) -> Iterator[str]:
-    """Sentences: the run's end, safety, trials, methods, damage, analyses."""
+    """Sentences on the run's end, safety, trials, methods, damage, analyses."""
     yield from _end(run)
     yield from _safety(run)
     yield from _not_executed(run)
@@ -49,21 +49,21 @@ def wrong_with(
 
 
 def without_trials(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
-    """In one line, cause first: how the run ended, and which tests it did not come to."""
+    """One line on tests without any executed trial, after the end of the run as the cause."""
     names = [test.name for test in tests if test.problem == NOT_EXECUTED]
     if names:
-        told = f"No trial of {_trials(len(names), 'test')} was executed: {', '.join(names)}."
-        yield " ".join((*_end(run), told))
+        sentence = f"No trial of {_trials(len(names), 'test')} was executed: {', '.join(names)}."
+        yield " ".join((*_end(run), sentence))
 
 
 def _end(run: RunReader) -> Iterator[str]:
     if run.status in ENDED:
-        known = run.reason and run.status is not RunStatus.INCOMPLETE  # its reason says the same
+        known = run.reason and run.status is not RunStatus.INCOMPLETE  # it would repeat ENDED
         yield ENDED[run.status] + (f": {_short(run.reason)}." if known else ".")
 
 
 def _safety(run: RunReader) -> Iterator[str]:
-    """That nobody saw the bench at rest; of a run without an end nobody can have."""
+    """Sentences on a safe state that is not confirmed; also for a run without an end."""
     unsafe = [t for t in run.trials if t.ending.safe_state is SafeState.NOT_CONFIRMED]
     if run.safe_state is SafeState.NOT_CONFIRMED:
         yield "Safe state NOT confirmed: the bench was not seen at rest, its drive off, at the end."
@@ -89,7 +89,7 @@ def _not_executed(run: RunReader) -> Iterator[str]:
 
 
 def _failed(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
-    """How many executed trials did not complete, and why most of them; sought instability apart."""
+    """Count of incomplete trials with the most frequent reason; sought instability separately."""
     seekers = {t.name: t.title for t in tests if t.experiment and t.experiment.seeks_instability}
     failed = [t for t in run.trials if t.ending.outcome is not Outcome.COMPLETED]
     is_sought = [t.trial.test in seekers and t.ending.outcome in SOUGHT for t in failed]
@@ -110,7 +110,7 @@ def _failed(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
 
 
 def _never_ran(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
-    """Methods of a test that were planned, and of which no trial completed; others' were."""
+    """Planned methods of a test without a completed trial, if other methods have one."""
     planned = {str(each.get("name", "")): each.get("matrix") for each in run.header.tests}
     for test in tests:
         matrix = planned.get(test.name)
@@ -130,7 +130,7 @@ def _never_ran(run: RunReader, tests: Sequence[AnalysedTest]) -> Iterator[str]:
 
 def _by_outcome(failed: Sequence[ArchivedTrial]) -> str:
     counts = Counter(each.ending.outcome for each in failed)
-    return ", ".join(f"{count} {_ended(way, count)}" for way, count in counts.most_common())
+    return ", ".join(f"{count} {_ended(outcome, count)}" for outcome, count in counts.most_common())
 
 
 def _ended(way: Outcome, count: int) -> str:
@@ -140,7 +140,7 @@ def _ended(way: Outcome, count: int) -> str:
 
 
 def _commonest(failed: Sequence[ArchivedTrial]) -> str:
-    """The reason of most of them, whatever its numbers, in the words of the first."""
+    """Most frequent reason, numbers ignored, in the words of its first trial."""
     kinds: dict[str, list[str]] = {}
     for each in failed:
         reason = each.ending.reason or "no reason is archived"
@@ -164,6 +164,6 @@ def _trials(count: int, what: str = "trial") -> str:
 
 
 def _short(text: str) -> str:
-    """In one line, without its full stop."""
+    """Text in one line of limited length, without its full stop."""
     line = " ".join(text.split()).rstrip(".")
     return line if len(line) <= LONGEST else f"{line[:LONGEST]} …"

@@ -1,4 +1,4 @@
-"""Settings of benches, options, tasks and motions, in the page's units."""
+"""Settings of benches, options, tasks and motions, in display units."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from campaign.trial import Task, Tree
 from campaign.units import Quantity, convert
 
 LISTED = 12
-"""Most values of a list that are written out."""
+"""Maximum number of shown values of a list."""
 
 Pairs = Iterator[tuple[str, str]]
 
 
 def settings_of(options: BaseModel, without: Sequence[str] = ()) -> Pairs:
-    """Every option that says something, tables within tables included: `motor: resistance`.
+    """Label and text of every non-empty option, nested tables included: `motor: resistance`.
 
-    `without`: names of fields that are told elsewhere.
+    `without`: names of fields to omit.
     """
     for name, field in type(options).model_fields.items():
         if name not in without:
             quantity = field_quantity(field)
-            told = _told(_words(name), getattr(options, name), quantity and quantity.here)
-            yield from told
+            pairs = _told(_words(name), getattr(options, name), quantity and quantity.here)
+            yield from pairs
 
 
 def tree_settings(tree: Tree) -> Pairs:
-    """The same of a table that this program has no class for: numbers are SI, and say so."""
+    """Label and text of the entries of a table without a class; numbers are marked as SI."""
     for name, value in tree.items():
         for label, text in _told(_words(name), value, None):
             yield label, f"{text} (SI)" if text[:1].isdigit() or text[:1] == "−" else text
 
 
 def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
-    """What the bench was told to do; `command`: its channel, which knows the kind of axis."""
+    """Label and text of a task; the unit of the channel `command` determines the kind of axis."""
     command = command or info(COMMAND, task.mode)
     axis = AxisKind.LINEAR if command.unit in ("m", "m/s", "N") else AxisKind.ROTARY
     rate = UNITS[axis][PhysicalQuantity.RATE]
@@ -67,19 +67,19 @@ def task_settings(task: Task, command: ChannelInfo | None) -> Pairs:
 
 
 def point_settings(point: Mapping[str, Any], options: BaseModel | None, bench: Any) -> Pairs:
-    """Where in its sweep a trial stands; a number whose unit nobody knows is SI, and says so.
+    """Label and text of a trial's sweep point; a number of unknown unit is marked as SI.
 
-    One of several `speeds` has their unit.
+    A swept `speed` has the unit of the option `speeds`.
     """
     for path, value in point.items():
         inside, _, rest = path.partition(".")
         lists = (path, f"{path}s", f"{path.removesuffix('y')}ies")
-        found = (_quantity_at(options, name) for name in lists)
+        quantities = (_quantity_at(options, name) for name in lists)
         quantity = (
-            _quantity_at(bench, rest) if inside == "bench" else next(filter(None, found), None)
+            _quantity_at(bench, rest) if inside == "bench" else next(filter(None, quantities), None)
         )
-        told = _told(_words(path.replace(".", ": ")), value, quantity)
-        for label, text in told:
+        pairs = _told(_words(path.replace(".", ": ")), value, quantity)
+        for label, text in pairs:
             bare = quantity is None and isinstance(value, float)
             yield label, f"{text} (SI)" if bare else text
 
@@ -147,12 +147,12 @@ def _with_unit(text: str, quantity: Quantity | None) -> str:
 
 
 def _amount(value: float, unit: tuple[str, str]) -> str:
-    """A number in `unit`, SI and the page's."""
+    """A number as text with its unit; `unit`: SI and display unit."""
     return f"{number(convert(value, *unit), 6)} {pretty_unit(unit[1])}"
 
 
 def _per_second(rate: tuple[str, str]) -> tuple[str, str]:
-    """Of an acceleration, as its rate is shown: deg/s² for deg/s."""
+    """Units of an acceleration from those of its rate: deg/s² for deg/s."""
     return f"{rate[0]}^2", f"{rate[1]}^2"
 
 
@@ -161,7 +161,7 @@ def _words(name: str) -> str:
 
 
 def _quantity_at(options: Any, path: str) -> Quantity | None:
-    """Of the field at a dotted path; None where there is none."""
+    """Quantity of the field at a dotted path; None without one."""
     name, _, rest = path.partition(".")
     if isinstance(options, Mapping):
         return _quantity_at(options.get(name), rest) if rest else None

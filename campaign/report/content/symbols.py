@@ -1,6 +1,6 @@
 """Symbols of the thesis and their keys (Tables 4.2, 5.1).
 
-One table for who reads an equation and looks for the number, and for the other way round.
+The table relates the symbols of an equation to keys and channels, in both directions.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from campaign.units import OBSERVER_GAIN
 
 @dataclass(frozen=True)
 class Symbol:
-    """A symbol as the thesis prints it.
+    """A symbol of the thesis.
 
     Attributes:
-        field: dotted path in a bench, `*` for a name of the bench's own; "" for a mere signal.
-        channel: its name in recordings; "" where it is not recorded, or is no signal.
         unit: SI, or "".
-        printed: the table or section that defines it.
+        printed: table, figure or section that defines it.
+        field: dotted path in a bench, with `*` for any name; "" for a signal.
+        channel: name in recordings; "" if it is not recorded, or is no signal.
     """
 
     symbol: str
@@ -33,7 +33,7 @@ class Symbol:
 
     @property
     def in_files(self) -> str:
-        """What a bench or a recording calls it."""
+        """Name in a bench or a recording."""
         return self.field or self.channel or "–"
 
     @property
@@ -83,7 +83,7 @@ SYMBOLS: tuple[Symbol, ...] = (
 
 
 def symbols_for(benches: Iterable[Sides]) -> tuple[Symbol, ...]:
-    """The symbols as they are of the benches of a run; where those differ, each unit there is."""
+    """Symbols with meanings and units for the benches of a run, `or` between different ones."""
     kinds = tuple(dict.fromkeys(benches)) or (BOTH_ROTARY,)
     return tuple(
         replace(
@@ -96,7 +96,7 @@ def symbols_for(benches: Iterable[Sides]) -> tuple[Symbol, ...]:
 
 
 def _own(symbol: Symbol, sides: Sides) -> Sides:
-    """Those of the side that it is about."""
+    """Axis terms of the symbol's side: motor or load."""
     return sides.at_motor if symbol.field.startswith("motor.") else sides
 
 

@@ -18,29 +18,29 @@ from campaign.text import NARROW, SHORT, interval, minus, number, pretty_unit
 from campaign.units import convert
 
 ROWS = 300
-"""Most rows on the page; the CSV file has them all."""
+"""Maximum number of rows on the page; the CSV file has all rows."""
 FIRST, LISTED = 12, 30
-"""Rows of a longer table that are cells on the page, and the rows from which on it is longer."""
+"""A table with more than `LISTED` rows has only the `FIRST` as cells on the page."""
 DAGGER = "†"
 MARKS = {Origin.MEASURED: "", Origin.CONTRADICTED: f" {DAGGER}"}
-"""Behind a number, by its origin; of others the origin itself."""
+"""Suffix of a number by its origin; for other origins the origin itself."""
 REASONS = 6
-"""Most reasons for a missing interval that stand below a table."""
+"""Maximum number of reasons for a missing interval below a table."""
 UNIT = "unit"
-"""Name of a column that says the unit of its row."""
+"""Name of a column with the unit of its row."""
 CONDITIONS = "conditions"
-"""Name of a column that lists the conditions of its row."""
+"""Name of a column with the conditions of its row."""
 FEWEST = 3
-"""Rows from which on what all of them say is said once."""
+"""Minimum number of rows for a note on their common content."""
 PUBLISHED = "published"
-"""Name of a column that the report puts beside those of an analysis: the last of the file."""
+"""Name of the column of published values that the report adds; the last of the CSV file."""
 ROUNDING = 1e-12
-"""Share of a column's largest number below which one is a rounding error, shown as 0."""
+"""Share of a column's largest number below which a number is a rounding error, shown as 0."""
 
 
 @dataclass(frozen=True)
 class ShownCell:
-    """A cell on the page: its text and whether it is a number (those stand right-aligned)."""
+    """A cell on the page: its text and whether it is a number (right-aligned)."""
 
     text: str
     number: bool
@@ -48,9 +48,10 @@ class ShownCell:
 
 @dataclass(frozen=True)
 class ShownTable:
-    """A table as the page shows it; `left_out` rows are in the CSV file only.
+    """A table as the page shows it.
 
-    `notes` are sentences: which of its numbers have no interval or are not determined, and why.
+    `left_out` rows are in the CSV file only. `notes` are sentences on numbers without interval, on
+    numbers that are not determined, and on the reasons.
     """
 
     headers: tuple[str, ...]
@@ -60,12 +61,12 @@ class ShownTable:
 
     @property
     def in_cells(self) -> tuple[tuple[ShownCell, ...], ...]:
-        """The rows that a page shows as a table; the others of a long one are `as_text`."""
+        """Rows that the page shows as a table; the other rows are in `as_text`."""
         return self.rows if len(self.rows) <= LISTED else self.rows[:FIRST]
 
     @property
     def as_text(self) -> str:
-        """The other rows as aligned lines with tabs between the cells; "" where there are none."""
+        """The other rows as aligned lines with tabs between the cells; "" without any."""
         rows = [[cell.text for cell in row] for row in self.rows[len(self.in_cells) :]]
         wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
         right = [cell.number for cell in self.rows[0]] if rows else []
@@ -80,18 +81,18 @@ class ShownTable:
 
 
 def show(table: Table, *, once: bool = True) -> ShownTable:
-    """The first `ROWS` rows, rounded, in display units; `once`: what all rows say, said once."""
+    """Round the first `ROWS` rows, in display units; `once`: common content moves to a note."""
     rows: Sequence[Mapping[str, Cell]] = table.rows[:ROWS]
     columns = [column for column in table.columns if not column.file_only]
-    told: list[str] = []
+    common: list[str] = []
     if once and len(rows) >= FEWEST:
-        told, columns, rows = _said_once(columns, rows)
+        common, columns, rows = _said_once(columns, rows)
     shown = [_shown_column(column, rows) for column in columns]
     headers = tuple(
         f"{column.label} ({pretty_unit(_unit(column))})" if _unit(column) else column.label
         for column in columns
     )
-    notes = ([f"In all rows: {'; '.join(told)}."] if told else []) + list(remarks(table))
+    notes = ([f"In all rows: {'; '.join(common)}."] if common else []) + list(remarks(table))
     left_out = len(table.rows) - len(rows)
     return ShownTable(headers, tuple(zip(*shown, strict=True)), left_out, tuple(notes))
 
@@ -99,19 +100,19 @@ def show(table: Table, *, once: bool = True) -> ShownTable:
 def _said_once(
     columns: Sequence[Column], rows: Sequence[Mapping[str, Cell]]
 ) -> tuple[list[str], list[Column], Sequence[Mapping[str, Cell]]]:
-    """What all rows have in common, and the columns and rows without it.
+    """Common content of all rows as texts, and the columns and rows without it.
 
-    These are words and what was set, never what was found. A common unit goes to the heads of the
+    Common content is words and settings, never results. A common unit moves to the headings of the
     numbers.
     """
-    told: list[str] = []
+    texts: list[str] = []
     unit, kept = "", list(columns[:1])
     for column in columns[1:]:
         cells = [row.get(column.name) for row in rows]
         words = [cell for cell in cells if isinstance(cell, str)]
         if column.name == CONDITIONS and len(words) == len(cells):
             common = set.intersection(*(set(text.split(", ")) for text in words)) - {""}
-            told += [part for part in words[0].split(", ") if part in common]
+            texts += [part for part in words[0].split(", ") if part in common]
             rest = [", ".join(p for p in text.split(", ") if p not in common) for text in words]
             rows = [{**row, CONDITIONS: text} for row, text in zip(rows, rest, strict=True)]
             kept += [column] if any(rest) else []
@@ -121,26 +122,25 @@ def _said_once(
             unit = str(cells[0])
         elif len(words) == len(cells) or (column.exact and not _takes_unit(column, rows)):
             text = _shown_column(column, rows)[0].text
-            told.append(" ".join(filter(None, (column.label, text, pretty_unit(_unit(column))))))
+            texts.append(" ".join(filter(None, (column.label, text, pretty_unit(_unit(column))))))
         else:
             kept.append(column)
     if unit:
         kept = [replace(c, unit=unit) if _takes_unit(c, rows) else c for c in kept]
-    return told, kept, rows
+    return texts, kept, rows
 
 
 def _takes_unit(column: Column, rows: Sequence[Mapping[str, Cell]]) -> bool:
-    """Whether the unit of its row is that of a column's numbers: these are no counts."""
+    """Whether the unit of the row applies to a column: its numbers are no counts."""
     cells = [row.get(column.name) for row in rows]
     return not _unit(column) and any(isinstance(cell, float | Estimate) for cell in cells)
 
 
 def table_csv(table: Table) -> str:
-    """All rows, unrounded, in display units that the header names (`error_mrad`).
+    """CSV text of all rows, unrounded, in display units that the header names (`error_mrad`).
 
-    Behind them the ends of each interval, systematic parts included: `error_mrad_low`, `_high`;
-    then what is published beside them; last `NAME_origin` of columns with numbers of a model that
-    the data contradict.
+    Further columns: the ends of each interval with systematic parts (`error_mrad_low`, `_high`),
+    the published values, and `NAME_origin` of columns with numbers of a contradicted model.
     """
     ends = [
         c for c in table.columns if any(isinstance(r.get(c.name), Estimate) for r in table.rows)
@@ -174,9 +174,9 @@ def _ends(cell: Cell) -> tuple[float | None, float | None]:
 
 
 def remarks(table: Table) -> Iterator[str]:
-    """Sentences: which numbers have no interval, which are not determined, and what is in none.
+    """Sentences on numbers without interval, undetermined numbers, and parts in no interval.
 
-    Each reason stands there once, with what it is true of: columns, a row, or how many rows.
+    Each reason occurs once, with the columns, the row or the number of rows that it applies to.
     """
     for head, reasons in (
         ("Without an interval", _without_interval),
@@ -204,23 +204,23 @@ def remarks(table: Table) -> Iterator[str]:
 def _by_reason(
     table: Table, reasons: Callable[[Estimate | float | int, Column], Sequence[str]]
 ) -> list[str]:
-    """`columns (reason)` for each reason, in the order of the columns; of some rows, which."""
-    found: dict[str, dict[str, set[int]]] = {}
+    """`columns (reason)` for each reason, in column order, with its rows if it is not for all."""
+    groups: dict[str, dict[str, set[int]]] = {}
     uncertain = [c for c in table.columns if _numbers(table, c) and not c.exact and not c.file_only]
     for column in uncertain:
         for place, cell in _placed(table, column):
             for reason in reasons(cell, column):
-                found.setdefault(reason, {}).setdefault(column.label, set()).add(place)
+                groups.setdefault(reason, {}).setdefault(column.label, set()).add(place)
     every: dict[str, set[int]] = {}
     for column in uncertain:
         every.setdefault(column.label, set()).update(n for n, _ in _placed(table, column))
-    return [f"{', '.join(_where(table, of, every))} ({reason})" for reason, of in found.items()]
+    return [f"{', '.join(_where(table, of, every))} ({reason})" for reason, of in groups.items()]
 
 
 def _where(
     table: Table, of: Mapping[str, set[int]], every: Mapping[str, set[int]]
 ) -> Iterator[str]:
-    """Where a reason is true: whole columns, a row by its name, or a number of rows."""
+    """Scope of a reason: whole columns, a row by its name, or a number of rows."""
     whole = [label for label, rows in of.items() if rows == every[label]]
     if 1 < len(every) == len(whole):
         yield "all numbers"
@@ -240,14 +240,14 @@ def _where(
 
 
 def _row_name(table: Table, place: int) -> str:
-    """What the first cell of a row calls it; "" where that is a number, or other rows have it."""
+    """First cell of a row; "" if it is a number or not unique."""
     names = [row.get(table.columns[0].name) for row in table.rows]
     name = names[place]
     return name if isinstance(name, str) and names.count(name) == 1 else ""
 
 
 def _placed(table: Table, column: Column) -> Iterator[tuple[int, Estimate | float | int]]:
-    """The cells of a column that hold a number, or say why they have none, each with its row."""
+    """Numeric cells of a column, also undetermined ones, each with the index of its row."""
     for place, row in enumerate(table.rows):
         cell = row.get(column.name)
         if isinstance(cell, Estimate | float | int) and not isinstance(cell, bool):
@@ -255,7 +255,7 @@ def _placed(table: Table, column: Column) -> Iterator[tuple[int, Estimate | floa
 
 
 def _numbers(table: Table, column: Column) -> list[Estimate | float | int]:
-    """The cells of a column that hold a number, or say why they have none."""
+    """Numeric cells of a column, also undetermined ones."""
     return [cell for _, cell in _placed(table, column)]
 
 
@@ -264,7 +264,7 @@ def _open(cell: Estimate | float | int) -> bool:
 
 
 def _given(cell: Estimate) -> bool:
-    """Whether it was set, as its cell says: it has no interval because it is not uncertain."""
+    """Whether a number was set: it is exact and needs no interval."""
     return cell.origin is Origin.GIVEN
 
 
@@ -289,7 +289,7 @@ def _contradicted(cell: Estimate | float | int, column: Column) -> Sequence[str]
 
 
 def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
-    """The systematic parts that intervals of a column do not have in them."""
+    """Systematic parts of unknown size, which the intervals of a column do not include."""
     for cell in _numbers(table, column):
         if isinstance(cell, Estimate) and cell.has_interval:
             yield from (
@@ -298,9 +298,9 @@ def _of_unknown_size(table: Table, column: Column) -> Iterator[str]:
 
 
 def data_link(text: str) -> str:
-    """A CSV text as a `data:` address, for a download that needs no second file.
+    """A CSV text as a `data:` address, for a download without a second file.
 
-    As text, not as base64: served compressed, that is two thirds as long.
+    The text is not in base64: compressed, its length is two thirds.
     """
     return "data:text/csv;charset=utf-8," + quote(text, safe="!$()*+,-./:;=?@_~")
 
@@ -316,7 +316,7 @@ def _displayed(value: Value, column: Column) -> Value:
 
 
 def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[ShownCell]:
-    """Numbers stand to the right, and so does what is missing among them."""
+    """Cells of a column as text; numbers and their missing values are right-aligned."""
     cells = [row.get(column.name) for row in rows]
     values = [_displayed(bare(cell), column) for cell in cells]
     given = [value for value in values if value is not None]
@@ -338,7 +338,7 @@ def _shown_column(column: Column, rows: Sequence[Mapping[str, Cell]]) -> list[Sh
 
 
 def _with_interval(cell: Estimate, column: Column) -> str:
-    """A number with its 95 % interval, or marked as a bound or as not determined."""
+    """A number with its 95 % interval, or with a mark as bound or not determined."""
     value, low, high = (
         None if end is None else float(str(_displayed(end, column)))
         for end in (cell.value, *cell.combined)
@@ -347,12 +347,12 @@ def _with_interval(cell: Estimate, column: Column) -> str:
     if sign:
         value, low, high = (low if high is None else high), None, None
     mark = MARKS.get(cell.origin, f" ({cell.origin})")
-    told = number(value, SHORT) if _is_narrow(cell) else interval(value, low, high)
-    return f"{sign}{told}{mark}"
+    text = number(value, SHORT) if _is_narrow(cell) else interval(value, low, high)
+    return f"{sign}{text}{mark}"
 
 
 def _is_narrow(cell: Cell) -> bool:
-    """Whether an interval is too narrow to be read; one of no width at all is told as such."""
+    """Whether an interval is too narrow for the shown digits; one of zero width is shown."""
     if not isinstance(cell, Estimate) or not cell.has_interval:
         return False
     return ROUNDING * abs(cell.value) < cell.half_width < NARROW * abs(cell.value)

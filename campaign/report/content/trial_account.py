@@ -1,4 +1,4 @@
-"""Everything an archive says of one trial, in a reader's units."""
+"""Content of a trial's page, in display units."""
 
 from __future__ import annotations
 
@@ -33,41 +33,42 @@ from campaign.trial import Role, Trial
 from campaign.units import convert
 
 SHOWN = {"rad/s": "deg/s", "rad/s^2": "deg/s^2", "m/s": "mm/s", "m/s^2": "mm/s^2"}
-"""Unit of a metric to the one it is shown in; small angles are shown in mrad, others in degrees."""
+"""Display unit by the SI unit of a metric."""
 COARSE_AND_FINE = {"rad": ("deg", "mrad"), "m": ("mm", "um")}
+"""Display units of large and of small values, by SI unit."""
 SHARES = ("time_stuck",)
 """Metrics that are a share of the time."""
 ONE_STEP = 1.5
-"""Sampling steps, rounding included."""
+"""Tolerance in sampling steps: one step and rounding."""
 SMALL = 0.01
 """rad."""
 SMALL_TRAVEL = 1e-4
 """m."""
 POINT = "Place in the sweep"
 WITHOUT = ("name", "description", "known")
-"""Of a bench: what is told elsewhere, or is about it and not of it."""
+"""Fields of a bench that are shown elsewhere, or are no physical properties."""
 
 Pairs = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class TrialAccount:
-    """What a trial's page says; nothing in it knows a page.
+    """Content of a trial's page, independent of the page.
 
     Attributes:
-        number: of the trial.
-        title: of its test.
-        heading: the same, and what is particular about this trial of it.
-        label: that, as plan and commands have it.
-        facts: how it ended, when, with what.
-        digests: what its place in the archive and its identity are.
-        settings: by group (`Task`, `Options`, `Bench` ...), each in words.
-        tables: metrics, events, attempts, decisions; those that say something.
-        windows: parts that its analysis uses, as far as they were recorded.
-        not_reached: sentences on those that were not recorded, or not to their end.
-        recording: without what is damaged; None without any samples.
-        why_empty: why there are no samples; empty when there are.
-        damaged: what of it is damaged.
+        number: number of the trial.
+        title: title of its test.
+        heading: title with role and sweep point of the trial.
+        label: label in plan and commands.
+        facts: outcome, times, seed and so on.
+        digests: group in the archive, and fingerprint.
+        settings: name and text of each setting, by group (`Task`, `Options of the test`, ...).
+        tables: metrics, events, attempts, decisions; only those with rows.
+        windows: recorded parts of the analysis windows.
+        recording: without damaged channels; None without samples.
+        why_empty: reason for missing samples; empty with samples.
+        damaged: damage of the trial.
+        not_reached: sentences on windows that were not recorded completely.
     """
 
     number: int
@@ -88,7 +89,7 @@ class TrialAccount:
 def account_of(
     run: RunReader, archived: ArchivedTrial, story: Lines, test: AnalysedTest | None
 ) -> TrialAccount:
-    """What there is to say of an executed trial; `story` is the run's journal."""
+    """Account of an executed trial; `story` is the run's journal."""
     with axis_terms(sides_in(archived.trial.bench)):
         return _account(run, archived, story, test)
 
@@ -127,10 +128,10 @@ def _account(
 def _recorded(
     wanted: Iterable[Window], recording: Recording | None
 ) -> tuple[tuple[Window, ...], tuple[str, ...]]:
-    """The recorded parts of windows, and sentences on what of them was not; none without samples.
+    """Recorded parts of windows, and sentences on the missing parts; both empty without samples.
 
-    A window ends before a sample that is due at its end, so that one step more than the last
-    sample counts as recorded.
+    A window excludes a sample at its end. Therefore one step after the last sample counts as
+    recorded.
     """
     if recording is None or not len(recording.time):
         return (), ()
@@ -155,7 +156,7 @@ def _recorded(
 
 
 def lost_account(run: RunReader, lost: int) -> TrialAccount:
-    """What is left to say of an executed trial that cannot be read: what the plan says of it."""
+    """Account of an executed trial that cannot be read, from the plan."""
     damaged = tuple(damage for damage in run.damaged if trial_number(damage) == lost)
     planned = next((each for each in run.plan if each.number == lost), None)
     label = planned.label if planned else f"trial {lost}"
@@ -199,9 +200,9 @@ def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[st
     options = _options(trial, experiment)
     try:
         bench = bench_of(trial)
-        told = tuple(settings_of(bench, WITHOUT))
-    except (ValueError, CampaignError):  # of another version, or a plug-in that is not here
-        bench, told = None, tuple(tree_settings(trial.bench))
+        properties = tuple(settings_of(bench, WITHOUT))
+    except (ValueError, CampaignError):  # another version, or a plug-in that is not installed
+        bench, properties = None, tuple(tree_settings(trial.bench))
     command = _command(archived)
     groups = {
         POINT: tuple(point_settings(trial.point, options, bench)),
@@ -209,13 +210,13 @@ def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[st
         "Options of the test": tuple(
             tree_settings(trial.options)
             if options is None
-            # Analyses fill in defaults that a trial from elsewhere was never executed with.
+            # Analyses add defaults; an imported trial was not executed with them.
             else settings_of(
                 options,
                 (*options.without_effect(), *(type(options).model_fields.keys() - trial.options)),
             )
         ),
-        "Bench": (("name", bench.name), *told) if bench else told,
+        "Bench": (("name", bench.name), *properties) if bench else properties,
         "Work of the backend": tuple(
             (name.replace(".", ": ").replace("_", " "), plain(value))
             for name, value in scalars(archived.ending.telemetry).items()
@@ -228,7 +229,7 @@ def _settings(archived: ArchivedTrial, experiment: Experiment | None) -> dict[st
 def _options(trial: Trial, experiment: Experiment | None) -> Any:
     try:
         return None if experiment is None else options_of(experiment, trial.options)
-    except (ValueError, CampaignError):  # of another version of the experiment
+    except (ValueError, CampaignError):  # another version of the experiment
         return None
 
 
@@ -240,7 +241,7 @@ def _command(archived: ArchivedTrial) -> Any:
 
 
 def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) -> Iterator[Table]:
-    """What was measured, what happened, and what the journal says of the trial."""
+    """Tables of metrics, events, attempts and decisions of the trial."""
     yield Table(
         "metrics",
         "What the recording says by itself",

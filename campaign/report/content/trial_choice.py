@@ -12,16 +12,16 @@ from campaign.recording import Outcome
 
 HOW = "write failed, all, N, N..M, or several of them with commas"
 TOLD = 8
-"""Most stretches of numbers that a message names."""
+"""Maximum number of ranges in a message."""
 
 _ONE = re.compile(r"(?:trial-)?(\d{1,10})")
 
 
 def chosen_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
-    """The numbers of executed trials that `wanted` means, in the plan's order; none for "".
+    """Numbers of the executed trials that `wanted` selects, in plan order; none for "".
 
-    Damaged trials are among them. Raises UsageError for what cannot be read, and for numbers of
-    trials that there are not, saying which there are.
+    Damaged trials are included. Raises UsageError for invalid text and for numbers of unknown
+    trials; the message lists the executed ones.
     """
     executed = executed_trials(run)
     chosen: set[int] = set()
@@ -39,7 +39,7 @@ def chosen_trials(run: RunReader, wanted: str) -> tuple[int, ...]:
 
 
 def executed_trials(run: RunReader) -> tuple[int, ...]:
-    """The numbers of all executed trials, damaged ones among them, in the plan's order."""
+    """Numbers of all executed trials, including damaged ones, in plan order."""
     return tuple(sorted({each.trial.number for each in run.trials} | set(lost_trials(run))))
 
 
@@ -52,11 +52,11 @@ def _numbered(run: RunReader, part: str, executed: Collection[int]) -> set[int]:
     for end in ends:
         if end not in planned:
             raise UsageError(f"--trials {part}: there is no trial {end}; {_there(run, executed)}")
-    found = {number for number in executed if first <= number <= last}
-    if not found:
+    selected = {number for number in executed if first <= number <= last}
+    if not selected:
         what = f"trial {first} was not" if first == last else "none of these trials was"
         raise UsageError(f"--trials {part}: {what} executed; {_there(run, executed)}")
-    return found
+    return selected
 
 
 def _number(text: str, part: str) -> int:
@@ -73,12 +73,12 @@ def _there(run: RunReader, executed: Collection[int]) -> str:
 
 
 def stretches(numbers: Iterable[int]) -> str:
-    """`1 to 12, 14, 16 to 20`."""
-    found: list[list[int]] = []
+    """Numbers as ranges: `1 to 12, 14, 16 to 20`."""
+    ranges: list[list[int]] = []
     for number in sorted(numbers):
-        if found and number == found[-1][1] + 1:
-            found[-1][1] = number
+        if ranges and number == ranges[-1][1] + 1:
+            ranges[-1][1] = number
         else:
-            found.append([number, number])
-    told = [str(a) if a == b else f"{a} to {b}" for a, b in found[:TOLD]]
-    return ", ".join([*told, "…"] if len(found) > TOLD else told)
+            ranges.append([number, number])
+    texts = [str(a) if a == b else f"{a} to {b}" for a, b in ranges[:TOLD]]
+    return ", ".join([*texts, "…"] if len(ranges) > TOLD else texts)

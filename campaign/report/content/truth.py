@@ -1,7 +1,6 @@
-"""True values, findings and intervals of simulated benches.
+"""True values, findings and intervals of simulated benches (runs on `sim` only).
 
-Only where that bench is known: of a run on `sim`. The report opens the truth when every analysis
-is done; no analysis is given it.
+The report reads the truth after all analyses; no analysis receives it.
 """
 
 from __future__ import annotations
@@ -33,43 +32,43 @@ Row = Mapping[str, Cell]
 Array = NDArray[np.float64]
 SIMULATED = "sim"
 FEWEST = 3
-"""Estimates of a quantity from which on their scatter says whether they are all off alike."""
+"""Minimum number of estimates of a quantity for the test for bias."""
 SURE = 0.995
-"""Level of that test: of 200 quantities that are not off, one is told to be."""
+"""Level of that test: one of 200 unbiased quantities is declared biased."""
 NEGLIGIBLE = 0.5
-"""Percent of a true value below which nobody minds that all estimates are off alike."""
+"""Bias in percent of the true value below which it is not reported."""
 MEANS = ("nominal", "both")
-"""Directions of a number that is the mean of those of the positive and the negative one."""
+"""Directions of a mean of the positive and the negative direction."""
 EXPONENT, FREE = "exponent", "free"
-"""Condition of a parameter that was fitted with the Stribeck exponent free, or held at a value."""
+"""Condition of a parameter, and its value for a fit with a free Stribeck exponent."""
 COUNTED = "counted"
-"""In a row, beside its cells: False for what other numbers of the table say already."""
+"""Key of a row, not a cell: False for a number that repeats others of the table."""
 
 
 def truth_tables(run: RunReader, tests: Iterable[AnalysedTest]) -> dict[str, Table]:
-    """By test, what it found of the parameters of the bench that was simulated."""
+    """Table of true values and estimates of the simulated bench, by test."""
     if run.header.backend != SIMULATED:
         return {}
     tests = tuple(tests)
     units = units_of(tests, run.header)
     plants = run.header.truth.plants
-    found = {}
+    tables = {}
     for test in tests:
         with axis_terms(test.sides):
-            found[test.name] = _table(test, plants, units[test.name])
-    return {name: table for name, table in found.items() if table is not None}
+            tables[test.name] = _table(test, plants, units[test.name])
+    return {name: table for name, table in tables.items() if table is not None}
 
 
 @dataclass
 class Benches:
-    """The bench that each trial was simulated on, made once for each that is different."""
+    """Cache of the benches on which trials were simulated."""
 
     plants: Mapping[str, Tree]
     known: dict[tuple[str, str], Bench | None] = field(default_factory=dict)
     by_number: dict[int, Bench | None] = field(default_factory=dict)
 
     def of(self, trial: Trial) -> Bench | None:
-        """On its day; None where the archive does not say any more, or nobody here knows it."""
+        """Bench of a trial on its day; None if the archive lacks it or it is invalid here."""
         if trial.number not in self.by_number:
             key = (trial.truth, canonical_json(trial.bench))
             if key not in self.known:
@@ -79,7 +78,7 @@ class Benches:
         return self.by_number[trial.number]
 
     def own(self, trial: Trial) -> Bench | None:
-        """As it was in this very trial, whose friction scatters."""
+        """Bench with the scattered friction of this trial; None as for `of`."""
         made = self._made(trial)
         return None if made is None else as_it_is(made, trial.seed)
 
@@ -100,8 +99,8 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
         if finding.quantity in QUANTITIES and not finding.recomputed
     ]
     again = [duplicate_of(finding, known) for finding in known]
-    found = [_row(finding, trials, benches, units) for finding in known]
-    pairs = [(row, why) for row, why in zip(found, again, strict=True) if row is not None]
+    found_rows = [_row(finding, trials, benches, units) for finding in known]
+    pairs = [(row, why) for row, why in zip(found_rows, again, strict=True) if row is not None]
     rows = [{**row, COUNTED: not why} for row, why in pairs]
     if not rows:
         return None
@@ -129,10 +128,9 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
 
 
 def held(rows: Sequence[Row]) -> str:
-    """How many of the intervals hold the true value; "" without any interval.
+    """Count of intervals that contain the true value; "" without intervals.
 
-    A mean says nothing that the numbers beside it, which it is of, do not say; nor do two fits of
-    the same points say more than one.
+    Means of counted numbers, and further fits of the same points, do not count.
     """
     inside = [row["inside"] for row in rows if row[COUNTED] and row["inside"] != ""]
     if not inside:
@@ -142,10 +140,10 @@ def held(rows: Sequence[Row]) -> str:
 
 
 def biases(rows: Sequence[Row]) -> Iterator[str]:
-    """Of each quantity whose estimates are all off alike, how far, and what may be behind it.
+    """Sentence on each biased quantity: size of the bias and largest systematic part.
 
-    By Student's t of the relative deviations of the single numbers. Wide intervals that hold the
-    true value hide such a bias, as does any count of them.
+    The test is Student's t of the relative deviations of the single numbers. A count of wide
+    intervals that contain the true value does not show such a bias.
     """
     for quantity in dict.fromkeys(str(row["quantity"]) for row in rows):
         own = [row for row in rows if row[COUNTED] and row["quantity"] == quantity]
@@ -158,9 +156,9 @@ def biases(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _bias(quantity: str, off: Array, source: str) -> str:
-    """`stiffness at rest: bias −7 to −10 % (4 of 4; exceeds scatter)`.
+    """Sentence such as `stiffness at rest: bias −7 to −10 % (4 of 4; exceeds scatter)`.
 
-    Where they lie on both sides: the mean, and from where to where they range.
+    Deviations of both signs: the mean and the range.
     """
     mean, low, high = float(np.mean(off)), float(np.min(off)), float(np.max(off))
     if low > 0 or high < 0:
@@ -169,8 +167,8 @@ def _bias(quantity: str, off: Array, source: str) -> str:
     else:
         ends = f"{_signed(low)} to {_signed(high)} %"
         where = f"bias {_signed(mean)} % (mean of {len(off)}, {ends}; exceeds scatter)"
-    told = f"{quantity}: {where}"
-    return f"{told}; largest systematic part: {in_axis_terms(source)}" if source else told
+    text = f"{quantity}: {where}"
+    return f"{text}; largest systematic part: {in_axis_terms(source)}" if source else text
 
 
 def _signed(value: float) -> str:
@@ -178,7 +176,7 @@ def _signed(value: float) -> str:
 
 
 def _largest_part(cells: Iterable[Cell]) -> str:
-    """The source of the largest systematic part of some estimates; "" without any."""
+    """Source of the largest systematic part of the estimates; "" without any."""
     parts = (part for cell in cells if isinstance(cell, Estimate) for part in cell.systematic)
     known = [(part.standard_uncertainty or 0.0, part.source) for part in parts]
     size, source = max(known, default=(0.0, ""))
@@ -186,23 +184,23 @@ def _largest_part(cells: Iterable[Cell]) -> str:
 
 
 def _deviation(row: Row) -> float | None:
-    """Found less true, in percent of true; None of a bound, which lies on one side by intent."""
-    found, true = row["found"], row["true"]
-    if not isinstance(found, Estimate) or not isinstance(true, float) or not true:
+    """Estimate minus true value, in percent of the true value; None for a one-sided bound."""
+    estimate, true = row["found"], row["true"]
+    if not isinstance(estimate, Estimate) or not isinstance(true, float) or not true:
         return None
-    if found.kind in ("at least", "at most"):
+    if estimate.kind in ("at least", "at most"):
         return None
-    return None if math.isnan(found.value) else 100.0 * (found.value - true) / abs(true)
+    return None if math.isnan(estimate.value) else 100.0 * (estimate.value - true) / abs(true)
 
 
 def _is_mean(finding: Finding) -> bool:
-    """Whether it is the mean of several numbers, by its conditions."""
+    """Whether a finding is the mean of several numbers, by its conditions."""
     conditions = finding.conditions
     return conditions.get("statistic") == "mean" or conditions.get("direction") in MEANS
 
 
 def duplicate_of(finding: Finding, others: Sequence[Finding]) -> str:
-    """As what a finding says again what others of its quantity say; "" where it says its own."""
+    """Kind of duplicate of other findings of the same quantity; "" if it is no duplicate."""
     beside = [each for each in others if each.quantity == finding.quantity]
     if _is_mean(finding) and not all(map(_is_mean, beside)):
         return "means of others"
@@ -219,7 +217,7 @@ def _capital(text: str) -> str:
 def _row(
     finding: Finding, trials: Sequence[Trial], benches: Benches, units: TestUnits
 ) -> Mapping[str, Cell] | None:
-    """Quantity, true value and estimate; None where the bench has no such number, or several."""
+    """Row of true value and estimate; None if the benches have no single true value."""
     own = list(_benches_of(finding, trials, benches))
     true = {
         None if bench is None else true_value(bench, finding.quantity, finding.conditions)
@@ -243,17 +241,17 @@ def _row(
 def _benches_of(
     finding: Finding, trials: Sequence[Trial], benches: Benches
 ) -> Iterator[Bench | None]:
-    """Each bench that a trial of the finding was executed on, on its day.
+    """Each bench on which a trial of the finding was executed, on its day.
 
-    Of a finding about one trial it is that trial's own value: friction scatters between trials.
+    For a finding of one trial, it is that trial's own bench: friction scatters between trials.
     """
     own = [trial for trial in trials if is_of(trial, finding)]
-    found = [benches.own(own[0])] if len(own) == 1 else [benches.of(trial) for trial in own]
-    yield from {id(bench): bench for bench in found}.values()
+    used = [benches.own(own[0])] if len(own) == 1 else [benches.of(trial) for trial in own]
+    yield from {id(bench): bench for bench in used}.values()
 
 
 def is_of(trial: Trial, finding: Finding) -> bool:
-    """Whether nothing of the trial's place contradicts the finding's conditions."""
+    """Whether the trial's sweep point does not contradict the finding's conditions."""
     return all(
         finding.conditions[path] == value
         for path, value in trial.point.items()
@@ -262,7 +260,7 @@ def is_of(trial: Trial, finding: Finding) -> bool:
 
 
 def conditions_text(conditions: Mapping[str, Value], units: TestUnits) -> str:
-    """Where a number holds, in the units of its test."""
+    """Conditions of a number as text, in the units of its test."""
     shown = (
         f"{path_words(name)} {units.value(name, value)}"
         for name, value in conditions.items()
@@ -272,7 +270,7 @@ def conditions_text(conditions: Mapping[str, Value], units: TestUnits) -> str:
 
 
 def inside(estimate: Estimate, true: float | None) -> str:
-    """Whether the combined interval holds the true value; empty where there is none."""
+    """`yes` or `no`: whether the combined interval contains the true value; "" without either."""
     if not estimate.has_interval or true is None:
         return ""
     low, high = estimate.combined

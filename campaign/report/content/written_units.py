@@ -1,9 +1,8 @@
 """Option and sweep values in the protocol's units.
 
-Everything inside is SI, and most quantities have one display unit. But who writes `"3 urad"` means
-microradians, and reads 0.000171887 degrees as somebody else's number. The protocol's text is in the
-archive: what it, or `--set`, wrote is the unit of the page; what it left to a default has the
-quantity's own.
+Internal values are in SI, and most quantities have one display unit. But an author of `"3 urad"`
+does not recognize 0.000171887 degrees. The archive contains the protocol's text: the page uses the
+unit that the protocol or `--set` wrote, and the quantity's own unit for defaults.
 """
 
 from __future__ import annotations
@@ -25,16 +24,16 @@ from campaign.text import number, path_words, pretty_unit
 from campaign.units import Quantity, convert
 
 LISTED = 12
-"""Most values of a list that are written out."""
+"""Maximum number of shown values of a list."""
 DIGITS = 6
-"""of a value that was written, at most."""
+"""Maximum number of digits of a written value."""
 KINDS = ("kind", "model", "method")
-"""Entries that say what a table is, and so come first and need no name."""
+"""Entries with the kind of a table; they come first and need no name."""
 
 
 @dataclass(frozen=True)
 class DisplayUnit:
-    """A number in the SI unit `si` is shown in `unit`; one of these is `factor` SI units."""
+    """Display unit of numbers in the SI unit `si`: one `unit` is `factor` SI units."""
 
     si: str
     unit: str
@@ -46,10 +45,10 @@ class DisplayUnit:
 
 @dataclass(frozen=True)
 class TestUnits:
-    """How values of one test's options, bench and sweep are shown.
+    """Display units of one test's options, bench and sweep.
 
     Attributes:
-        written: dotted path to unit, of this test.
+        written: written unit by dotted path.
     """
 
     __test__ = False
@@ -58,19 +57,19 @@ class TestUnits:
     written: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, path: str) -> DisplayUnit | None:
-        """The unit of what stands at a path, of an option or of what trials are told apart by."""
+        """Display unit at a path of an option or of a sweep; None without one."""
         if path not in self._known:
             self._known[path] = self._find(path)
         return self._known[path]
 
     def listed_by(self, path: str) -> str:
-        """The option that lists the values of a sweep of the experiment's own: `speeds`; or ""."""
+        """Option that lists the values of an experiment's own sweep: `speeds`; or ""."""
         fields = self.test.experiment.options.model_fields if self.test.experiment else {}
         several = [f"{path}s", f"{path[:-1]}ies" if path.endswith("y") else f"{path}es"]
         return next((name for name in several if path not in fields and name in fields), "")
 
     def words(self, path: str, values: Sequence[Any]) -> str:
-        """Values at a path as people write them, the unit once: `0.1, 0.2, 0.4 Hz`."""
+        """Values at a path as text with the unit once: `0.1, 0.2, 0.4 Hz`."""
         unit = self.of(path)
         if any(isinstance(value, Mapping) for value in values):
             return "; ".join(self._tables(path, values))
@@ -83,13 +82,13 @@ class TestUnits:
         return f"{text} {pretty_unit(unit.unit)}".rstrip() if unit and numbers else text
 
     def value(self, path: str, value: Any) -> str:
-        """One value, which may be a list or a table of further options."""
+        """Text of one value, which may be a list or a table of further options."""
         if isinstance(value, list | tuple):
             return self.words(path, value)
         return self.words(path, [value])
 
     def table(self, table: Table) -> Table:
-        """The same table, with words for paths and the protocol's units for what was set."""
+        """The same table, with words for paths and the protocol's units for settings."""
         columns = []
         for column in table.columns:
             set_ = column.exact or column.name in self._swept
@@ -103,7 +102,7 @@ class TestUnits:
         return replace(table, columns=tuple(columns))
 
     def in_si(self, table: Table) -> Table:
-        """The same table, with the SI unit of what was swept, for its file."""
+        """The same table, with SI units of swept columns, for its file."""
         columns = (
             replace(column, unit=unit.si)
             if column.name in self._swept and not column.unit and (unit := self.of(column.name))
@@ -144,7 +143,7 @@ class TestUnits:
         return quantity.of(bench.sides) if quantity and bench else quantity
 
     def _of_column(self, path: str) -> DisplayUnit | None:
-        """As the analysis tabulates it, where an experiment alone knows what its points are."""
+        """Display unit of the analysis' column of this name, for points of the experiment's own."""
         for table in self.test.result.tables:
             for column in table.columns:
                 if column.name == path and column.unit:
@@ -153,28 +152,28 @@ class TestUnits:
         return None
 
     def _tables(self, path: str, values: Sequence[Any]) -> Iterator[str]:
-        """Tables by what they are, and by what they say that is not the same in all of them."""
+        """Texts of tables: their kind, and the entries that are not equal in all of a kind."""
         leaves = [dict(leaves_of(v)) if isinstance(v, Mapping) else {"": v} for v in values]
         for own in leaves:
             alike = [other for other in leaves if _kind(other) == _kind(own)]
-            told = [
+            entries = [
                 f"{path_words(name)} {self.value(f'{path}.{name}', value)}".strip()
                 for name, value in own.items()
                 if name not in KINDS
                 and value not in (None, [], ())
                 and (len(values) == 1 or any(other.get(name) != value for other in alike))
             ]
-            yield ", ".join(filter(None, (_kind(own), *told))) or "as given"
+            yield ", ".join(filter(None, (_kind(own), *entries))) or "as given"
 
 
 def units_of(tests: Iterable[AnalysedTest], header: RunHeader) -> dict[str, TestUnits]:
-    """By test, how its values are shown."""
+    """Display units by test."""
     written = written_units(header)
     return {test.name: TestUnits(test, written.get(test.name, {})) for test in tests}
 
 
 def short_number(value: float) -> str:
-    """A number that was written: as many of `DIGITS` digits as it has."""
+    """A written number as text, with its own digits, at most `DIGITS`."""
     rounded = float(f"{value:.{DIGITS}g}")
     if not rounded or 1e-5 <= abs(rounded) < 10.0 ** (DIGITS + 3):
         return number(rounded, DIGITS)
@@ -183,7 +182,7 @@ def short_number(value: float) -> str:
 
 
 def _shown(quantity: Quantity, unit: str | None) -> DisplayUnit:
-    """In the unit that was written, where that is one of the quantity; else in its own."""
+    """Display unit of a quantity: the written unit if it is valid, else the quantity's own."""
     for each in filter(None, (unit, quantity.display)):
         try:
             return DisplayUnit(quantity.si, each, quantity.parse_own(f"1 {each}"))
@@ -193,7 +192,7 @@ def _shown(quantity: Quantity, unit: str | None) -> DisplayUnit:
 
 
 def _within(shape: Shape | None) -> Quantity | None:
-    """The quantity of a value, or of the values of a list."""
+    """Quantity of a value, or of the values of a list."""
     depth = 0
     while shape is not None and shape.quantity is None and depth < 3:
         shape, depth = shape.child(0), depth + 1

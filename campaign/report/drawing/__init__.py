@@ -1,1 +1,1 @@
-"""What a report draws: data in, SVG out, the same bytes for the same data."""
+"""Drawings of a report: SVG from data, with the same bytes for the same data."""

@@ -22,7 +22,7 @@ from campaign.signals import Array
 TWO_PI = 2.0 * np.pi
 POINTS = 1500
 DEEPEST, HIGHEST = -70.0, 60.0
-"""dB; below, nothing of a loop matters; above, it is only an integrator."""
+"""Limits of the magnitude (dB): below, a loop has no effect; above, it is only an integrator."""
 FREQUENCY = Axis("Frequency", "Hz", scale="log")
 
 
@@ -44,7 +44,7 @@ class Trace:
 
 
 def traces_of(bench: CompleteBench, names: Sequence[str]) -> dict[Regime, list[Trace]]:
-    """The rate loop with each compensation, by regime; those without a linear loop are missing."""
+    """Rate loop with each compensation, by regime; those without a linear loop are missing."""
     loops: list[tuple[Regime, str, Response, LoopMargins]] = []
     for regime in REGIMES:
         for name in names:
@@ -54,22 +54,22 @@ def traces_of(bench: CompleteBench, names: Sequence[str]) -> dict[Regime, list[T
                 continue
             loops.append((regime, name, Response(loop), margins_of(loop)))
     low, high = _range([margins for _, _, _, margins in loops])
-    found: dict[Regime, list[Trace]] = {}
+    traces: dict[Regime, list[Trace]] = {}
     for regime, name, response, margins in loops:
         near = frequency_grid(response.poles, response.period)
         near = near[(near > low) & (near < high)]
         omega = np.unique(np.concatenate([np.geomspace(low, high, POINTS), near]))
-        found.setdefault(regime, []).append(_trace(name, omega, response, margins))
-    return found
+        traces.setdefault(regime, []).append(_trace(name, omega, response, margins))
+    return traces
 
 
 def bode_svg(bench: CompleteBench, names: Sequence[str]) -> str:
-    """The picture as a complete SVG document for white paper."""
+    """Bode plot as a complete SVG document for white paper."""
     return DrawingFiles.of(draw(bode_figure(bench, names))).svg
 
 
 def bode_png(bench: CompleteBench, names: Sequence[str]) -> bytes:
-    """The picture as a PNG on white."""
+    """Bode plot as a PNG on white."""
     out = io.BytesIO()
     sheet = draw_sheet(bode_figure(bench, names))
     sheet.savefig(out, format="png", dpi=200, facecolor=PAPER.light)
@@ -77,7 +77,7 @@ def bode_png(bench: CompleteBench, names: Sequence[str]) -> bytes:
 
 
 def bode_figure(bench: CompleteBench, names: Sequence[str]) -> Figure:
-    """Magnitude above, phase below, a column per regime; margins of the least stable loop."""
+    """Figure with magnitude above phase, a column per regime, margins of the least stable loop."""
     traces = traces_of(bench, names)
     levels = [trace.level for shown in traces.values() for trace in shown] or [np.zeros(1)]
     lowest, highest = float(np.min(np.hstack(levels))), float(np.max(np.hstack(levels)))
@@ -112,20 +112,20 @@ def bode_figure(bench: CompleteBench, names: Sequence[str]) -> Figure:
 
 
 def _range(loops: Sequence[LoopMargins]) -> tuple[float, float]:
-    """From well below every crossover to Nyquist's frequency, or well above them (rad/s)."""
-    told = [omega for loop in loops for omega in (*loop.crossovers, loop.gain_crossing) if omega]
+    """Range from below every crossover to the Nyquist frequency, or above them (rad/s)."""
+    omegas = [omega for loop in loops for omega in (*loop.crossovers, loop.gain_crossing) if omega]
     periods = [loop.period for loop in loops if loop.period is not None]
-    high = math.pi / periods[0] if periods else 30.0 * max(told, default=TWO_PI)
-    return max(0.1 * min(told, default=TWO_PI), 1e-5 * high), high
+    high = math.pi / periods[0] if periods else 30.0 * max(omegas, default=TWO_PI)
+    return max(0.1 * min(omegas, default=TWO_PI), 1e-5 * high), high
 
 
 def _trace(name: str, omega: Array, response: Response, margins: LoopMargins) -> Trace:
     value = response(omega)
     phase = np.degrees(np.unwrap(np.angle(value)))
-    # Whole turns are arbitrary: where the margin is, the phase is from -270 to 90 degrees.
+    # Whole turns are arbitrary: at the margin, the phase must be from -270 to 90 degrees.
     place = margins.crossover or margins.gain_crossing or float(omega[len(omega) // 2])
-    there = float(np.interp(place, omega, phase))
-    phase -= 360.0 * math.ceil((there - 90.0) / 360.0)
+    phase_there = float(np.interp(place, omega, phase))
+    phase -= 360.0 * math.ceil((phase_there - 90.0) / 360.0)
     return Trace(name, omega / TWO_PI, 20.0 * np.log10(np.abs(value)), phase, margins)
 
 
@@ -134,7 +134,7 @@ def _curve(trace: Trace, values: Array) -> Curve:
 
 
 def _margins(trace: Trace) -> tuple[list[Mark], list[Mark]]:
-    """Marks of crossover, phase and gain margin: on the magnitude, and on the phase."""
+    """Marks of crossover, phase margin and gain margin, on the magnitude and on the phase."""
     margins, own = trace.margins, trace.compensation
     above: list[Mark] = []
     below: list[Mark] = []

@@ -1,7 +1,7 @@
 """Axes with cached ticks.
 
-matplotlib asks for the ticks of an axis eight times while it is measured and drawn (for its labels,
-its spines, its title), works them out anew each time, and measures their labels four times.
+During layout and drawing, matplotlib computes the ticks of an axis eight times (for labels, spines
+and title), and measures their labels four times.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ASKED = ("_update_ticks", "_get_ticklabel_bboxes")
-"""Methods of an axis that say the same until something is moved; one that a matplotlib does not
-have is not missed."""
+"""Methods of an axis with a constant result until something moves; matplotlib may lack some."""
 
 
 @contextmanager
 def settled(axes: Iterable[Axes]) -> Iterator[None]:
-    """Inside the block neither the limits nor the places of the axes may change."""
+    """Cache the ticks within the block; limits and positions of the axes must not change."""
     every = [axis for ax in axes for axis in (ax.xaxis, ax.yaxis)]
     kept = [(axis, name) for axis in every for name in ASKED if hasattr(axis, name)]
     for axis, name in kept:
@@ -34,7 +33,7 @@ def settled(axes: Iterable[Axes]) -> Iterator[None]:
 
 
 def _once(work: Callable[..., Any], found: list[Any], *arguments: Any) -> Any:
-    """What `work` said when it was asked first."""
+    """Result of the first call of `work`."""
     if not found:
         found.append(work(*arguments))
     return found[0]

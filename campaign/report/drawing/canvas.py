@@ -1,7 +1,7 @@
-"""Sheets to draw on in the report's style, and what becomes of them: reproducible SVG.
+"""Sheets in the report's style, and their output as reproducible SVG.
 
-Text stays text and takes the page's font. Colours are written so that the page can exchange them
-for its dark ones; a file on its own is for white paper.
+Text remains text in the page's font. The page can replace the colours by its dark ones; a separate
+file is for white paper.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 WIDTH = 180.0 / 25.4
-"""Inches: the width of both columns of a journal."""
+"""Width of both columns of a journal (inches)."""
 TITLE = 9.0
-"""Points of a title."""
+"""Size of a title (points)."""
 TITLE_PAD = 7.0
-"""Points between the axes and their title."""
+"""Distance between the axes and their title (points)."""
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "campaign",
     "pdf.fonttype": 42,  # journals refuse Type 3
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
-    "text.parse_math": False,  # a label is a name, whatever signs are in it
+    "text.parse_math": False,  # a label is plain text, with any signs
     "axes.titlesize": TITLE,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
@@ -64,18 +64,18 @@ STYLE: dict[Any, Any] = {
     "legend.handlelength": 2.6,
     "lines.linewidth": 1.4,
     "lines.scale_dashes": True,
-    "axes.titley": 1.0,  # not to be searched for, which takes as long as drawing
+    "axes.titley": 1.0,  # fixed, because its search takes as long as drawing
     "savefig.transparent": True,
     "savefig.dpi": 200,
 }
 PADS: dict[str, Any] = {"w_pad": 3.0 / 72, "h_pad": 4.3 / 72, "wspace": 0.0, "hspace": 0.0}
-"""Inches that stay free around axes with their labels, and around the legend."""
+"""Free space around axes with their labels, and around the legend (inches)."""
 METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Within the block matplotlib draws as the report does, whatever the user's style is."""
+    """Use the report's style within the block, independent of the user's style."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -86,14 +86,14 @@ def style() -> Iterator[None]:
 
 @contextmanager
 def canvas(width: float, height: float) -> Iterator[Canvas]:
-    """An empty matplotlib figure (inches) under the report's own style."""
+    """Empty matplotlib figure (inches) in the report's style."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     from campaign.report.drawing.sheet import Sheet
 
     with style():
-        sheet = Sheet(figsize=(width, height), dpi=72)  # as an SVG document is drawn
+        sheet = Sheet(figsize=(width, height), dpi=72)  # the resolution of an SVG document
         FigureCanvasSVG(sheet).get_renderer = _measuring  # type: ignore[attr-defined]
         sheet.set_layout_engine(ConstrainedLayoutEngine(**PADS))
         yield sheet
@@ -101,9 +101,9 @@ def canvas(width: float, height: float) -> Iterator[Canvas]:
 
 @cache
 def _measuring() -> RendererSVG:
-    """What measures the texts of all sheets, and so remembers those that many have.
+    """Renderer that measures the texts of all sheets, and caches common texts.
 
-    Without one, each question would begin a document anew. Its size means nothing to a text's.
+    Otherwise each measurement would start a new document. Its size does not affect texts.
     """
     from matplotlib.backends.backend_svg import RendererSVG
 
@@ -111,9 +111,9 @@ def _measuring() -> RendererSVG:
 
 
 def to_svg(sheet: Canvas) -> str:
-    """The SVG document of a canvas, with nothing in it that changes from run to run.
+    """SVG document of a canvas; the same drawing results in the same bytes.
 
-    Coordinates are cut to a hundredth of a point; `slim` rounds those of curves further.
+    Coordinates are truncated to a hundredth of a point; `slim` rounds those of curves further.
     """
     place_axes(sheet)
     out = io.StringIO()
@@ -126,9 +126,9 @@ def to_svg(sheet: Canvas) -> str:
 
 
 def place_axes(sheet: Canvas) -> None:
-    """Place the axes for good: saving would draw all in vain, to have the layout computed.
+    """Place the axes and remove the layout engine: it would draw everything twice on saving.
 
-    Even with "none", which leaves a placeholder; only the default can be no engine at all.
+    The layout "none" leaves a placeholder engine; only None removes it.
     """
     engine = sheet.get_layout_engine()
     if engine is not None:
@@ -140,9 +140,9 @@ _DIGITS = re.compile(r"(\d\.\d\d)\d+")
 
 
 def inline(svg: str, prefix: str, title: str, alt: str) -> str:
-    """The SVG for the middle of a page: own ids, the page's colours, and words for who cannot see.
+    """Convert an SVG document for use within a page: ids, the page's colours, alternative text.
 
-    `prefix` must be unique on the page and safe in an id.
+    `prefix` must be unique on the page and valid in an id.
     """
     from markupsafe import escape
 
@@ -161,7 +161,7 @@ def inline(svg: str, prefix: str, title: str, alt: str) -> str:
 
 
 def _with_variables(svg: str) -> str:
-    """Every palette colour as a CSS variable with itself as the fallback."""
+    """Replace each palette colour by its CSS variable, with the colour as the fallback."""
     by_colour: dict[str, str] = {}
     for name, (light, _) in variables().items():
         by_colour.setdefault(light, name)
@@ -172,5 +172,5 @@ def _with_variables(svg: str) -> str:
 
 
 def _view_box(svg: str) -> str:
-    found = re.search(r'viewBox="[-0-9. ]+"', svg[: svg.index(">")])
-    return found[0] if found else ""
+    match = re.search(r'viewBox="[-0-9. ]+"', svg[: svg.index(">")])
+    return match[0] if match else ""

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PITCH = 0.19
-"""Inches from one row to the next."""
+"""Pitch of the rows (inches)."""
 MOST = 60
-"""Rows that a picture has room for; the tables have them all."""
+"""Maximum number of rows; the tables have all pairs."""
 LINEAR = 10.0
-"""Percent up to which an axis of changes is linear where some are far larger."""
+"""Limit of the linear part of a logarithmic axis of changes (percent)."""
 FAR = 60.0
-"""Percent beyond which changes count as far larger."""
+"""Limit of the axis above which it is logarithmic (percent)."""
 
 
 def with_change(pairs: Sequence[tuple[JudgedNumber, str]]) -> list[tuple[JudgedNumber, str]]:
-    """Those that are drawn: what is not judged is left out, unless nothing else is there."""
+    """Select the pairs to draw: those with an interval that are testable, or else all of these."""
     known = [
         each for each in pairs if None not in (each[0].found.change.low, each[0].found.change.high)
     ]
@@ -32,9 +32,9 @@ def with_change(pairs: Sequence[tuple[JudgedNumber, str]]) -> list[tuple[JudgedN
 
 
 def draw_changes(shown: Sequence[tuple[JudgedNumber, str]]) -> str:
-    """Every change in percent with its interval, filled where declared; with names of the rows.
+    """Draw each change in percent with its interval, filled if declared, and its name.
 
-    shown: of `with_change`, at least one.
+    shown: pairs of `with_change`, at least one.
     """
     with canvas(WIDTH, len(shown) * PITCH + 0.9) as sheet:
         ax = sheet.subplots()
@@ -52,14 +52,14 @@ def draw_changes(shown: Sequence[tuple[JudgedNumber, str]]) -> str:
 
 
 def name_row(ax: Axes, row: int, name: str, pair: JudgedNumber) -> None:
-    """Its name, left of the axes; bold where a difference was declared."""
+    """Write the name of a pair left of the axes, bold if a difference is declared."""
     declared = pair.verdict is Verdict.DIFFERENT
     weight = "bold" if declared else "normal"
     word(ax, LEFT, row, name, INK if declared else MUTED, weight=weight)
 
 
 def _limit(pairs: Sequence[JudgedNumber]) -> float:
-    """Half of the axis (percent): all values and, up to three times as far, their intervals."""
+    """Half of the axis (percent): all values, and intervals up to three times the largest."""
     values = max(abs(100 * pair.found.change.value) for pair in pairs)
     ends = max(
         abs(100 * (end or 0.0))

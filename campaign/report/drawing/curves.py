@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DENSE = 2_000
-"""From here on a scatter is drawn as an image: thousands of signs would outweigh the page."""
+"""Number of points above which a scatter is an image: thousands of signs make a large page."""
 LONGEST_BAR = 1.0
-"""Span of a panel's numbers beyond which the bars of their intervals are cut."""
+"""Maximum extent of interval bars beyond the numbers of a panel, as a share of their span."""
 OUT_OF_SIGHT = 1e-6
-"""of a number: where a bar ends that a logarithmic axis has no end for."""
+"""Lower end of a bar on a logarithmic axis, as a share of the number, if it is not positive."""
 BARS = "bars"
-"""What the paths of intervals are called."""
+"""Id of the paths of intervals."""
 FLAT = 1e-4
-"""Share of its level that a curve must vary by to be drawn as varying."""
+"""Minimum variation of a curve, as a share of its level; with less it is drawn as constant."""
 
 ARROW = 17.0
-"""Points that the arrow of a bound is long ..."""
+"""Length of the arrow of a bound (points) ..."""
 HEADROOM = 0.14
-"""... and the share of a panel's height that is left for it."""
+"""... and the share of a panel's height for it."""
 BAR = 0.5
-"""Width of a bar, where named places are 1 apart."""
+"""Width of a bar, relative to the distance of named places."""
 PALE = 0.55
-"""Opacity of published values that contradict themselves, or that nobody could reproduce."""
+"""Opacity of published values that are inconsistent or not reproducible."""
 ARROWS = (0.15, 0.4, 0.65, 0.9)
-"""Places of a loop, as shares of its length, where an arrow shows which way it runs."""
+"""Places of the arrows for the direction of a loop, as shares of its length."""
 
 HOLLOW: dict[str, Any] = {
     "linestyle": "none",
@@ -54,17 +54,17 @@ DOTTED: dict[str, Any] = {"linewidth": 2.0, "dashes": (0.8, 1.4)}
 def draw_published(
     ax: Axes, marks: Sequence[PublishedMarks], look: Look, panel: Panel, aside: float = 0.0
 ) -> list[Array]:
-    """Hollow marks in the colour of their series, or a dotted curve; their y in display units.
+    """Draw hollow marks in the colour of their series, or a dotted curve; return y as displayed.
 
-    A dotted curve has the colour of ink: it may lie on the fit that it is compared with.
-    `aside` is that of the curve they belong to (`Curve.aside`).
+    A dotted curve has the colour of ink, because it may coincide with the fit to compare. `aside`
+    is `Curve.aside` of the curve that they belong to.
     """
     drawn = []
     for each in marks:
         x = _showable(each.x, panel.x, scale_of(panel.x)) + aside * scale_of(panel.x)
         y = _showable(each.y, panel.y, scale_of(panel.y))
         how: dict[str, Any] = {"color": look.light, "zorder": 3}
-        if each.joined:  # never pale: it would not be seen on a fit that agrees with it
+        if each.joined:  # never pale, or it would be invisible on a fit that coincides with it
             ax.plot(x, y, **{**DOTTED, **how, "color": INK.light})
         else:
             how |= {"alpha": PALE} if each.doubtful else {}
@@ -76,30 +76,30 @@ def draw_published(
 
 
 def series_name(curve: Curve) -> str:
-    """What a curve stands for, which has one look on a page."""
+    """Series of a curve, which has one look on a page."""
     return curve.series or curve.label
 
 
 def hollow_marker(look: Look) -> str:
-    """The sign of a series' published values: its own, where that has an inside."""
+    """Marker of a series' published values: its own marker, or a circle if it cannot be hollow."""
     return "o" if look.marker in "x+" else look.marker
 
 
 def draw_bounds(ax: Axes, curve: Curve, look: Look, x: Array, y: Array) -> Array:
-    """Arrows from those points of a curve that are bounds, at display coordinates (n,).
+    """Draw arrows from the points of a curve that are bounds, at display coordinates (n,).
 
-    Returns: the y of those whose arrow goes up.
+    Returns: y of the points with an upward arrow.
     """
     up = np.zeros(len(y))
-    for end, infinite, way in ((curve.high, np.isposinf, 1.0), (curve.low, np.isneginf, -1.0)):
+    for end, infinite, sign in ((curve.high, np.isposinf, 1.0), (curve.low, np.isneginf, -1.0)):
         if end is not None:
-            up[infinite(np.asarray(end, dtype=float).ravel()[: len(y)])] = way
+            up[infinite(np.asarray(end, dtype=float).ravel()[: len(y)])] = sign
     _draw_bound(ax, x, y, up, {"color": look.light, "zorder": 2.2, "arrowstyle": "<|-"})
     return y[up > 0.0]
 
 
 def _draw_bound(ax: Axes, x: Array, y: Array, up: Array, how: Mapping[str, Any]) -> None:
-    """An arrow of `ARROW` points from each place whose `up` is 1 or -1, with its head away."""
+    """Draw an arrow of `ARROW` points, up or down, from each place with `up` of 1 or -1."""
     arrow = {key: value for key, value in how.items() if key != "zorder"}
     arrow |= {"shrinkA": 0, "shrinkB": 0, "linewidth": 1.2, "mutation_scale": 9}
     for k in np.flatnonzero((up != 0.0) & np.isfinite(x) & np.isfinite(y)):
@@ -109,7 +109,7 @@ def _draw_bound(ax: Axes, x: Array, y: Array, up: Array, how: Mapping[str, Any])
 
 
 def leave_room(ax: Axes, bounds: Array) -> None:
-    """Room above the highest of `bounds` (display units, (n,)) for its arrow."""
+    """Raise the upper limit for the arrow of the highest of `bounds` (display units, (n,))."""
     known = bounds[np.isfinite(bounds)]
     if not known.size:
         return
@@ -123,7 +123,7 @@ def leave_room(ax: Axes, bounds: Array) -> None:
 def prepared(
     curve: Curve, panel: Panel, scale_x: float, scale_y: float
 ) -> tuple[Array, Array, Array | None]:
-    """Coordinates in display units; what a logarithmic axis cannot show becomes a gap."""
+    """Coordinates in display units; values that a logarithmic axis cannot show become gaps."""
     x = _showable(curve.x, panel.x, scale_x)
     y = _showable(curve.y, panel.y, scale_y)
     low = None if curve.y_low is None else _showable(curve.y_low, panel.y, scale_y)
@@ -133,7 +133,7 @@ def prepared(
 
 
 def drawn_points(curve: Curve, panel: Panel, points: int) -> tuple[Array, Array, Array | None]:
-    """x, y and lower edge of a curve as it is drawn: display units, shape (n,), lines decimated."""
+    """Drawn x, y and lower edge of a curve: display units, shape (n,), lines decimated."""
     x, y, y_low = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
     if curve.style in ("points", "band"):
         return x, y, y_low
@@ -141,7 +141,7 @@ def drawn_points(curve: Curve, panel: Panel, points: int) -> tuple[Array, Array,
 
 
 def drawn_interval(curve: Curve, panel: Panel) -> tuple[Array, Array, Array] | None:
-    """x, low and high of a curve's 95 % interval in display units, (n,); None without one."""
+    """Drawn x, low and high of a curve's 95 % interval: display units, (n,); None without one."""
     x, y, _ = prepared(curve, panel, scale_of(panel.x), scale_of(panel.y))
     ends = interval_of(curve, panel, y)
     return None if ends is None else (x, *ends)
@@ -156,7 +156,7 @@ def _showable(values: Array, axis: Axis, scale: float) -> Array:
 def draw_interval(
     ax: Axes, curve: Curve, ends: tuple[Array, Array], look: Look, x: Array, y: Array, points: int
 ) -> None:
-    """The 95 % interval of a curve: bars on points, a band behind a line."""
+    """Draw the 95 % interval of a curve: bars on points, a band behind a line."""
     low, high = ends
     known = np.isfinite(x) & np.isfinite(y) & np.isfinite(low) & np.isfinite(high)
     if not known.any():
@@ -166,16 +166,16 @@ def draw_interval(
         x, low, high = x[some], low[some], high[some]
         ax.fill_between(x, low, high, color=look.light, alpha=0.18, linewidth=0)
         return
-    # One path with gaps, which is a tenth of what a page carries for as many bars by themselves.
+    # One path with gaps has a tenth of the size of separate bars.
     rows = [np.repeat(x[known], 3), np.full(3 * int(known.sum()), np.nan)]
     rows[1][0::3], rows[1][1::3] = np.minimum(low, y)[known], np.maximum(high, y)[known]
     ax.plot(*rows, color=look.light, linewidth=1.0, zorder=1.9, gid=BARS)
 
 
 def interval_of(curve: Curve, panel: Panel, y: Array) -> tuple[Array, Array] | None:
-    """Low and high in display units, each shape (n,); None for a curve that has none.
+    """Low and high in display units, each shape (n,); None for a curve without interval.
 
-    A logarithmic axis has no place for a lower end that is not positive: its bar goes out of sight.
+    A logarithmic axis cannot show a lower end that is not positive: its bar ends out of view.
     """
     if curve.low is None or curve.high is None:
         return None
@@ -188,9 +188,9 @@ def interval_of(curve: Curve, panel: Panel, y: Array) -> tuple[Array, Array] | N
 
 
 def limit_intervals(ax: Axes, values: Array, ends: Sequence[tuple[Array, Array]]) -> None:
-    """Bars that are far longer than what the points tell are cut, so that those can be told apart.
+    """Limit the y axis so that long interval bars do not hide the differences of points.
 
-    `values` are all that is drawn besides the intervals `ends`.
+    `values`: all drawn values without the intervals `ends`.
     """
     finite = values[np.isfinite(values)]
     reach = np.concatenate([np.empty(0), *(np.concatenate(pair) for pair in ends)])
@@ -213,7 +213,7 @@ def limit_intervals(ax: Axes, values: Array, ends: Sequence[tuple[Array, Array]]
 def draw_curve(
     ax: Axes, curve: Curve, look: Look, x: Array, y: Array, y_low: Array | None, points: int
 ) -> None:
-    """A curve in its style, at display coordinates of shape (n,); a long line is decimated."""
+    """Draw a curve in its style, at display coordinates (n,); a long line is decimated."""
     label = curve.label or None
     if curve.style == "band":
         low = np.zeros_like(y) if y_low is None else y_low
@@ -237,7 +237,7 @@ def draw_curve(
     if curve.style == "loop":
         _draw_arrows(ax, x, y, look.light)
     line: dict[str, Any] = {"color": look.light, "label": label, "linewidth": 1.4}
-    if look.dash:  # above the solid lines, which then show through the gaps
+    if look.dash:  # above solid lines, which are then visible through the gaps
         line |= {"dashes": look.dash, "zorder": 2.1}
     if curve.style == "thin":
         line |= {"linewidth": 0.9, "alpha": 0.9}
@@ -247,28 +247,28 @@ def draw_curve(
 
 
 def draw_bar(ax: Axes, look: Look, x: Array, y: Array) -> None:
-    """A pale bar from zero to each number of a named place, behind its dot and interval."""
+    """Draw a pale bar from zero to each number of a named place, behind its dot and interval."""
     ax.bar(x, y, BAR, color=look.light, alpha=0.25, zorder=1.2)
 
 
 def _draw_arrows(ax: Axes, x: Array, y: Array, colour: str) -> None:
-    """Heads of arrows on a line, where it is at `ARROWS` of its length as it is seen."""
+    """Draw arrow heads on a line, at the shares `ARROWS` of its length on the page."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
     if len(x) < 3 or not np.ptp(x) or not np.ptp(y):
         return
-    way = np.concatenate(
+    length = np.concatenate(
         [[0.0], np.cumsum(np.hypot(np.diff(x / np.ptp(x)), np.diff(y / np.ptp(y))))]
     )
     for share in ARROWS:
-        at = np.array([share, share + 0.01]) * way[-1]
-        (x0, x1), (y0, y1) = np.interp(at, way, x), np.interp(at, way, y)
+        at = np.array([share, share + 0.01]) * length[-1]
+        (x0, x1), (y0, y1) = np.interp(at, length, x), np.interp(at, length, y)
         how = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "linewidth": 0}
         ax.annotate("", (x1, y1), xytext=(x0, y0), arrowprops={**how, "mutation_scale": 12})
 
 
 def spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
-    """A constant is drawn as one: an axis does not zoom in on its last digits."""
+    """Draw a constant as one: the axis does not zoom in on its rounding errors."""
     finite = np.concatenate([np.empty(0), *(y[np.isfinite(y)] for y in values)])
     if not finite.size:
         return
@@ -278,5 +278,5 @@ def spare_rounding_errors(ax: Axes, values: Sequence[Array]) -> None:
 
 
 def scale_of(axis: Axis) -> float:
-    """Display units in one of the axis' own."""
+    """Factor from the axis' unit to its display unit."""
     return factor(axis.unit, axis.display) if axis.display and axis.display != axis.unit else 1.0

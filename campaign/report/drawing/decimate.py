@@ -10,23 +10,23 @@ from campaign.result import Figure
 Array = NDArray[np.float64]
 
 POINTS = 3000
-"""Most points of a drawn line: about four per pixel column of a page."""
+"""Maximum number of points of a drawn line: about four per pixel column of a page."""
 FIGURE_POINTS = 40_000
-"""Most points of a figure's lines together; many curves share them."""
+"""Maximum number of points of all lines of a figure."""
 
 
 def points_of_each(figure: Figure) -> int:
-    """Most points of each line of a figure; many lines share what a drawing can carry."""
+    """Maximum number of points of each line of a figure; its lines share `FIGURE_POINTS`."""
     total = sum(len(panel.curves) for panel in figure.panels)
     return max(64, min(POINTS, FIGURE_POINTS // max(total, 1)))
 
 
 def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """At most `points` of the line's own points, both shape (n,), in their order.
+    """Reduce a line to at most `points` of its own points, both shape (n,), in their order.
 
-    Each of `points / 4` equal stretches keeps its extremes in x and in y (for a time series: its
-    first, last, lowest and highest sample), so the picture is the same; a stretch without any
-    finite point stays a gap.
+    Each of `points / 4` equal segments keeps its extremes in x and in y (for a time series: its
+    first, last, lowest and highest sample), so that the picture is the same. A segment without a
+    finite point remains a gap.
     """
     if len(x) <= points:
         return x, y
@@ -35,7 +35,7 @@ def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
 
 
 def kept(x: Array, y: Array, points: int) -> NDArray[np.intp]:
-    """Which points `decimate` leaves, in their order; all where there are but `points`."""
+    """Indices of the points that `decimate` keeps; all for at most `points`."""
     if len(x) <= points:
         return np.arange(len(x))
     edges = np.linspace(0, len(x), max(points // 4, 1) + 1).astype(int)
@@ -59,6 +59,6 @@ def kept(x: Array, y: Array, points: int) -> NDArray[np.intp]:
 def _first(
     values: Array, wanted: Array, starts: NDArray[np.intp], lengths: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Where each stretch first has its wanted value; a stretch without a finite one, its start."""
-    there = np.flatnonzero(values == np.repeat(wanted, lengths))
-    return there[np.searchsorted(there, starts)]
+    """First index of the wanted value in each segment; the start if no value is finite."""
+    matches = np.flatnonzero(values == np.repeat(wanted, lengths))
+    return matches[np.searchsorted(matches, starts)]

@@ -1,4 +1,4 @@
-"""Files of a drawing: the compact SVG, and its CSV; how wide its labels want it."""
+"""Files of a drawing: compact SVG and CSV; minimum width for legible labels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from campaign.report.drawing.slim_svg import slim
 from campaign.result import Figure
 
 LEGIBLE = 9.0
-"""CSS pixels that the smallest label of a figure has at least."""
+"""Minimum size of the smallest label of a figure (CSS pixels)."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class DrawingFiles:
     """A finished drawing.
 
     Attributes:
-        svg: a complete SVG document, as short as it can be.
-        csv: its numbers; empty for a picture that no analysis made.
+        svg: complete compact SVG document.
+        csv: its numbers; empty for a picture that is not from an analysis.
     """
 
     svg: str
@@ -30,17 +30,17 @@ class DrawingFiles:
 
     @classmethod
     def of(cls, svg: str, figure: Figure | None = None) -> Self:
-        """Of an SVG document as it was drawn, and of what it shows."""
+        """Convert a drawn SVG document and its figure."""
         return cls(slim(svg), "" if figure is None else on_a_page(figure_csv(figure)))
 
     @property
     def box(self) -> tuple[float, float]:
         """Width and height in its own units."""
-        found = re.search(r'viewBox="\S+ \S+ ([\d.]+) ([\d.]+)"', self.svg)
-        return (float(found[1]), float(found[2])) if found else (1.0, 1.0)
+        match = re.search(r'viewBox="\S+ \S+ ([\d.]+) ([\d.]+)"', self.svg)
+        return (float(match[1]), float(match[2])) if match else (1.0, 1.0)
 
     @property
     def least(self) -> int:
-        """CSS pixels that it must be wide for its smallest label to be `LEGIBLE`; 0 without any."""
+        """Width (CSS pixels) at which its smallest label has `LEGIBLE` pixels; 0 without labels."""
         fonts = [float(size) for size in re.findall(r"font-size:\s*([\d.]+)px", self.svg)]
         return math.ceil(LEGIBLE / min(fonts) * self.box[0]) if fonts else 0

@@ -16,17 +16,17 @@ from campaign.units import convert
 
 COLUMNS = ("panel", "curve", "x", "y", "low", "high", "x_unit", "y_unit")
 DIGITS = 9
-"""of a number: more than any drawing shows, and less than twice the bytes of all of them."""
+"""Digits of a number: more than a drawing shows, in less than half the bytes of all digits."""
 
 Array = NDArray[np.float64]
 
 
 def figure_csv(figure: Figure) -> str:
-    """A row for each point of each curve: `COLUMNS`.
+    """CSV text with a row for each point of each curve: `COLUMNS`.
 
-    `panel` and `curve` are their titles, or their numbers where they have none of their own. `low`
-    and `high` are the interval of `y`; of a band, which has no `y`, its edges. A line is thinned
-    out as its drawing is, to its own points, extremes included.
+    `panel` and `curve` are titles, or numbers if these are not unique. `low` and `high` are the
+    interval of `y`, or the edges of a band, which has no `y`. A line is decimated as in its
+    drawing, to a subset of its points with all extremes.
     """
     text = io.StringIO()
     text.write(f"{','.join(COLUMNS)}\n")
@@ -42,14 +42,14 @@ def figure_csv(figure: Figure) -> str:
 
 
 def _quoted(*cells: str) -> str:
-    """Cells of a row, quoted where they need it."""
+    """Cells of a row, quoted if necessary."""
     text = io.StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return text.getvalue()
 
 
 def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[str]:
-    """`x,y,low,high` of each point that is written."""
+    """`x,y,low,high` of each written point."""
     x, y = _displayed(curve.x, panel.x), _displayed(curve.y, panel.y)
     count = min(len(x), len(y))
     x, y, low, high = x[:count], y[:count], curve.low, curve.high
@@ -67,7 +67,7 @@ def _rows(curve: Curve, panel: Panel, points: int) -> Iterator[str]:
 
 
 def _names(titles: list[str]) -> list[str]:
-    """Each title, or its place where there is none, or the same one twice."""
+    """Each title, with its number if it is empty or not unique."""
     return [
         title if title and titles.count(title) == 1 else f"{title} {place}".strip()
         for place, title in enumerate(titles, start=1)
@@ -84,7 +84,7 @@ def _unit(axis: Axis) -> str:
 
 
 def _texts(values: Array) -> Iterable[str]:
-    """Each number in `DIGITS`; nothing for one that is not finite."""
+    """Each number in `DIGITS`; empty for one that is not finite."""
     texts = map(f"%.{DIGITS}g".__mod__, values.tolist())
     if np.isfinite(values).all():
         return texts

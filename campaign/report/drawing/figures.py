@@ -1,4 +1,4 @@
-"""Drawing `result.Figure`: panels on a sheet, and how large they are."""
+"""Drawing of `result.Figure`: panels on a sheet, and their sizes."""
 
 from __future__ import annotations
 
@@ -44,27 +44,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SINGLE = 88.0 / 25.4
-"""Inches: the width of one column of a journal."""
+"""Width of one column of a journal (inches)."""
 TALLEST = 230.0 / 25.4
-"""That of a page of a journal, less a caption: rows of panels share it."""
+"""Height of a journal page without a caption (inches); rows of panels share it."""
 LOWEST = 1.4
-"""Inches of a row; where a page has not room for so many, more panels stand side by side."""
+"""Minimum height of a row (inches); with too many rows, more panels are side by side."""
 LETTER, BOLD_LETTER, NUMBER = 5.0, 6.3, 28.0
-"""Points along a line that a letter needs at most, on average; of a bold title; and a number ..."""
+"""Maximum mean width of a letter and of a bold letter, and width of a number (points)."""
 LINE, GAP = 14.0, 8.0
-"""... and across it; and between a number and the next."""
+"""Height of a number, and gap between numbers (points)."""
 SHORTEST, SMALL_TITLE = 12, 7.0
-"""Letters that a line of a title has at least; its points where a word has no room."""
+"""Minimum letters per line of a title; size of a title with a word that is too long (points)."""
 NAME, AROUND = 0.134, 0.7
-"""Inches of a named place along y, and of the title and labels above and below all of them."""
+"""Height of a named place along y, and of the title and labels above and below (inches)."""
 LOW = 2.0
-"""Inches of a row whose panels have nothing but named places along x."""
+"""Maximum height of a row whose panels have named places along x only (inches)."""
 Column = Literal["single", "double"]
 _column: ContextVar[Column] = ContextVar("_column", default="double")
 BESIDE = 0.05
-"""Share of its width that a panel of named places is wider on either side: signs are whole."""
+"""Margin of a panel of named places, as a share of its width: no sign is cut."""
 ROOM = 0.14
-"""Share of its height that a panel is higher on either side, for the labels of points in it."""
+"""Margin of a panel for the labels of its points, as a share of its height."""
 
 
 def draw(
@@ -72,10 +72,10 @@ def draw(
     published: Marks | None = None,
     chosen: Mapping[str, Look] | None = None,
 ) -> str:
-    """A figure as a complete SVG document for white paper.
+    """Draw a figure as a complete SVG document for white paper.
 
-    published: values of a document that stand beside its curves.
-    chosen: the looks of all series of the page; of this figure alone where they are not given.
+    published: published values beside its curves.
+    chosen: looks of all series of the page; default: looks for this figure alone.
     """
     with _drawn(figure, published, chosen) as sheet:
         return to_svg(sheet)
@@ -86,10 +86,10 @@ def draw_sheet(
     published: Marks | None = None,
     chosen: Mapping[str, Look] | None = None,
 ) -> Canvas:
-    """The same as a matplotlib figure, laid out; whatever style holds later, it stays as it is."""
+    """Draw a figure as a matplotlib figure with final layout, independent of a later style."""
     with _drawn(figure, published, chosen) as sheet:
         place_axes(sheet)
-        sheet.draw_without_rendering()  # ticks are made when they are drawn, in the style of then
+        sheet.draw_without_rendering()  # creates the ticks in the present style
         return sheet
 
 
@@ -97,7 +97,7 @@ def draw_sheet(
 def _drawn(
     figure: Figure, published: Marks | None, chosen: Mapping[str, Look] | None
 ) -> Iterator[Canvas]:
-    """A sheet with the figure on it, in the report's style."""
+    """Sheet with the figure, in the report's style."""
     import matplotlib as mpl
 
     published, chosen = published or {}, chosen or looks(series_of(figure))
@@ -132,7 +132,7 @@ def _drawn(
 
 
 def series_of(figure: Figure) -> list[str]:
-    """The series of all its curves and marks, in their order."""
+    """Series of all curves and marks of a figure, in their order."""
     curves = [series_name(curve) for panel in figure.panels for curve in panel.curves]
     marks = [mark.series for panel in figure.panels for mark in panel.marks if mark.series]
     return [*curves, *marks]
@@ -146,13 +146,13 @@ def _titles_say_it(figure: Figure) -> bool:
 
 
 def letter(place: int) -> str:
-    """What a panel is called by: a, b, ..."""
+    """Letter of a panel: a, b, ..."""
     return "abcdefghijklmnopqrstuvwxyz"[place % 26]
 
 
 @contextmanager
 def in_column(column: Column) -> Iterator[None]:
-    """Within the block, figures are as wide as a column of a journal."""
+    """Draw figures within the block in the width of a journal's column."""
     before = _column.set(column)
     try:
         yield
@@ -171,7 +171,7 @@ def _across(figure: Figure) -> int:
 
 
 def _lowest(figure: Figure) -> float:
-    """Inches of a row of panels that has room for its names and numbers."""
+    """Minimum height of a row of panels, with its named places (inches)."""
     names = max((len(panel.y.places) for panel in figure.panels), default=0)
     return max(LOWEST, NAME * names + AROUND if names else 0.0)
 
@@ -191,13 +191,13 @@ def _size(figure: Figure) -> tuple[float, float]:
 
 
 def _turned(panel: Panel, wide: float) -> bool:
-    """Whether names along x stand upright, since they have no room side by side."""
+    """Whether names along x are vertical for lack of room."""
     long = [max(map(len, name.split("\n"))) + 1 for _, name in panel.x.places]
     return LETTER * max(map(sum, pairwise(long)), default=0) / 2 > wide / max(len(long), 1)
 
 
 def _title_type(figure: Figure, wide: float) -> tuple[int, float]:
-    """Letters of a line of the panels' titles, and their size (points)."""
+    """Letters per line of the panels' titles, and their size (points)."""
     words = " ".join(panel.title for panel in figure.panels).replace("-", "- ").split()
     word = max(map(len, words), default=0)
     if word * BOLD_LETTER <= wide:
@@ -210,7 +210,7 @@ def _longest(panel: Panel) -> int:
 
 
 def _room(figure: Figure) -> tuple[float, float]:
-    """Points of a panel's width and height beside the labels of its axes."""
+    """Width and height of a panel without the labels of its axes (points)."""
     (width, height), across = _size(figure), _across(figure)
     down = -(-len(figure.panels) // across)
     return 72.0 * width / across - 50.0, 72.0 * (height - 0.35) / max(down, 1) - 45.0
@@ -221,8 +221,7 @@ class _Drawn:
     """A panel with its curves, before its ticks and labels.
 
     Attributes:
-        x, y: all that is shown along each axis, in display units; of what is drawn aside, its
-            true x.
+        x, y: all values along each axis, in display units; x without the offset `aside`.
     """
 
     ax: Axes
@@ -257,8 +256,8 @@ def _draw_panel(
         marks = published.get(number, ())
         values = draw_published(ax, marks, look, panel, curve.aside)
         beside += values
-        told = zip(marks, values, strict=True)
-        bounds += [own for each, own in told if each.bound == "at least"]
+        pairs = zip(marks, values, strict=True)
+        bounds += [own for each, own in pairs if each.bound == "at least"]
     for set_scale, axis in ((ax.set_xscale, panel.x), (ax.set_yscale, panel.y)):
         if axis.scale == "log" and any(np.isfinite(y).any() for _, y, _ in shown):
             set_scale("log")
@@ -277,7 +276,7 @@ def _draw_panel(
 
 
 def _share_scales(sets: Sequence[_Drawn]) -> None:
-    """Give panels whose y axes are alike the limits that hold what all of them show."""
+    """Give panels with the same kind of y axis common limits."""
     alike: dict[tuple[str, ...], list[Axes]] = {}
     for each in sets:
         y = each.panel.y
@@ -289,12 +288,12 @@ def _share_scales(sets: Sequence[_Drawn]) -> None:
 
 
 def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]) -> PanelMarks:
-    """Ticks, marks, and what is said of an empty panel, once its limits are known."""
+    """Draw ticks, marks, and the note of an empty panel, after its limits are known."""
     ax, panel = drawn.ax, drawn.panel
     scale_x, scale_y = scale_of(panel.x), scale_of(panel.y)
     _label_axes(ax, panel, room)
     marked = PanelMarks(ax, panel.marks, scale_x, scale_y, chosen, TITLE_PAD)
-    draw_marks(marked)  # they may widen what is in view
+    draw_marks(marked)  # marks may widen the limits
     number = max(NUMBER, LETTER * decade_letters(ax.get_xlim()) + GAP)
     set_ticks(ax.xaxis, panel.x, drawn.x, scale_x, int(room[0] / number))
     set_ticks(ax.yaxis, panel.y, drawn.y, scale_y, int(room[1] / LINE))
@@ -308,7 +307,7 @@ def _finish(drawn: _Drawn, chosen: Mapping[str, Look], room: tuple[float, float]
 
 
 def _label_axes(ax: Axes, panel: Panel, room: tuple[float, float]) -> None:
-    """Names of the axes, in as many lines as they are short of them."""
+    """Label the axes, with line breaks at the length of the axes."""
     for name, axis, long in ((ax.set_xlabel, panel.x, room[0]), (ax.set_ylabel, panel.y, room[1])):
         name(fill(axis_label(axis), max(12, int(long / LETTER)), break_long_words=False))
 
@@ -322,7 +321,7 @@ def _limit_axes(ax: Axes, panel: Panel, scale_x: float, scale_y: float) -> None:
 
 
 def axis_label(axis: Axis) -> str:
-    """`label (unit)` in the unit of the page; places with names of their own have none."""
+    """`label (unit)` in the display unit; an axis of named places has no unit."""
     unit = "" if axis.places else axis.display or axis.unit
     if unit and axis.label.endswith(")"):
         return f"{axis.label[:-1]}, {pretty_unit(unit)})"

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 LETTER, SIGN = 0.072, 0.65
-"""Inches of a letter in a legend, and of the sign before an entry with the space around both."""
+"""Width of a letter in a legend, and of the sign of an entry with all spaces (inches)."""
 MOST_SIGNS = 4
-"""Published series whose signs stand beside one word in a legend; a figure may have more."""
+"""Maximum number of signs of published series beside one entry of a legend."""
 
 
 def add_legend(sheet: Canvas, axes: Sequence[Axes], more: Mapping[str, Any] | None = None) -> None:
-    """One legend for all panels, above them, where it covers no data.
+    """Add one legend for all panels above them, where it covers no data.
 
-    more: entries behind those of the axes, label to sign.
+    more: further entries, sign by label.
     """
     from matplotlib.legend_handler import HandlerTuple
 
@@ -49,7 +49,7 @@ def add_legend(sheet: Canvas, axes: Sequence[Axes], more: Mapping[str, Any] | No
 
 
 def _sign(handle: Any) -> object:
-    """What a curve looks like: one may be a line in one panel, and dots in another."""
+    """Look of a curve: it may be a line in one panel, and dots in another."""
     from matplotlib.lines import Line2D
 
     if not isinstance(handle, Line2D):
@@ -58,7 +58,7 @@ def _sign(handle: Any) -> object:
 
 
 def _columns(lengths: Sequence[int], width: float) -> int:
-    """Most columns of a legend, `width` inches wide, for entries of so many characters."""
+    """Maximum number of columns of a legend in `width` (inches), for entries of these `lengths`."""
     for columns in range(len(lengths), 1, -1):
         widest = [max(lengths[column::columns]) for column in range(columns)]
         if sum(LETTER * each + SIGN for each in widest) <= width:
@@ -67,7 +67,7 @@ def _columns(lengths: Sequence[int], width: float) -> int:
 
 
 def published_signs(figure: Figure, published: Marks, chosen: Mapping[str, Look]) -> dict[str, Any]:
-    """Entries of a legend for published values: the hollow signs that there are, side by side."""
+    """Legend entries of published values: their hollow signs side by side."""
     from matplotlib.lines import Line2D
 
     signs: dict[str, dict[tuple[str, str], Any]] = {}

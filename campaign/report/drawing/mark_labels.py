@@ -1,7 +1,7 @@
 """Marks of a panel, and their labels placed off the data.
 
-Labels of lines and stretches stand outside of the axes, where no curve is; the label of a point
-stands beside it where there is room, else outside as well.
+Labels of lines and stretches are outside of the axes, away from the curves. The label of a point is
+beside it if there is room, else outside.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 SIZE = 8.0
-"""Points: the smallest text of a figure."""
+"""Size of the smallest text of a figure (points)."""
 ROW = 10.5
-"""Points from one row of labels to the next."""
+"""Pitch of rows of labels (points)."""
 GAP = 2.0
-"""Points between the axes and a label."""
+"""Distance between the axes and a label (points)."""
 WRAP = 16
-"""Characters of a line of a label in the margin, which takes its width from the axes."""
+"""Characters per line of a label in the margin, which reduces the width of the axes."""
 SPARE = 1.15
-"""Share by which a page's own font may be wider than the one that is measured here."""
+"""Ratio by which the font of a page may be wider than the measured font."""
 DISTANCES = (5.0, 10.0, 18.0, 28.0, 42.0, 60.0)
-"""Points from a dot to the nearest corner or side of its label."""
+"""Distances from a dot to the nearest corner or side of its label (points)."""
 LEADER = 16.0
-"""Points from which on a thin line leads from the dot to its label."""
+"""Minimum distance for a thin line from the dot to its label (points)."""
 WAYS = tuple(math.radians(angle) for angle in (45, 0, 135, 180, -45, -135, 90, -90))
 
 
 @dataclass
 class PanelMarks:
-    """The marks of one panel while they are drawn.
+    """Drawing state of the marks of one panel.
 
     Attributes:
-        above, beside, inside: labels over the axes, in their right margin, and next to dots.
-        points: dots whose labels have no place yet: x, y (display units), label, colour.
+        above, beside, inside: labels above the axes, in their right margin, and next to dots.
+        points: dots whose labels are not placed in the margin: x, y (display units), label, colour.
     """
 
     ax: Axes
@@ -65,7 +65,7 @@ class PanelMarks:
 
 
 def draw_marks(marked: PanelMarks) -> None:
-    """Lines, stretches and dots; labels are told `place_labels`."""
+    """Draw lines, stretches and dots, and collect labels for `place_labels`."""
     ax = marked.ax
     for mark in marked.marks:
         x = None if mark.x is None else mark.x * marked.scale_x
@@ -152,7 +152,7 @@ def _text(
 
 
 def place_labels(sheet: Canvas, panels: Sequence[PanelMarks]) -> None:
-    """Give every label its place, and make room for those outside of their axes."""
+    """Place every label, and make room for labels outside of their axes."""
     margins = sheet.get_layout_engine()
     if not any(each.above or each.beside or each.points for each in panels) or margins is None:
         return
@@ -162,22 +162,22 @@ def place_labels(sheet: Canvas, panels: Sequence[PanelMarks]) -> None:
     margins.execute(sheet)
     outside = [each for each in panels if _place_points(sheet, each)]
     if outside:
-        margins.execute(sheet)  # axes have given way to labels in the margin
+        margins.execute(sheet)  # labels in the margin make the axes smaller
         for each in panels:
             _place_points(sheet, each)
     for each in panels:
         _spread_beside(sheet, each)
-    sheet.set_layout_engine("none")  # what was placed stays where it is
+    sheet.set_layout_engine("none")  # keeps all placed labels
 
 
 def _extent(text: Annotation) -> Bbox:
-    """Where a label is (pixels), somewhat wider than it is here."""
+    """Box of a label (pixels), widened by `SPARE`."""
     box = text.get_window_extent()
     return box.expanded(SPARE, 1.0)
 
 
 def _stack_above(sheet: Canvas, marked: PanelMarks) -> None:
-    """Labels over the axes: within their width, in as many rows as keep them apart."""
+    """Place labels above the axes, within their width, in rows without overlap."""
     ends: list[float] = []
     axes = marked.ax.get_window_extent()
     per_point = sheet.dpi / 72
@@ -194,7 +194,7 @@ def _stack_above(sheet: Canvas, marked: PanelMarks) -> None:
 
 
 def _spread_beside(sheet: Canvas, marked: PanelMarks) -> None:
-    """Labels right of the axes: each at its level, moved up where it would meet the one below."""
+    """Place labels right of the axes at their level, moved up to avoid the label below."""
     per_point = sheet.dpi / 72
     lowest = -math.inf
     at = marked.ax.get_yaxis_transform()
@@ -207,7 +207,7 @@ def _spread_beside(sheet: Canvas, marked: PanelMarks) -> None:
 
 
 def _place_points(sheet: Canvas, marked: PanelMarks) -> bool:
-    """Labels of dots, each in the nearest free place; whether one had to go into the margin."""
+    """Place labels of dots; return whether one moved to the margin for lack of room."""
     ax, outside = marked.ax, []
     for text in marked.inside:
         text.remove()
@@ -235,9 +235,9 @@ def _beside_dot(
     colour: str,
     taken: list[Bbox],
 ) -> Bbox | None:
-    """Put the label of a dot into the nearest free place, and say which; None without any.
+    """Put the label of a dot into the nearest free place; return its box, or None without any.
 
-    taken: where labels and the lines to them are already; a new line is added.
+    taken: boxes of placed labels and of lines to them; the box of a new line is added.
     """
     ax = marked.ax
     frame = ax.get_window_extent()
@@ -246,8 +246,8 @@ def _beside_dot(
     per_point = sheet.dpi / 72
     half_width, half_height = 0.5 * size.width / per_point, 0.5 * size.height / per_point
     for distance in DISTANCES:
-        for way in WAYS:
-            east, north = math.cos(way), math.sin(way)
+        for direction in WAYS:
+            east, north = math.cos(direction), math.sin(direction)
             offset = (
                 east * distance + half_width * float(np.sign(round(east, 6))),
                 north * distance + half_height * float(np.sign(round(north, 6))),
@@ -269,7 +269,7 @@ def _beside_dot(
 
 
 def _lead(ax: Axes, dot: tuple[float, float], end: tuple[float, float], colour: str) -> Annotation:
-    """A thin line from a dot to its label, which begins at `end` (points from the dot)."""
+    """Draw a thin line from a dot to its label at `end` (points from the dot)."""
     return ax.annotate(
         "",
         dot,
@@ -286,12 +286,12 @@ def _between(one: Any, other: Any) -> Bbox:
 
 
 def covers_data(ax: Axes, box: Bbox) -> bool:
-    """Whether anything that is drawn of curves, their bars included, lies within `box` (pixels)."""
+    """Whether a curve, or a bar of an interval, intersects `box` (pixels)."""
     for line in ax.lines:
         path = line.get_path().transformed(line.get_transform())
         if line.get_linestyle() != "None" and path.intersects_bbox(box, filled=False):
             return True
-        spare = line.get_markersize()  # more than half of it, at any resolution
+        spare = line.get_markersize()  # more than half a marker, at any resolution
         if line.get_marker() not in ("None", None, "") and _holds(box.padded(spare), path.vertices):
             return True
     return False

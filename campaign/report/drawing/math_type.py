@@ -1,8 +1,8 @@
 """Symbols of labels in math type, and true minus signs.
 
-Experiments write `σ0` or `T_c` as one writes on a keyboard. A symbol is italic and its index
-upright (ISO 80000-1), whichever format is drawn: in an SVG document as spans of the same text,
-elsewhere by matplotlib's mathtext.
+Experiments write `σ0` or `T_c` in plain text. A symbol becomes italic and its index upright
+(ISO 80000-1) in all formats: in an SVG document by spans of the text, in others by matplotlib's
+mathtext.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.backend_bases import RendererBase
 
 SHARE = 0.75
-"""Size of an index in that of its text: 6 pt at 8 pt, the least that Elsevier's guide allows."""
+"""Size of an index relative to its text: 6 pt at 8 pt, the minimum of Elsevier's guide."""
 LEAST = 8.6
-"""Points of a text with an index, where matplotlib decides on the share (0.7)."""
+"""Minimum size (points) of a text with an index in mathtext, whose fixed share is 0.7."""
 DOWN = 0.2
-"""Ems of an index from its baseline to the text's."""
+"""Distance of an index below the baseline of its text (em)."""
 
 _SYMBOL = re.compile(
     r"(?<![^\W\d_])(?:"
@@ -35,23 +35,23 @@ _LOWERED = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
 
 def pieces(text: str) -> Iterator[tuple[str, str, str]]:
-    """(words before, symbol, index) for each symbol; the words behind the last with neither."""
+    """(text before, symbol, index) for each symbol; then the remaining text with neither."""
     text = _MINUS.sub("−", text)
     here = 0
-    for found in _SYMBOL.finditer(text):
-        symbol = found["greek"] or found["index"] or found["short"] or found["alone"]
-        index = found["digits"] or found["word"] or found["tail"] or ""
-        yield text[here : found.start()], symbol, index.removeprefix("_").translate(_LOWERED)
-        here = found.end()
+    for match in _SYMBOL.finditer(text):
+        symbol = match["greek"] or match["index"] or match["short"] or match["alone"]
+        index = match["digits"] or match["word"] or match["tail"] or ""
+        yield text[here : match.start()], symbol, index.removeprefix("_").translate(_LOWERED)
+        here = match.end()
     yield text[here:], "", ""
 
 
 def in_mathtext(text: str) -> tuple[str, bool]:
-    """A label for matplotlib, and whether it is to be parsed as one with math in it."""
-    found = list(pieces(text))
-    if len(found) == 1:
-        return found[0][0], False
-    return "".join(_mathtext(*each) for each in found), True
+    """Label for matplotlib, and whether matplotlib must parse it as math."""
+    parts = list(pieces(text))
+    if len(parts) == 1:
+        return parts[0][0], False
+    return "".join(_mathtext(*each) for each in parts), True
 
 
 def _mathtext(words: str, symbol: str, index: str) -> str:
@@ -63,7 +63,7 @@ def _mathtext(words: str, symbol: str, index: str) -> str:
 
 
 def in_svg(svg: str) -> str:
-    """An SVG document of matplotlib's, whose texts are text, with its symbols in math type."""
+    """Set the symbols of a matplotlib SVG document in math type; its texts must be text."""
     return re.sub(r"(?<=>)([^<>]+)(?=</text>)", lambda text: _spans(text[1]), svg)
 
 
@@ -84,7 +84,7 @@ def _spans(text: str) -> str:
 
 @contextmanager
 def math_type(renderer: RendererBase) -> Iterator[None]:
-    """Within the block, `renderer` sets symbols in math type, where it writes no SVG document."""
+    """Let `renderer` set symbols in math type within the block, except in an SVG document."""
     from matplotlib.backends.backend_svg import RendererSVG
 
     if isinstance(getattr(renderer, "_renderer", renderer), RendererSVG):

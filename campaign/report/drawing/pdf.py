@@ -1,7 +1,7 @@
 """Figures as PDF for LaTeX.
 
-Nobody who draws knows of it: within `also_as_pdf`, each sheet that becomes an SVG document is kept
-as a PDF of one page until somebody takes it.
+Drawing functions need no change: within `also_as_pdf`, each sheet that becomes an SVG document is
+kept as a PDF of one page until the caller takes it (`taken`).
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 METADATA = {"CreationDate": None, "ModDate": None, "Creator": None, "Producer": None}
-"""Nothing that changes from run to run."""
+"""Omits metadata that changes from run to run."""
 
 _kept: ContextVar[list[bytes] | None] = ContextVar("_kept", default=None)
 
 
 @contextmanager
 def also_as_pdf() -> Iterator[None]:
-    """Within the block, `taken` has the sheet that was drawn last."""
+    """Keep the last drawn sheet for `taken` within the block."""
     before = _kept.set([])
     try:
         yield
@@ -32,12 +32,12 @@ def also_as_pdf() -> Iterator[None]:
 
 
 def keeps_pdf() -> bool:
-    """Whether sheets are kept, by whoever draws them here."""
+    """Whether sheets are kept in this context."""
     return _kept.get() is not None
 
 
 def keep_as_pdf(sheet: Canvas) -> None:
-    """Called with every finished sheet; outside of `also_as_pdf` it does nothing."""
+    """Keep a finished sheet as PDF; outside of `also_as_pdf` do nothing."""
     kept = _kept.get()
     if kept is not None:
         out = io.BytesIO()
@@ -46,6 +46,6 @@ def keep_as_pdf(sheet: Canvas) -> None:
 
 
 def taken() -> bytes | None:
-    """The last sheet that was drawn, as PDF, once; None when there is none."""
+    """Take the last drawn sheet as PDF, only once; None without any."""
     kept = _kept.get()
     return kept.pop() if kept else None

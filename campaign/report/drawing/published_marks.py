@@ -1,8 +1,8 @@
 """Published values beside the curves of a figure.
 
-A curve says of which quantity its points are and under which conditions; a published cell that
-agrees with all of that is a hollow mark, at the cell's own place along x. Where a document prints
-the parameters of a curve instead, the curve that they give is drawn.
+A curve has a quantity and conditions. A published cell with the same quantity and conditions is a
+hollow mark at the cell's x. If a document prints the parameters of a curve instead, the resulting
+curve is drawn.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from campaign.units import convert
 DRAWN = ("equal", "near")
 """Relations of a cell that is a value ..."""
 BOUNDS = ("at least", "at most")
-"""... and of one that is a bound, which an arrow goes from; a rank has no place on an axis."""
+"""... and of one that is a bound, with an arrow; a rank has no place on an axis."""
 FINE = 300
-"""Points of a published curve."""
+"""Number of points of a published curve."""
 DOUBTFUL = "inconsistent or not reproducible"
 
 
@@ -33,10 +33,10 @@ class PublishedMarks:
 
     Attributes:
         x, y: shape (n,).
-        tables: headings of the tables they are from.
-        joined: points of a curve that was worked out from published parameters.
-        doubtful: the document contradicts itself there, or nobody could reproduce it.
-        bound: `at least` or `at most`, where the values are no more than that.
+        tables: headings of their tables.
+        joined: whether they are a curve computed from published parameters.
+        doubtful: whether the document contradicts itself, or they are not reproducible.
+        bound: `at least` or `at most` for bounds, else "".
     """
 
     x: Array
@@ -48,17 +48,17 @@ class PublishedMarks:
 
 
 Place = tuple[int, int]
-"""Number of a panel in its figure, and of a curve in that panel."""
+"""Index of a panel in its figure, and of a curve in that panel."""
 Marks = Mapping[Place, Sequence[PublishedMarks]]
 
 
 @dataclass(frozen=True)
 class PublishedBeside:
-    """What a test's figures are compared with.
+    """Published tables beside a test's figures.
 
     Attributes:
-        tables: those that the test stands for, of the document that its protocol names.
-        known: conditions that hold for every curve which does not state them itself.
+        tables: tables that the test reproduces, of the document that its protocol names.
+        known: default conditions of every curve that does not state them.
     """
 
     tables: Sequence[PublishedTable] = ()
@@ -68,17 +68,17 @@ class PublishedBeside:
     def of(
         cls, published: Published, reproduces: Iterable[str], known: Mapping[str, Value]
     ) -> PublishedBeside:
-        """With the tables that a test reproduces; names that the document lacks have none."""
+        """Select the tables that a test reproduces; unknown names are ignored."""
         return cls([published[name] for name in reproduces if name in published], known)
 
     def marks(self, figure: Figure) -> Marks:
-        """What is published of each curve of a figure; curves without anything are missing."""
-        found = {
+        """Published values of each curve of a figure; curves without any are missing."""
+        by_curve = {
             (place, number): tuple(self._of_curve(curve, panel))
             for place, panel in enumerate(figure.panels)
             for number, curve in enumerate(panel.curves)
         }
-        return {place: marks for place, marks in found.items() if marks}
+        return {place: marks for place, marks in by_curve.items() if marks}
 
     def _of_curve(self, curve: Curve, panel: Panel) -> Iterator[PublishedMarks]:
         for doubtful in (False, True):
@@ -91,7 +91,7 @@ class PublishedBeside:
     def _points(
         self, curve: Curve, panel: Panel, doubtful: bool, relations: Sequence[str]
     ) -> Iterator[PublishedMarks]:
-        found = [
+        points = [
             (x, y, table.heading)
             for table in self.tables
             for cell in table.cells
@@ -99,14 +99,14 @@ class PublishedBeside:
             if (x := _along(curve, cell)) is not None and self._agree(curve, cell, relations)
             if (y := _value(cell, panel.y.unit)) is not None
         ]
-        if found:
-            xs, ys, headings = zip(*found, strict=True)
+        if points:
+            xs, ys, headings = zip(*points, strict=True)
             tables = tuple(dict.fromkeys(headings))
             bound = relations[0] if relations[0] in BOUNDS else ""
             yield PublishedMarks(np.array(xs), np.array(ys), tables, doubtful=doubtful, bound=bound)
 
     def _curves(self, curve: Curve, doubtful: bool) -> Iterator[PublishedMarks]:
-        """One for each table that prints every parameter once under the curve's conditions."""
+        """Curve of each table with exactly one value per parameter under the curve's conditions."""
         x = _range(curve.x)
         for table in self.tables:
             cells = [
@@ -122,7 +122,7 @@ class PublishedBeside:
                 yield PublishedMarks(x, y, (table.heading,), joined=True, doubtful=doubtful)
 
     def _agree(self, curve: Curve, cell: Cell, relations: Sequence[str] = DRAWN) -> bool:
-        """Whether the curve states each condition of a cell but the one along x."""
+        """Whether the curve states all conditions of a cell, except the one along x."""
         stated = {**self.known, **curve.conditions}
         return cell.relation in relations and all(
             name in stated and same_value(stated[name], value)
@@ -132,7 +132,7 @@ class PublishedBeside:
 
 
 def _along(curve: Curve, cell: Cell) -> float | None:
-    """Where a cell stands along x; beside the only point of a curve that nothing runs along."""
+    """Position of a cell along x; without a condition along x, that of the curve's only point."""
     if not curve.along:
         return float(curve.x[0]) if len(curve.x) == 1 else None
     x = cell.conditions.get(curve.along)
@@ -140,7 +140,7 @@ def _along(curve: Curve, cell: Cell) -> float | None:
 
 
 def _value(cell: Cell, unit: str) -> float | None:
-    """A cell in `unit`; None where that is of another kind."""
+    """Value of a cell in `unit`; None for an incompatible unit or a value that is not finite."""
     try:
         value = float(convert(cell.value, cell.unit, unit))
     except ValueError:
@@ -149,9 +149,9 @@ def _value(cell: Cell, unit: str) -> float | None:
 
 
 def _range(x: Array) -> Array:
-    """`FINE` places from one end of a curve to the other; at equal ratios where all are positive.
+    """`FINE` values over the range of a curve, at equal ratios if all are positive.
 
-    Empty where it has no two places.
+    Empty for fewer than two different values.
     """
     finite = np.asarray(x, dtype=float)[np.isfinite(x)]
     if not finite.size or finite.min() == finite.max():
@@ -161,7 +161,7 @@ def _range(x: Array) -> Array:
 
 
 def published_text(marks: Marks) -> str:
-    """A sentence for each sort of sign: which tables it stands for; "" without any."""
+    """Sentence for each kind of sign with its tables; "" without marks."""
     every = [each for group in marks.values() for each in group]
     sentences = []
     for joined, bound in product((False, True), ("", *BOUNDS)):
@@ -179,7 +179,7 @@ def published_text(marks: Marks) -> str:
 
 
 def _listed(headings: Sequence[str]) -> str:
-    """`Tables 5.2, 5.4; Figure 5.14`, in their order."""
+    """Headings in short, such as `Tables 5.2, 5.4; Figure 5.14`, in their order."""
     parts = []
     for word, group in groupby(headings, key=lambda heading: heading.split(" ")[0]):
         numbers = [heading.split(" ", 1)[1] for heading in group]

@@ -11,15 +11,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LEFT, RIGHT = -0.015, 1.015
-"""Places beside the axes, in shares of their width."""
+"""Positions beside the axes, as shares of their width."""
 LABEL = 58
-"""Letters of a row's name."""
+"""Maximum number of letters of a row's name."""
 
 
 def word(
     ax: Axes, x: float, row: float, text: str, look: Look, size: float = 7.5, **more: Any
 ) -> None:
-    """A word beside the axes: left of `LEFT`, right of `RIGHT`."""
+    """Write a text beside the axes: left of `LEFT`, or right of `RIGHT`."""
     side = "right" if x < 0.5 else "left"
     at: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": side, "va": "center"}
     short = text if len(text) <= LABEL else f"{text[: LABEL - 1]}…"
@@ -27,7 +27,7 @@ def word(
 
 
 def set_rows(ax: Axes, ends: tuple[float, float], lines: int = 0) -> None:
-    """Rows from top to bottom in place of a y axis, and so many lines between them."""
+    """Replace the y axis by rows from top to bottom, with `lines` lines between them."""
     ax.set_ylim(*ends)
     ax.yaxis.set_visible(False)
     ax.spines["left"].set_visible(False)
@@ -37,17 +37,17 @@ def set_rows(ax: Axes, ends: tuple[float, float], lines: int = 0) -> None:
 
 
 def zero_line(ax: Axes) -> None:
-    """Where nothing differs."""
+    """Draw the line of zero difference."""
     ax.axvline(0, color=INK.light, linewidth=0.9, zorder=1)
 
 
 def signed_decades(
     ax: Axes, limit: float, linear: float, scale: float, told: Callable[[float], str]
 ) -> None:
-    """An x axis to both sides of 0, linear up to `linear` and logarithmic beyond it.
+    """Set an x axis with both signs, linear up to `linear` and logarithmic beyond.
 
-    limit: of what is labelled. scale: decades that the linear part is as long as. told: a label,
-    with a hyphen for a minus.
+    limit: largest labelled value. scale: length of the linear part in decades. told: label of a
+    value, with a hyphen for a minus.
     """
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 

@@ -1,8 +1,8 @@
 """The scoreboard as a figure: deviation of each published cell.
 
-A few cells have a row each. Many share one row per table, where they lie side by side on the axis,
-and the farthest of each is named. Either way the picture fits a screen, each sign tells in its
-tooltip which cell it is, and has the class of its status, so that a page can hide some.
+With few cells, each has a row. Many cells share one row per table, with the name of the cell of the
+largest deviation. The picture always fits a screen. Each sign has a tooltip with its cell, and the
+class of its status, so that a page can hide some.
 """
 
 from __future__ import annotations
@@ -35,33 +35,34 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HIGHEST = 8.0
-"""Inches, of 6.9 inches of width: on a page that shows it 768 pixels wide, 890 pixels."""
+"""Maximum height (inches) at 6.9 inches of width: 890 pixels on a page of 768 pixels of width."""
 PITCH = (0.125, 0.17)
-"""Inches from row to row where each cell has its own: the least that its words need, the most."""
+"""Minimum (for legible words) and maximum pitch of rows of cells (inches)."""
 HEADING = 0.24
-"""Inches for the name of a table above its cells."""
+"""Height of the name of a table above its cells (inches)."""
 TABLE_PITCH = (0.13, 0.42)
-"""Inches from row to row where a row is a table: the least that its words need, and the most."""
+"""Minimum (for legible words) and maximum pitch of rows of tables (inches)."""
 AROUND = 0.6
-"""Inches for the axis, and for each row of the legend ..."""
+"""Height of the axis ..."""
 LEGEND = 0.19
+"""... and of each row of the legend (inches)."""
 LINEAR = 1.0
-"""Percent up to which the deviation axis is linear; beyond, it is logarithmic."""
+"""Limit (percent) of the linear part of the deviation axis, which is logarithmic beyond."""
 SMALL = 6.3
-"""Points, of the smallest words: 9.7 pixels on a page that shows it 768 pixels wide."""
+"""Size of the smallest words (points): 9.7 pixels on a page of 768 pixels of width."""
 WORD = 0.06
-"""Inches from the axes to the middle of a word above them."""
+"""Distance from the axes to the middle of a word above them (inches)."""
 SHORT = 30
-"""Characters that the name of the farthest cell may have."""
+"""Maximum number of characters of the name of the farthest cell."""
 SIGN = 4.2
-"""Points of a sign among many."""
+"""Size of a sign in a row of a table (points)."""
 ACROSS = 4
-"""Statuses side by side in the legend."""
+"""Number of statuses side by side in the legend."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row of the picture: a table, or the tables that have no row of their own."""
+    """One row of the picture: a table, or all tables without a row of their own."""
 
     name: str
     lines: tuple[Line, ...]
@@ -72,7 +73,7 @@ class Row:
 
 
 def draw_overview(scoreboard: Scoreboard) -> str | None:
-    """The picture as an SVG document; None when no cell was compared."""
+    """Draw the picture as an SVG document; None if no cell has a deviation."""
     lines = [line for line in scoreboard.lines if line.deviation is not None]
     if not lines:
         return None
@@ -103,7 +104,7 @@ def _row(name: str, lines: tuple[Line, ...]) -> Row:
 
 
 def _few(rows: list[Row], most: int) -> list[Row]:
-    """At most so many rows; the last one then stands for all further tables."""
+    """Limit the rows to `most`; the last one then contains all further tables."""
     if len(rows) <= most:
         return rows
     rest = rows[most - 1 :]
@@ -112,7 +113,7 @@ def _few(rows: list[Row], most: int) -> list[Row]:
 
 
 def _draw_cells(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
-    """A row for each cell, with its name, below the name of its table; `pitch` in inches."""
+    """Draw a row for each cell below the name of its table; `pitch` in inches."""
     gap = HEADING / pitch
     size = min(7.5, 54.0 * pitch)
     y = 0.0
@@ -133,11 +134,11 @@ def _draw_cells(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
 
 
 def _draw_tables(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
-    """A row for each table: its cells side by side, the farthest by name; `pitch` in inches."""
+    """Draw a row for each table with the name of its farthest cell; `pitch` in inches."""
     set_rows(ax, (len(rows) - 0.5, -0.5))
     word(ax, LEFT, -0.5 - WORD / pitch, "table (cells)", MUTED, SMALL)
     word(ax, RIGHT, -0.5 - WORD / pitch, "its farthest cell", MUTED, SMALL)
-    # Signs that would cover each other go to lanes of their own, as many as the row is high.
+    # Signs that would overlap use different lanes, within the height of the row.
     lanes = max(1, int(72.0 * pitch / (SIGN + 0.8)))
     for y, row in enumerate(rows):
         ax.axhline(y + 0.5, color=HAIRLINE.light, linewidth=0.6, zorder=0)
@@ -150,9 +151,9 @@ def _draw_tables(ax: Axes, rows: Sequence[Row], pitch: float) -> None:
 
 
 def _lanes(ax: Axes, lines: Sequence[Line], lanes: int) -> list[int]:
-    """Which lane, counted from the middle one, each sign goes to: the nearest that is free there.
+    """Lane of each sign, counted from the middle one: the nearest free lane.
 
-    Where all are taken, the one whose last sign is farthest away.
+    If no lane is free, the lane whose last sign is farthest away.
     """
     places = ax.transData.transform([(line.deviation or 0.0, 0.0) for line in lines])[:, 0]
     width = (SIGN + 0.4) * ax.get_figure(root=True).dpi / 72.0  # type: ignore[union-attr]
@@ -168,7 +169,7 @@ def _lanes(ax: Axes, lines: Sequence[Line], lanes: int) -> list[int]:
 
 
 def _told(line: Line) -> str:
-    """The farthest cell in a few words, behind its deviation."""
+    """Deviation and short name of a cell."""
     name = cell_name(line.cell)
     if len(name) > SHORT:
         name = name[: SHORT - 1].rstrip(" ·") + "…"
@@ -199,7 +200,7 @@ def _gid(line: Line) -> str:
 
 
 def _with_tooltips(svg: str, lines: Sequence[Line]) -> str:
-    """Every group that stands for a cell gets the class of its status and words to point at."""
+    """Add the class of its status and a tooltip to the group of each cell."""
     by_gid = {str(escape(_gid(line))): line for line in lines}
 
     def told(found: re.Match[str]) -> str:
@@ -241,5 +242,5 @@ def _draw_legend(ax: Axes, lines: Sequence[Line]) -> None:
 
 
 def _present(lines: Sequence[Line]) -> dict[Status, Look]:
-    found = {line.status for line in lines}
-    return {status: look for status, look in STATUS.items() if status in found}
+    statuses = {line.status for line in lines}
+    return {status: look for status, look in STATUS.items() if status in statuses}

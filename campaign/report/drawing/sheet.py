@@ -1,4 +1,4 @@
-"""A matplotlib figure that a notebook shows by itself."""
+"""Matplotlib figure that a notebook displays without pyplot."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from campaign.report.drawing.math_type import math_type
 
 
 class Sheet(Figure):
-    """A figure; notebooks show one of matplotlib's own only where pyplot was set up for it."""
+    """A figure with an SVG for notebooks, which show plain matplotlib figures only with pyplot."""
 
     def draw(self, renderer: Any) -> None:
-        """With symbols in math type, in whichever format; an SVG document gets them behind."""
+        """Draw with symbols in math type; an SVG document gets them afterwards (`to_svg`)."""
         with math_type(renderer):
             super().draw(renderer)
 
     def _repr_svg_(self) -> str:
-        """In a notebook: the drawing, with the bytes of the report's file."""
+        """SVG for a notebook, identical to the report's file."""
         from campaign.report.drawing.canvas import style, to_svg
         from campaign.report.drawing.slim_svg import slim
 

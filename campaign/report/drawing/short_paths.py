@@ -10,27 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 CURVES = 10
-"""Parts of a point that coordinates are rounded to: a fifth of a pixel on the widest page ..."""
+"""Rounding of coordinates in parts of a point: a fifth of a pixel on the widest page ..."""
 SIGNS = 100
-"""... and those of a sign, which is round only if they are finer."""
+"""... and of a sign, which is round only with finer coordinates."""
 Whole = NDArray[np.int64]
 
 
 def short_path(text: str, parts: int = CURVES) -> str:
-    """The same path with steps in place of places, in whole parts that do not add up to an error.
+    """Shorten a path: relative steps in integer parts of a point, so that errors do not add up.
 
-    Steps that go on in the same direction are one, which paints the same.
+    Successive steps in the same direction are merged, which paints the same.
     """
     if re.search(r"[^MLCQz0-9.\s-]", text):
-        return text  # not as matplotlib writes paths
+        return text  # no path of matplotlib
     if re.fullmatch(r"[^CQz]*z?\s*", text):
         body, closed, _ = text.partition("z")
         return _straight(body, parts) + closed
-    found = re.findall(r"([A-Za-z])([^A-Za-z]*)", text)
+    commands = re.findall(r"([A-Za-z])([^A-Za-z]*)", text)
     written: list[str] = []
     here = start = (0, 0)
     last = ""
-    for command, numbers in found:
+    for command, numbers in commands:
         values = [whole(number, parts) for number in numbers.split()]
         points = list(zip(values[::2], values[1::2], strict=True))
         if command == "z":
@@ -49,7 +49,7 @@ def short_path(text: str, parts: int = CURVES) -> str:
 
 
 def _straight(text: str, parts: int) -> str:
-    """Moves and lines alone, as all long paths are."""
+    """Shorten a path of moves and lines only, as all long paths are."""
     moves = np.array(re.findall("[ML]", text)) == "M"
     if not len(moves):
         return ""
@@ -57,8 +57,8 @@ def _straight(text: str, parts: int) -> str:
     places = np.rint(numbers * parts).astype(np.int64).reshape(-1, 2)
     steps = np.diff(places, axis=0, prepend=0)
     after_move = np.concatenate([[False], moves[:-1]])  # a dot, perhaps
-    there = moves | after_move | (steps != 0).any(axis=1)
-    steps, moves, after_move = steps[there], moves[there], after_move[there]
+    visible = moves | after_move | (steps != 0).any(axis=1)
+    steps, moves, after_move = steps[visible], moves[visible], after_move[visible]
     (x, y), (x_before, y_before) = steps.T, np.concatenate([[[0, 0]], steps[:-1]]).T
     onward = (x * y_before == y * x_before) & (x * x_before + y * y_before > 0)
     first = np.flatnonzero(~onward | moves | after_move)
@@ -79,7 +79,7 @@ def _straight(text: str, parts: int) -> str:
 
 
 def _write(written: list[str], last: str, letter: str, steps: Sequence[int], parts: int) -> None:
-    # What follows a move without a letter is a line.
+    # After a move, a step without a letter is a line.
     same = (letter == last and letter != "m") or (letter, last) == ("l", "m")
     numbers = _joined(steps, parts)
     if not same:
@@ -92,7 +92,7 @@ def _write(written: list[str], last: str, letter: str, steps: Sequence[int], par
 def _step(
     command: str, here: tuple[int, int], points: Sequence[tuple[int, int]]
 ) -> tuple[str, list[int]]:
-    """The relative command and its numbers; straight ones need one number."""
+    """Relative command with its numbers; horizontal and vertical lines need one number."""
     steps = [value - origin for point in points for value, origin in zip(point, here, strict=True)]
     if command == "L" and not steps[1]:
         return "h", steps[:1]
@@ -110,13 +110,13 @@ def _joined(values: Sequence[int], parts: int) -> str:
 
 
 def whole(number: str, parts: int = CURVES) -> int:
-    """A number in whole parts, in which steps add up without an error."""
+    """A number in integer parts of a point, in which steps add up without error."""
     return round(parts * float(number))
 
 
 @lru_cache(maxsize=8192)
 def short_number(value: int, parts: int = CURVES) -> str:
-    """`12.5`, `-.05`: so many parts as short as SVG reads them."""
+    """Shortest SVG notation of a number of parts: `12.5`, `-.05`."""
     before, behind = divmod(abs(value), parts)
     digits = len(str(parts)) - 1
     text = f"{before or ''}{f'.{behind:0{digits}}'.rstrip('0') if behind else ''}" or "0"

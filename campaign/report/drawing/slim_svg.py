@@ -1,9 +1,9 @@
 """Compact SVG: matplotlib's nested groups as one flat list of shapes.
 
-Coordinates are rounded to a tenth of a point, those of signs to a hundredth; paths go from point to
-point. Marks, ticks and grid lines that look alike are one path. A mark with words of its own stays
-one, and so do marks that may lie on one another where that shows: transparent ones, and those with
-an edge of another color.
+Coordinates are rounded to a tenth of a point, those of signs to a hundredth; paths use relative
+steps. Marks, ticks and grid lines with the same look are merged into one path. Marks with a tooltip
+are not merged. Neither are marks whose overlap is visible: transparent ones, and those with an edge
+of another color.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ ET.register_namespace("", SVG[1:-1])
 ET.register_namespace("xlink", XLINK[1:-1])
 HEADER = '<?xml version="1.0" encoding="utf-8"?>\n'
 EVERYWHERE = {"stroke-linejoin": "round"}
-"""What matplotlib says of all elements in a style sheet, which on a page would be of the page."""
+"""Matplotlib's style sheet for all elements; on a page it would apply to the whole page."""
 LARGEST_SIGN = 20.0
-"""Points from its middle to its ends; what a band is drawn from lies farther away."""
+"""Maximum coordinate of a sign from its middle (points); those of a band are larger."""
 OF_TEXT = frozenset({"font-size", "font-family", "font-weight", "font-style", "text-anchor"})
-"""Properties that act on nothing but texts."""
+"""Properties that affect texts only."""
 FEW = 5
-"""Lines of a closed path that is more than a mark or a bar."""
+"""Minimum number of lines of a closed path that is no mark or bar."""
 Element = ET.Element
 Style = dict[str, str]
 
 
 @dataclass(frozen=True)
 class _Shape:
-    """Something that is painted: an element without its style.
+    """A painted element.
 
     Attributes:
-        style: all that is in force there.
-        clip: reference to the frame that cuts it; "" for none.
-        told: class and title of the group that it stands for; empty for none.
-        sign: whether it is one of the small things that stand in many places.
+        style: effective style, with inherited properties.
+        clip: reference to its clip path; "" for none.
+        told: class and title of its group; empty for none.
+        sign: whether it is a small mark that is used in many places.
     """
 
     element: Element
@@ -66,12 +66,12 @@ class _Shape:
 
     @cached_property
     def is_straight(self) -> bool:
-        """Whether it is a path of straight lines that do not meet: it hides nothing."""
+        """Whether it is a path of separate straight lines, which hides nothing."""
         return re.fullmatch(r"(M[^A-Za-z]*L[^A-Za-z]*)+", self.path) is not None
 
     @property
     def look(self) -> tuple[object, ...] | None:
-        """What shapes have in common that can be one path; None for one that stays by itself."""
+        """Key of shapes that can be merged into one path; None for a shape that cannot."""
         path = self.path
         small = self.sign or self.is_straight or (path.count("L") < FEW and path[-2:] == "z\n")
         alone = any(self.told) or "transform" in self.element.attrib
@@ -81,8 +81,8 @@ class _Shape:
 
 
 def slim(svg: str) -> str:
-    """An SVG document of matplotlib's, looking the same; the same text always gives the same."""
-    root = ET.fromstring(svg)  # noqa: S314 (ours, not somebody's file)
+    """Shorten an SVG document of matplotlib without a change of its look; deterministic."""
+    root = ET.fromstring(svg)  # noqa: S314 (generated here, no foreign file)
     named = {each.attrib["id"]: each for each in root.iter() if "id" in each.attrib}
     shapes = _merged(_shapes(root, {}, "", ("", ""), named))
     clips = dict.fromkeys(shape.clip for shape in shapes if shape.clip)
@@ -101,7 +101,7 @@ def slim(svg: str) -> str:
 
 
 def _common(styles: Sequence[Style]) -> Style:
-    """What all texts say alike, of what acts on nothing else."""
+    """Text properties that all texts share."""
     shared = (
         set(styles[0].items()).intersection(*(each.items() for each in styles[1:]))
         if styles
@@ -117,7 +117,7 @@ def _shapes(
     told: tuple[str, str],
     named: Mapping[str, Element],
 ) -> Iterator[_Shape]:
-    """All that is painted within an element, in order; `named`: elements by their ids."""
+    """Painted shapes within an element, in order; `named`: elements by id."""
     for element in parent:
         own = style | _style(element)
         cut = element.get("clip-path", clip)
@@ -128,8 +128,8 @@ def _shapes(
         elif element.tag == f"{SVG}use":
             sign = named[element.attrib[HREF][1:]]
             path, place = sign.get("d", ""), (float(element.get(name, "0")) for name in "xy")
-            there = Element(PATH, {"d": _moved(path, *place)})
-            yield _Shape(there, own | _style(sign), cut, told, _is_sign(path))
+            moved = Element(PATH, {"d": _moved(path, *place)})
+            yield _Shape(moved, own | _style(sign), cut, told, _is_sign(path))
         elif element.tag == PATH:
             if element.get("d") and own != {"fill": "none"}:
                 yield _Shape(element, own, cut, told)
@@ -139,13 +139,13 @@ def _shapes(
 
 @lru_cache(maxsize=256)
 def _is_sign(path: str) -> bool:
-    """Whether a path is that of a mark, and no band."""
+    """Whether a path is a mark and no band."""
     numbers = map(float, re.findall(r"-?\d+(?:\.\d+)?", path))
     return all(abs(number) <= LARGEST_SIGN for number in numbers)
 
 
 def _moved(path: str, x: float, y: float) -> str:
-    """A path of pairs of coordinates, that far away."""
+    """Translate a path of coordinate pairs."""
 
     def place(pair: re.Match[str]) -> str:
         return f"{float(pair[1]) + x:.3f} {float(pair[2]) + y:.3f}"
@@ -154,16 +154,16 @@ def _moved(path: str, x: float, y: float) -> str:
 
 
 def _merged(shapes: Iterable[_Shape]) -> list[_Shape]:
-    """Each path goes to the first of its look; past lines and words, but past nothing else."""
-    found: list[_Shape] = []
+    """Merge each path into the first one with its look, past straight lines and texts only."""
+    merged: list[_Shape] = []
     open_: dict[object, _Shape] = {}
     for shape in shapes:
         look = shape.look
         if shape.is_text:
-            found.append(shape)
+            merged.append(shape)
         elif look is None:
             open_.clear()
-            found.append(shape)
+            merged.append(shape)
         else:
             if not shape.is_straight:
                 open_ = {each: first for each, first in open_.items() if each == look}
@@ -172,19 +172,19 @@ def _merged(shapes: Iterable[_Shape]) -> list[_Shape]:
                 first.set("d", f"{first.attrib['d']}{shape.path}")
             else:
                 open_[look] = shape
-                found.append(shape)
-    return found
+                merged.append(shape)
+    return merged
 
 
 def _covers(style: Style) -> bool:
-    """Whether marks of this style look the same on one another in any order."""
+    """Whether overlapping marks of this style look the same in any order."""
     clear = any(style.get(name, "1") != "1" for name in style if name.endswith("opacity"))
     fill, stroke = style.get("fill", "#000000"), style.get("stroke", "none")
     return not clear and (stroke in ("none", fill) or fill == "none")
 
 
 def _written(shape: _Shape, names: Mapping[str, str], common: Style) -> Element:
-    """A shape as an element, in as few parts of a point as it needs."""
+    """Element of a shape, with rounded coordinates."""
     element, parts = shape.element, SIGNS if shape.sign else CURVES
     attributes: dict[str, str] = {"class": shape.told[0]} if shape.told[0] else {}
     if shape.path:
@@ -204,13 +204,13 @@ def _written(shape: _Shape, names: Mapping[str, str], common: Style) -> Element:
         ET.SubElement(written, TITLE).text = shape.told[1]
     if not (turned and clip):
         return written
-    frame = Element(GROUP, clip)  # in whose coordinates the clip is, not in those of the turn
+    frame = Element(GROUP, clip)  # the clip is in coordinates before the rotation
     frame.append(written)
     return frame
 
 
 def _frame(clip: Element, name: str) -> Element:
-    """A clip, under a short name."""
+    """Clip path under a short name."""
     frame = Element(clip.tag, {"id": name})
     for shape in clip:
         attributes = {key: _rounded(value) for key, value in shape.attrib.items()}
@@ -224,7 +224,7 @@ def _rounded(value: str) -> str:
 
 
 def _turned(transform: str) -> str:
-    """Without turns by nothing."""
+    """Transform without rotations by zero, rounded."""
     turned = re.sub(r"rotate\(-?0(?:\.0*)?(?: [^)]*)?\)", "", transform).strip()
     if "scale" in turned or "matrix" in turned:
         return turned

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PITCH = 0.24
-"""Inches from one strip to the next."""
+"""Pitch of the strips (inches)."""
 BAND = 0.3
 """Opacity of an interval's bar."""
 MOST = 48
-"""Strips that a page has room for; the tables have every place."""
+"""Maximum number of strips; the tables have all draws."""
 
 
 def draw_strips(scoreboard: Scoreboard) -> str | None:
-    """The picture as an SVG document; None when nothing was drawn more than once."""
+    """Draw the picture as an SVG document; None without a value of several draws."""
     lines = [line for line in scoreboard.lines if _has_strip(line)][:MOST]
     if not lines:
         return None
@@ -40,7 +40,7 @@ def draw_strips(scoreboard: Scoreboard) -> str | None:
 
 
 def _has_strip(line: Line) -> bool:
-    """Single readings would fill a page; and of a printed 0 nothing has a percentage."""
+    """Whether a line has draws, no printed 0, and is reproducible (single readings are not)."""
     return bool(line.draws and line.cell.value) and line.status is not Status.NOT_REPRODUCIBLE
 
 
@@ -51,9 +51,9 @@ def _draw_strip(ax: Axes, line: Line, row: int) -> None:
         return 100 * (value - published) / abs(published)
 
     colour = STATUS[line.status or Status.SIMULATED].light
-    found = line.found
-    if found is not None and found.low is not None and found.high is not None:
-        ends = [percent(found.low), percent(found.high)]
+    estimate = line.found
+    if estimate is not None and estimate.low is not None and estimate.high is not None:
+        ends = [percent(estimate.low), percent(estimate.high)]
         ax.plot(ends, [row, row], color=MUTED.light, alpha=BAND, linewidth=5, solid_capstyle="butt")
     dots: dict[str, Any] = {"linestyle": "none", "color": colour, "clip_on": False}
     ax.plot(
@@ -67,7 +67,7 @@ def _draw_strip(ax: Axes, line: Line, row: int) -> None:
 
 
 def _draw_legend(ax: Axes) -> None:
-    """What tick, dot, bar and line are, above the strips; and what stands on their right."""
+    """Draw the legend of ticks, dots, bars and lines, and the heading of the right column."""
     from matplotlib.lines import Line2D
 
     sign: dict[str, Any] = {"linestyle": "none", "color": INK.light}

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FEWEST = 3
-"""Labelled ticks of a logarithmic axis, if 1-2-5 has as many."""
+"""Minimum number of labelled ticks of a logarithmic axis at decades or 1-2-5 steps."""
 MOST_DECADES = 8
 TURN = (5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0)
-"""Steps of an axis in degrees: parts of a turn, and those below that everybody counts in ..."""
+"""Steps of an axis in degrees: parts of a turn, and usual smaller ones ..."""
 MOST_STEPS = 7
-"""... the smallest of which there are at most as many."""
+"""... of which the smallest is used that results in at most so many steps."""
 WIDE_ANGLE = 20.0
-"""deg; a shorter axis has plain steps, since nobody thinks of 0.45 deg as of a part of a turn."""
+"""Minimum span of an axis with these steps (deg); a shorter axis has plain steps."""
 
 
 def set_ticks(
@@ -35,11 +35,11 @@ def set_ticks(
     scale: float,
     decades: int = MOST_DECADES,
 ) -> None:
-    """Ticks for what is in view; to be called once its limits are set.
+    """Set the ticks of an axis; call it after its limits are set.
 
-    values: all that is drawn along this axis, in display units.
-    scale: display units in one of the axis' own.
-    decades: as many labels as a logarithmic axis has room for.
+    values: all drawn values along this axis, in display units.
+    scale: factor from the axis' unit to its display unit.
+    decades: maximum number of labels of a logarithmic axis.
     """
     from matplotlib.ticker import (
         AutoMinorLocator,
@@ -71,9 +71,9 @@ def set_ticks(
 
 
 def thin_out(drawn: DrawnAxis, most: Callable[[int], int]) -> None:
-    """Fewer ticks of a linear axis with plain steps, where its labels would touch.
+    """Reduce the ticks of a linear axis with plain steps if its labels would touch.
 
-    most: how many labels of so many letters the axis has room for.
+    most: function from letters per label to the maximum number of labels.
     """
     from matplotlib.ticker import AutoLocator, MaxNLocator
 
@@ -88,7 +88,7 @@ def thin_out(drawn: DrawnAxis, most: Callable[[int], int]) -> None:
 def logarithmic(low: float, high: float, most: int = MOST_DECADES) -> list[float]:
     """Labelled places of a logarithmic axis from `low` to `high`, both positive.
 
-    Decades where there are enough of them, else 1-2-5, else equal steps.
+    Decades if there are enough, else 1-2-5 steps, else equal steps.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -109,13 +109,13 @@ def logarithmic(low: float, high: float, most: int = MOST_DECADES) -> list[float
 
 
 def decade_letters(ends: tuple[float, float]) -> int:
-    """Letters of the longest number that a logarithmic axis has at a decade."""
+    """Number of letters of the longest label at a decade of a logarithmic axis."""
     within = (10.0 ** math.floor(math.log10(end)) for end in ends if 0 < end < math.inf)
     return max((len(number(each)) for each in within), default=0)
 
 
 def _nines(low: float, high: float) -> list[float]:
-    """The unlabelled ticks between: 2 to 9 of each decade, where these are not too many."""
+    """Unlabelled ticks: 2 to 9 of each decade; none for more than `MOST_DECADES`."""
     if not 0 < low < high or math.log10(high / low) > MOST_DECADES:
         return []
     exponents = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
@@ -124,7 +124,7 @@ def _nines(low: float, high: float) -> list[float]:
 
 
 def _counts(axis: Axis, values: Sequence[Array]) -> bool:
-    """Whether an axis without a unit shows nothing but whole numbers: of a map, of a reading."""
+    """Whether an axis without a unit shows only whole numbers, e.g. numbers of readings."""
     shown = [each[np.isfinite(each)] for each in values]
     total = sum(each.size for each in shown)
     whole = all(bool(np.all(each == np.round(each))) for each in shown)

@@ -1,7 +1,7 @@
 """Recorded channels over time as small plain SVG.
 
-What matplotlib takes a second for is drawn here in milliseconds, with nothing but a frame, ticks,
-lines and shaded windows. Colours are the page's own variables.
+This module needs milliseconds where matplotlib needs a second. It draws only a frame, ticks, lines
+and shaded windows. Colours are CSS variables of the page.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from campaign.text import number
 Array = NDArray[np.float64]
 
 WIDTH, HEIGHT = 720.0, 170.0
-"""Pixels of one chart ..."""
+"""Size of one chart (pixels) ..."""
 FONT = 11.0
-"""... of its labels, as the page's style has them ..."""
+"""... of its labels, as in the page's style ..."""
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 8.0, 8.0, 34.0
-"""... and those beside, above and below its frame."""
+"""... and of the margins of its frame."""
 POINTS = 800
-"""Most points of a line: about one per pixel."""
+"""Maximum number of points of a line: about one per pixel."""
 TICKS = 6
-"""About how many ticks an axis has at most."""
+"""Approximate maximum number of ticks of an axis."""
 FLAT = 1e-4
-"""Share of its level that a channel must vary by to be drawn as varying."""
+"""Minimum variation of a channel, as a share of its level; with less it is drawn as constant."""
 MARGIN = 0.05
-"""Share of the span of the values that is left free above and below them."""
+"""Free margin above and below the values, as a share of their span."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One line: `values` over the chart's time, in the unit of the page, with its look."""
+    """One line: `values` over the chart's time, in display units, with its look."""
 
     label: str
     values: Array
@@ -61,13 +61,13 @@ def draw_traces(
     windows: Sequence[Stretch] = (),
     moments: Sequence[tuple[float, str]] = (),
 ) -> Markup:
-    """One chart as an SVG element for the middle of a page.
+    """Draw one chart as an SVG element within a page.
 
     Args:
         time: s, shape (n,).
-        traces: each of shape (n,); what is not finite is a gap.
+        traces: each of shape (n,); values that are not finite are gaps.
         axis: label and unit of the values.
-        windows: what is shaded, each with a tooltip.
+        windows: shaded parts, each with a tooltip.
         moments: times (s) of events, each with a tooltip.
     """
     x, y = _Scale.of(time, LEFT, WIDTH - RIGHT, 0.0), _scale_of_values(traces)
@@ -84,12 +84,12 @@ def draw_traces(
         *_labels(axis),
         "</svg>",
     ]
-    return Markup("".join(parts))  # noqa: S704 (numbers of ours, and every text is escaped)
+    return Markup("".join(parts))  # noqa: S704 (numbers are generated here, texts are escaped)
 
 
 def key(look: Look) -> Markup:
-    """A short piece of a trace, for a legend in the page's text."""
-    return Markup(  # noqa: S704 (all of it is ours)
+    """Short piece of a trace, for a legend in the page's text."""
+    return Markup(  # noqa: S704 (all of it is generated here)
         '<svg class="key" width="26" height="8" aria-hidden="true">'
         f'<line x1="0" x2="26" y1="4" y2="4" {_stroke(look)}/></svg>'
     )
@@ -97,7 +97,7 @@ def key(look: Look) -> Markup:
 
 @dataclass(frozen=True)
 class _Scale:
-    """From values to pixels; `low` and `high` lie at `start` and `stop`."""
+    """Scale from values to pixels; `low` and `high` are at `start` and `stop`."""
 
     low: float
     high: float

@@ -1,4 +1,4 @@
-"""A report in other formats, from what is laid out: a file per format, or an installed plug-in."""
+"""Further formats of a report: one file per format, or an installed plug-in."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from campaign.text import nearest
 
 @cache
 def formats() -> Kinds[Format]:
-    """Every format besides the page, by name."""
+    """All formats besides the page, by name."""
     return Kinds("report format", __name__, "FORMAT", Format)
 
 
 def chosen_formats(names: Iterable[str]) -> tuple[Format, ...]:
-    """The formats of these names, each once. Raises UsageError for an unknown one, and for one
-    that needs what this machine lacks.
+    """Formats of these names, each once.
+
+    Raises UsageError for an unknown one, or for one whose requirements this machine lacks.
     """
     kinds = formats()
     chosen = []

@@ -29,18 +29,18 @@ from campaign.report.page.pieces import FoldedSection, Items, Paragraph, Piece
 from campaign.units import factor
 
 POINTS = 400
-"""Most points of a curve; the drawing has more, and the results beside the run have all."""
+"""Maximum number of points of a curve; the drawing has more, the results beside the run all."""
 DIGITS = 7
-"""of the numbers of a curve."""
+"""Digits of the numbers of a curve."""
 
 
 def report_json(layout: Layout) -> str:
-    """The text of `report.json`; the same report gives the same text."""
+    """Text of `report.json`, deterministic."""
     return _text(report_data(layout))
 
 
 def article_json(article: Article) -> str:
-    """The text of a comparison's, trends' or an identification's JSON."""
+    """JSON text of a comparison, trends or an identification."""
     return _text(article_data(article))
 
 
@@ -48,7 +48,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def _as(model: type[M], /, *sources: object, **more: Any) -> M:
-    """A model of `more` and of what the first of `sources` that has it says under the same name."""
+    """Model of `more`; other fields are attributes of the first of `sources` with that name."""
     fields = {
         name: plain(getattr(source, name))
         for source in reversed(sources)
@@ -105,7 +105,7 @@ def _text(page: BaseModel) -> str:
 
 
 def read_report(text: str) -> data.ReportData:
-    """A report from its JSON. Raises ValueError where it is not as the schema says."""
+    """Parse the JSON of a report. Raises ValueError when it violates the schema."""
     return data.ReportData.model_validate_json(text)
 
 
@@ -135,16 +135,16 @@ def report_data(layout: Layout) -> data.ReportData:
 
 def number(estimate: Estimate) -> data.Number:
     """An estimate as data."""
-    said = {name: value for name, value in row_of(estimate).items() if name != "systematic"}
+    row = {name: value for name, value in row_of(estimate).items() if name != "systematic"}
     systematic = {part.source: part.standard_uncertainty for part in estimate.systematic}
-    fields = {name: plain(value) for name, value in said.items()}
+    fields = {name: plain(value) for name, value in row.items()}
     return data.Number.model_validate(
         {**fields, "level": estimate.level, "systematic": plain(systematic)}
     )
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it; a number that is not finite is null."""
+    """Convert a value to JSON types; a number that is not finite becomes null."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, Mapping):
@@ -173,17 +173,17 @@ def _run(document: Document) -> data.Run:
 
 
 def _test(section: Section) -> data.Test:
-    test, found = section.test, section.test.result
+    test, outcome = section.test, section.test.result
     with axis_terms(test.sides):
         return _as(
             data.Test,
             section,
             test,
-            found,
+            outcome,
             trials=tuple(each.trial.number for each in test.trials),
             conditions=tuple(data.Said(name=n, text=text) for n, text in section.conditions),
-            key_numbers=tuple(map(_finding, found.key_numbers)),
-            findings=tuple(map(_finding, found.findings)),
+            key_numbers=tuple(map(_finding, outcome.key_numbers)),
+            findings=tuple(map(_finding, outcome.findings)),
             comparisons=tuple(map(_comparison, section.comparisons)),
             figures=tuple(map(_figure, section.figures)),
             tables=tuple(map(_table, section.tables)),
@@ -344,7 +344,7 @@ def _provenance(document: Document) -> data.Provenance:
 
 
 def _display(shown: result.Column | result.Axis) -> dict[str, Any]:
-    """The unit that a reader is shown, and what a number is multiplied by to be in it."""
+    """Display unit, and the factor that converts a number to it."""
     display = shown.display or shown.unit
     same = display == shown.unit
     return {"display": display, "factor": 1.0 if same else float(factor(shown.unit, display))}

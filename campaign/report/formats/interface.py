@@ -12,20 +12,20 @@ if TYPE_CHECKING:
 
 
 def _nothing() -> None:
-    """Most formats need nothing but this program."""
+    """Require nothing."""
 
 
 @dataclass(frozen=True)
 class WrittenPage:
-    """A report or another page whose HTML, tables and figures are written already.
+    """A report or another page whose HTML, tables and figures are already written.
 
     Attributes:
-        name: of its files, without suffix: the page is `NAME.html`.
-        label: a short name for marks in a text, of letters, digits and dashes.
-        pieces: what the page says, in its order.
-        folder: where the page, `tables/` and `figures/` lie.
-        pdfs: figures as PDF, by their names in the folder, where the format wants them.
-        bibtex: an entry for the run; empty without one.
+        name: name of its files, without suffix: the page is `NAME.html`.
+        label: short name for labels in a text, of letters, digits and dashes.
+        pieces: content of the page, in order.
+        folder: folder with the page, `tables/` and `figures/`.
+        pdfs: figures as PDF, by path in the folder, if a format requests them.
+        bibtex: entry for the run; empty without one.
     """
 
     name: str
@@ -38,12 +38,12 @@ class WrittenPage:
 
 @dataclass(frozen=True)
 class Format:
-    """A format as `campaign report --format NAME` finds it.
+    """A report format, selected by `campaign report --format NAME`.
 
     Attributes:
-        write: adds its files to the folder. Raises UsageError; then there is no report at all.
-        require: raises UsageError, before anything is done, when the machine lacks what it needs.
-        pdf_figures: whether it wants the figures as PDF.
+        write: adds its files to the folder. May raise UsageError; then no report is written.
+        require: raises UsageError at the start when the machine lacks a requirement.
+        pdf_figures: whether it needs the figures as PDF.
     """
 
     name: str

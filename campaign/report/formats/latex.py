@@ -1,4 +1,4 @@
-r"""`NAME.tex` for one's own paper, and `main.tex`, which typesets it alone."""
+r"""`NAME.tex` for use in a paper, and `main.tex`, which typesets it alone."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def write(written: WrittenPage) -> None:
 
 
 def _in_their_sections(written: WrittenPage) -> Iterator[list[str]]:
-    """The lines of each piece; before a heading, what floats finds its place."""
+    """Lines of each piece; before a heading, all floats are placed."""
     floating = False
     for piece in all_plain(written.pieces):
         lines = list(_lines(piece, written))

@@ -1,4 +1,4 @@
-"""LaTeX tables with booktabs and siunitx: natural width, or wrapped to the line."""
+"""LaTeX tables with booktabs and siunitx: natural width, or wrapped to the line width."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from campaign.report.latex_text import LONGEST, breakable, cell_numbers, column_
 from campaign.report.page.pieces import Grid
 
 LONG = 30
-"""Rows from which on a table may go over pages."""
+"""Maximum number of rows of a table without page breaks."""
 ROOM = 84
-"""Characters of a line of an article in footnotesize; a wider table has its cells wrapped."""
+"""Characters of a line of an article in footnotesize; cells of a wider table are wrapped."""
 WIDEST = 40
-"""Characters from which on a column's words ask for no more room."""
+"""Limit of the requested width of a column (characters)."""
 GAP = 3
-"""Characters between two columns."""
+"""Gap between two columns (characters)."""
 MANY = 8
-"""Columns from which on the letters are smaller."""
+"""Maximum number of columns in the normal size of letters."""
 
 
 def grid_lines(grid: Grid, label: str) -> Iterator[str]:
-    """A table with its caption and, below it, its notes. `label`: for references to it."""
+    """Table with its caption above and its notes below. `label`: for references to it."""
     caption = rf"\caption{{{breakable(grid.title)}}}\label{{{label}}}"
     letters = r"\scriptsize" if len(grid.headers) > MANY else r"\footnotesize"
     letters += r"\setlength{\tabcolsep}{4pt}\sisetup{separate-uncertainty,retain-explicit-plus}"
@@ -46,7 +46,7 @@ def _short(grid: Grid) -> Iterator[str]:
 
 
 def _long(grid: Grid, caption: str) -> Iterator[str]:
-    """Over as many pages as it takes; the heads are repeated."""
+    """Table with page breaks and repeated headings."""
     top = rf"\toprule {_head(grid)} \midrule"
     if grid.number is None:
         yield rf"\noindent {_title(grid)}"
@@ -57,7 +57,7 @@ def _long(grid: Grid, caption: str) -> Iterator[str]:
     yield from _rows(grid)
     yield r"\end{longtable}"
     if grid.number is None:
-        yield r"\addtocounter{table}{-1}"  # which every long table counts up
+        yield r"\addtocounter{table}{-1}"  # every long table increments it
 
 
 def _title(grid: Grid) -> str:
@@ -82,7 +82,7 @@ def _right(grid: Grid) -> tuple[bool, ...]:
 
 
 def _columns(grid: Grid) -> str:
-    """The column specification; cells wrap where they are wider than a line together."""
+    """Column specification; cells are wrapped if the table is wider than a line."""
     right = _right(grid)
     lines = [grid.headers, *grid.rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(grid.headers))]
@@ -99,12 +99,12 @@ def _columns(grid: Grid) -> str:
 
 
 def _longest(text: str) -> int:
-    """Characters of a text's longest word that is not broken."""
+    """Length of the longest word of a text, at most `LONGEST` (longer words are broken)."""
     return min(max(map(len, text.split()), default=0), LONGEST)
 
 
 def _asked(least: Sequence[int], wanted: Sequence[int]) -> list[float]:
-    """What each column gets of the room: its longest word, and of the rest as it has more."""
+    """Width of each column (characters): its minimum, and a share of the spare width."""
     more = [max(want - word, 0) for want, word in zip(wanted, least, strict=True)]
     spare = max(ROOM - sum(least), 0) / max(sum(more), 1)
     return [word + spare * each for word, each in zip(least, more, strict=True)]

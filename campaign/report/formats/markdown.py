@@ -21,12 +21,12 @@ from campaign.report.page.pieces import (
 )
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]<>|~$^#@&])")
-"""What begins markup of GitHub's or pandoc's within a line: code, emphasis, links, HTML, maths,
-entities, citations, sub- and superscripts."""
+"""Start of markup of GitHub or pandoc within a line: code, emphasis, links, HTML, maths, entities,
+citations, sub- and superscripts."""
 _ADDRESS = re.compile(r"://|\bwww\.|:(?=[a-z_+-][a-z0-9_+-]*:)", re.IGNORECASE)
-"""What is made a link, or a picture of a face, without any markup."""
+"""Text that becomes a link or an emoji without markup."""
 _FIRST = re.compile(r"^([-+=:%]|\d+(?=[.)]))")
-"""What begins a list, a rule, a definition or a title at the beginning of a line."""
+"""Start of a list, a rule, a definition or a title at the beginning of a line."""
 
 
 def write(written: WrittenPage) -> None:
@@ -36,13 +36,13 @@ def write(written: WrittenPage) -> None:
 
 
 def escaped(text: str) -> str:
-    """`text` within a line, or in a cell: one line that looks the same and is no markup."""
+    """Escape text within a line or a cell: one line that looks the same and has no markup."""
     line = _SIGNS.sub(r"\\\1", " ".join(text.split()))
     return _ADDRESS.sub(lambda found: found[0].replace(":", "&#58;").replace(".", "&#46;"), line)
 
 
 def paragraph(text: str) -> str:
-    """The same where a line begins with it."""
+    """Escape text at the beginning of a line."""
     line = escaped(text)
     first = _FIRST.match(line)
     if first is None:
@@ -102,7 +102,7 @@ def _row(cells: Iterable[str]) -> str:
 
 
 def _fenced(source: Source) -> str:
-    """The text as it stands, between fences that are longer than any in it."""
+    """Verbatim text between fences that are longer than any in it."""
     longest = max(map(len, re.findall("`+", source.text)), default=0)
     fence = "`" * max(3, longest + 1)
     return f"{fence}{source.language}\n{source.text.rstrip()}\n{fence}"

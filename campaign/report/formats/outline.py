@@ -1,4 +1,4 @@
-"""The page as an ordered list of plain pieces, for formats without templates."""
+"""Content of the page as an ordered list of pieces, for formats without templates."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from campaign.report.page.pieces import (
 )
 
 FAILED = 200
-"""Most failed trials that are listed; the archive has them all."""
+"""Maximum number of listed failed trials; the archive has all."""
 
 
 def outline(layout: Layout, damage: Notice | None) -> Iterator[Piece]:
-    """All that the page says, but for the protocol's text and what only a screen can show."""
+    """Pieces of the whole page, without the protocol's text and content for screens only."""
     document = layout.document
     header = document.run.header
     yield Heading(1, document.title)
@@ -82,7 +82,7 @@ def _counted(count: int, what: str) -> list[str]:
 
 
 def _opening(layout: Layout) -> Iterator[Piece]:
-    """How good the run is, its key numbers, each caveat of them, and the page's first figure."""
+    """Quality of the run, its key numbers with all remarks, and the leading figure."""
     opening = layout.document.opening
     yield Heading(2, "What was found", "opening")
     yield from (Paragraph(why, role="warning") for why in opening.wrong)
@@ -105,7 +105,7 @@ def _problem(answer: Answer) -> str:
 
 
 def key_numbers(answers: Sequence[Answer]) -> Grid:
-    """Those of some tests as a table; columns that say nothing are left out."""
+    """Key numbers of tests as a table, without empty columns."""
     rows = tuple(
         (
             answer.title,
@@ -132,7 +132,7 @@ def key_numbers(answers: Sequence[Answer]) -> Grid:
 
 
 def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
-    """What the page says of a test; `with_truth` where its truth is shown."""
+    """Sentences on a test; `with_truth`: whether its true values are shown."""
     if answer.problem:
         yield _problem(answer)
     if with_truth and answer.truth:
@@ -141,15 +141,15 @@ def _answer(answer: Answer, with_truth: bool) -> Iterator[str]:
 
 
 def _section(section: Section, answer: Answer, telling: ShownFigure | None) -> Iterator[Piece]:
-    """A test in the order of the page, which its numbers follow; `telling` is shown already."""
+    """Pieces of a test in the order of the page's numbers; `telling` is already shown."""
     yield Heading(2, section.test.title, section.anchor)
     if section.test.description:
         yield Paragraph(section.test.description)
     yield from (Paragraph(problem, role="warning") for problem in section.problems)
     if answer.numbers:
         yield key_numbers([answer])
-    if told := " ".join(_answer(answer, section.truth is not None)):
-        yield Paragraph(told)
+    if text := " ".join(_answer(answer, section.truth is not None)):
+        yield Paragraph(text)
     yield Heading(3, "Conditions")
     yield Facts(section.conditions)
     yield from map(_compared, section.comparisons)
@@ -160,8 +160,8 @@ def _section(section: Section, answer: Answer, telling: ShownFigure | None) -> I
     yield from (section.references)
     for figure in section.figures:
         if figure is telling:
-            told = f"Figure {figure.number}, {figure.title}, is at the top of the report."
-            yield Paragraph(told)
+            text = f"Figure {figure.number}, {figure.title}, is at the top of the report."
+            yield Paragraph(text)
         else:
             yield figure
     yield from (section.tables)
@@ -188,15 +188,15 @@ def _compared(shown: Comparison) -> Grid:
 
 
 def _line(line: ShownLine, unit: tuple[str, ...]) -> tuple[str, ...]:
-    found = f"{line.reproduced} ({line.place})" if line.place else line.reproduced
+    number = f"{line.reproduced} ({line.place})" if line.place else line.reproduced
     verdict = f"{line.verdict} ✓" if line.good else line.verdict
     share = line.deviation.removesuffix(" %")
-    return line.name, *unit, line.published, found, share, verdict, line.status
+    return line.name, *unit, line.published, number, share, verdict, line.status
 
 
 def _contradictions(document: Document) -> Iterator[Piece]:
-    found = lines.contradictions(document.scoreboard)
-    if found:
+    groups = lines.contradictions(document.scoreboard)
+    if groups:
         yield Heading(2, "Where the source contradicts itself", "contradictions")
         yield Paragraph(
             "These published numbers cannot all be right, so no deviation from them counts for or"
@@ -205,7 +205,7 @@ def _contradictions(document: Document) -> Iterator[Piece]:
         yield Facts(
             tuple(
                 (f"{table if ' ' in table else f'Table {table}'}: {', '.join(cells)}", reason)
-                for table, cells, reason in found
+                for table, cells, reason in groups
             )
         )
 

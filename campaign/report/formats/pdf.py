@@ -1,7 +1,7 @@
-"""`NAME.pdf`: the page printed by a browser on A4, unfolded.
+"""`NAME.pdf`: the unfolded page, printed by a browser on A4.
 
-Chromium writes the time of printing into the file, so the same page gives the same pages and not
-the same bytes.
+Chromium writes the time of printing into the file, so that the same page results in the same pages,
+but not in the same bytes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from campaign.report.formats.interface import Format, WrittenPage
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SECONDS = 180.0
-"""The longest that printing may take."""
+"""Time limit of printing."""
 
 FLAGS = (
     "--headless",
@@ -31,24 +31,24 @@ FLAGS = (
     "--disable-sync",
     "--disable-component-update",
     "--disable-background-networking",
-    "--host-resolver-rules=MAP * ~NOTFOUND",  # the page asks for nothing, nor does the browser
+    "--host-resolver-rules=MAP * ~NOTFOUND",  # neither page nor browser needs the network
     "--no-pdf-header-footer",
 )
 PRINTED = """
 @page { size: A4; @bottom-center { content: counter(page) " / " counter(pages); font-size: 8pt; } }
 """
-"""Page numbers, by Chromium 131 and newer; an older one leaves them out."""
+"""Page numbers, in Chromium 131 and newer; older ones omit them."""
 
 _FOLDED = re.compile(r"<details(?![^>]*\sopen\b)")
 
 
 def browser() -> str | None:
-    """The Chromium or Chrome that is found first; None without any."""
+    """Path of the first installed Chromium or Chrome; None without any."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 def require() -> None:
-    """Raise UsageError where no browser is installed."""
+    """Raise UsageError when no browser is installed."""
     if browser() is None:
         raise UsageError(
             f"--format pdf needs Chromium or Chrome; none of {', '.join(BROWSERS)} is on the PATH."
@@ -63,25 +63,25 @@ def write(written: WrittenPage) -> None:
         page, made = Path(scratch) / "page.html", Path(scratch) / "page.pdf"
         html = (written.folder / f"{written.name}.html").read_text(encoding="utf-8")
         page.write_text(unfolded(html), encoding="utf-8")
-        told = _print(page, made, Path(scratch) / "profile")
+        last = _print(page, made, Path(scratch) / "profile")
         if not made.is_file():
-            raise UsageError(f"--format pdf: {browser()} printed nothing: {told or 'no message'}")
+            raise UsageError(f"--format pdf: {browser()} printed nothing: {last or 'no message'}")
         shutil.copyfile(made, written.folder / f"{written.name}.pdf")
 
 
 def unfolded(html: str) -> str:
-    """The page with everything open and numbers at the foot of each sheet."""
+    """Page with all sections open and page numbers."""
     head, style, rest = html.partition("</style>")
     return f"{head}{PRINTED if style else ''}{style}{_FOLDED.sub('<details open', rest)}"
 
 
 def _print(page: Path, made: Path, profile: Path) -> str:
-    """What the browser said last. Raises UsageError when it takes too long or cannot start."""
+    """Print; return the browser's last message. Raises UsageError on timeout or failed start."""
     command = [str(browser()), *FLAGS, f"--user-data-dir={profile}", f"--print-to-pdf={made}"]
     if _is_root():
-        command.append("--no-sandbox")  # as root, Chromium runs with none or not at all
+        command.append("--no-sandbox")  # as root, Chromium does not start with a sandbox
     try:
-        running = subprocess.Popen(  # noqa: S603 (no shell, and nothing of the run is in it)
+        running = subprocess.Popen(  # noqa: S603 (no shell, no data of the run)
             [*command, page.as_uri()],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -94,13 +94,13 @@ def _print(page: Path, made: Path, profile: Path) -> str:
         raise UsageError(f"--format pdf: {command[0]}: {error.strerror}") from None
     with running:
         try:
-            _, told = running.communicate(timeout=SECONDS)
+            _, messages = running.communicate(timeout=SECONDS)
         except subprocess.TimeoutExpired:
             late = f"{command[0]} did not print the page within {SECONDS:g} s"
             raise UsageError(f"--format pdf: {late}") from None
-        finally:  # also when somebody pressed Ctrl-C
+        finally:  # also after Ctrl-C
             _end_all(running)
-    return next(reversed(told.strip().splitlines()), "")
+    return next(reversed(messages.strip().splitlines()), "")
 
 
 def _is_root() -> bool:
@@ -108,7 +108,7 @@ def _is_root() -> bool:
 
 
 def _end_all(running: subprocess.Popen[str]) -> None:
-    """End the browser and all that it has started."""
+    """Kill the browser and all its child processes."""
     if os.name == "posix":
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(running.pid, signal.SIGKILL)

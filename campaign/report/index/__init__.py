@@ -1,1 +1,1 @@
-"""One page over a results folder: what was run, what came of it, and where its report is."""
+"""Page over a results folder: runs, their results, and links to their reports."""

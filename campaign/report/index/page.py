@@ -23,22 +23,22 @@ from campaign.report.palette import variables
 
 NAME = "index.html"
 OURS = '<meta name="generator" content="campaign index">'
-"""What an index of ours says of itself near its beginning."""
+"""Mark of an index of campaign near its beginning."""
 BEGINNING = 4096
-"""Bytes within which it does."""
+"""Number of bytes that are searched for it."""
 COMPARISON = "comparison.html"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One run as the page shows it.
+    """One run on the page.
 
     Attributes:
-        state: one word for how it ended, or `damaged`; the CSS class goes by it.
-        verdict: sentences: the report's first, then how the trials ended.
-        link: address relative to the page; empty where there is none.
-        thumbnail: that of a picture, or the picture itself; `caption` says what it shows.
-        problem: why it cannot be read.
+        state: status as one word, or `damaged`; used for the CSS class.
+        verdict: sentences of the report, then the outcome of the trials.
+        link: relative address of its report; empty without one.
+        thumbnail: address or `data:` address of a picture; `caption` is its title.
+        problem: reason why the run cannot be read.
     """
 
     name: str
@@ -61,9 +61,9 @@ class Entry:
 def write_index(results: Path, packaged_templates: Path) -> Path:
     """Write `index.html` into a results folder and return its path.
 
-    The same folder gives the same bytes. Nothing is analysed: headers, journals and what reports
-    say of themselves are read. Raises UsageError when an `index.html` that is not ours is there, or
-    when the folder cannot be read or written.
+    The same folder results in the same bytes. Only headers, journals and the data of reports are
+    read; nothing is analysed. Raises UsageError when an `index.html` that is not from campaign
+    exists, or when the folder cannot be read or written.
     """
     path = results / NAME
     _refuse_foreign(path)
@@ -76,7 +76,7 @@ def write_index(results: Path, packaged_templates: Path) -> Path:
 
 
 def render(results: Path, packaged_templates: Path) -> str:
-    """The page's text; nothing is written."""
+    """Text of the page, without writing."""
     from markupsafe import Markup
 
     entries = [entry_of(run) for run in reversed(list_runs(results))]
@@ -99,19 +99,19 @@ def render(results: Path, packaged_templates: Path) -> str:
 
 
 def entry_of(run: RunSummary) -> Entry:
-    """A run in words."""
+    """Entry of a run."""
     folder = run.path.with_name(f"{run.path.stem}-report")
-    told = summary_of_report(folder)
-    link = _address(told.page, run.path.parent) if told.page else ""
-    thumbnail = f"data:image/svg+xml,{quote(told.sketch)}" if told.sketch else ""
-    if told.figure:
-        thumbnail = _address(told.figure, run.path.parent)
+    report = summary_of_report(folder)
+    link = _address(report.page, run.path.parent) if report.page else ""
+    thumbnail = f"data:image/svg+xml,{quote(report.sketch)}" if report.sketch else ""
+    if report.figure:
+        thumbnail = _address(report.figure, run.path.parent)
     if run.problem:
         problem = run.problem.replace(str(run.path.parent) + os.sep, "")
         blank: tuple[str, ...] = ()
         return Entry(
             run.name, "", "", blank, blank, "damaged", "damaged", blank, "", "", blank,
-            link, thumbnail, told.caption, problem,
+            link, thumbnail, report.caption, problem,
         )  # fmt: skip
     return Entry(
         name=run.name,
@@ -121,24 +121,24 @@ def entry_of(run: RunSummary) -> Entry:
         benches=run.benches,
         status=_status(run),
         state=str(run.status or "").replace(" ", "-"),
-        verdict=tuple(filter(None, (told.numbers, told.headline, _trials(run)))),
+        verdict=tuple(filter(None, (report.numbers, report.headline, _trials(run)))),
         backend=run.backend,
         operator=run.operator,
         tags=run.tags,
         link=link,
         thumbnail=thumbnail,
-        caption=told.caption,
+        caption=report.caption,
     )
 
 
 def _status(run: RunSummary) -> str:
-    """The status; of a folder that it is one, still running or killed."""
+    """The status; `not sealed` marks a folder, of a run in progress or killed."""
     word = str(run.status or "unknown")
     return f"{word} (not sealed)" if run.path.suffix == PARTIAL else word
 
 
 def _trials(run: RunSummary) -> str:
-    """`18 of 20 trials completed, 1 failed, 1 not executed.`"""
+    """Sentence such as `18 of 20 trials completed, 1 failed, 1 not executed.`"""
     completed = run.trials - run.failed - run.interrupted
     parts = [f"{completed} of {run.planned} trials completed"]
     if run.failed:
@@ -162,18 +162,18 @@ def _comparisons(results: Path) -> Iterator[tuple[str, str]]:
 
 
 def _title(page: Path) -> str:
-    """What a page calls itself near its beginning; the empty text where it does not."""
+    """Title of a page from its beginning; "" without one."""
     try:
         with page.open("rb") as file:
             beginning = file.read(BEGINNING).decode("utf-8", "replace")
     except OSError:
         return ""
-    found = re.search(r"<title>([^<]{1,400})</title>", beginning)
-    return unescape(found[1]).strip() if found else ""
+    match = re.search(r"<title>([^<]{1,400})</title>", beginning)
+    return unescape(match[1]).strip() if match else ""
 
 
 def _address(path: Path, base: Path) -> str:
-    """Relative, and no more than an address whatever the names have in them."""
+    """Relative address, with all special characters escaped."""
     relative = path.relative_to(base).as_posix()
     return "./" + quote(os.fsencode(relative))
 

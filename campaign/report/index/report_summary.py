@@ -1,7 +1,7 @@
 """Key numbers and picture of an existing report.
 
-The folder is read as anybody's: what is missing, too large or not as expected is as if it were not
-there, and nothing of it is believed to be more than text.
+The folder is untrusted: missing, too large and unexpected content is ignored, and all content is
+treated as plain text.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from campaign.report.page.names import slug
 PAGE = "report.html"
 DATA = "report.json"
 LARGEST = 1 << 25
-"""Bytes of a `report.json` beyond which it is left alone."""
+"""Maximum size of a `report.json` (bytes); a larger one is ignored."""
 LONGEST = 400
-"""Letters of a text that are shown."""
+"""Maximum number of shown letters of a text."""
 SHOWN = 3
-"""Key numbers that are shown."""
+"""Number of shown key numbers."""
 NOT_TELLING = ("scoreboard", "draws", "incidents-")
-"""Beginnings of names of figures that are no analysis' own."""
+"""Prefixes of the names of figures that are not from an analysis."""
 
 
 @dataclass(frozen=True)
 class ReportSummary:
-    """What a report says; everything may be missing.
+    """Summary of a report; everything may be missing.
 
     Attributes:
-        page: `report.html`, as a path.
-        numbers: the first of the test of the opening's figure, else the first of the opening.
-        headline: how published values came out.
-        sketch: SVG of its most telling figure, small; made from the numbers of `report.json`.
-        caption: what that figure is called.
-        figure: where there is no sketch, an SVG file of the report.
+        page: path of `report.html`.
+        numbers: first key numbers of the leading figure's test, else of the first screen.
+        headline: sentence on the reproduced published values.
+        sketch: small SVG of the leading figure, from the numbers of `report.json`.
+        caption: title of that figure.
+        figure: SVG file of the report, without a sketch.
     """
 
     page: Path | None = None
@@ -49,14 +49,14 @@ class ReportSummary:
 
 
 def summary_of_report(folder: Path) -> ReportSummary:
-    """What the report in `folder` says; an empty `ReportSummary` where there is none."""
+    """Summary of the report in `folder`; an empty `ReportSummary` without one."""
     page = folder / PAGE
     if not page.is_file():
         return ReportSummary()
     tree = _tree(folder / DATA)
     opening = _mapping(tree.get("opening"))
     answers = [_mapping(answer) for answer in _sequence(opening.get("answers"))]
-    # Numbers and picture are of one test where it has both.
+    # Numbers and picture are of the same test, if it has both.
     telling = _sequence(opening.get("telling"))
     test = next(map(_text, telling), "")
     answers.sort(key=lambda answer: not test or answer.get("test") != test)
@@ -74,7 +74,7 @@ def summary_of_report(folder: Path) -> ReportSummary:
 
 
 def _tree(path: Path) -> Mapping[str, Any]:
-    """A JSON file's table; empty for anything else."""
+    """Table of a JSON file; empty for anything else."""
     try:
         if path.stat().st_size > LARGEST:
             return {}
@@ -84,34 +84,34 @@ def _tree(path: Path) -> Mapping[str, Any]:
 
 
 def _first_numbers(answers: Sequence[Mapping[str, Any]]) -> str:
-    """`Coulomb friction Tc, positive: 25.3 ± 0.1 N·m`, of the first test that has numbers."""
+    """Key numbers of the first test with any: `Coulomb friction Tc, positive: 25.3 ± 0.1 N·m`."""
     numbers = next(filter(None, (_sequence(each.get("numbers")) for each in answers)), ())
-    told = []
+    texts = []
     for number in map(_mapping, numbers[:SHOWN]):
         name = ", ".join(filter(None, (_text(number.get(key)) for key in ("quantity", "where"))))
         if value := _text(number.get("value")):
-            told.append(f"{name}: {value}")
-    return f"{'; '.join(told)}." if told else ""
+            texts.append(f"{name}: {value}")
+    return f"{'; '.join(texts)}." if texts else ""
 
 
 def _figures(
     tree: Mapping[str, Any], wanted: Sequence[tuple[str, str]]
 ) -> Iterator[Mapping[str, Any]]:
-    """The figures of analyses, those that are wanted by test and key first."""
+    """Figures of analyses, first those of `wanted` (test and key)."""
     tests = [_mapping(test) for test in _sequence(tree.get("tests"))]
-    there = {
+    figures = {
         (_text(test.get("name")), _text(figure.get("key"))): figure
         for test in tests
         for figure in map(_mapping, _sequence(test.get("figures")))
     }
-    yield from (there[each] for each in wanted if each in there)
-    yield from there.values()
+    yield from (figures[each] for each in wanted if each in figures)
+    yield from figures.values()
 
 
 def _wanted(
     telling: Sequence[Any], answers: Sequence[Mapping[str, Any]]
 ) -> Iterator[tuple[str, str]]:
-    """Test and key of the most telling figure, then of what stands for each answer."""
+    """Test and key of the leading figure, then of the figure of each answer."""
     if len(telling) == 2:
         yield _text(telling[0]), _text(telling[1])
     for answer in answers:
@@ -119,16 +119,16 @@ def _wanted(
 
 
 def _drawing(figures: Path, wanted: Sequence[tuple[str, str]]) -> Path | None:
-    """The drawing of the most telling figure that is there; else the first of an analysis."""
+    """First existing drawing of `wanted`; else the first drawing of an analysis."""
     for test, key in wanted:
         path = figures / f"{slug(f'{test}-{key}')}.svg"
         if test and key and path.is_file():
             return path
     try:
-        there = sorted(path for path in figures.iterdir() if path.suffix == ".svg")
+        drawings = sorted(path for path in figures.iterdir() if path.suffix == ".svg")
     except OSError:
         return None
-    return next((path for path in there if not path.name.startswith(NOT_TELLING)), None)
+    return next((path for path in drawings if not path.name.startswith(NOT_TELLING)), None)
 
 
 def _mapping(value: object) -> Mapping[str, Any]:

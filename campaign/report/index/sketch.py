@@ -1,7 +1,7 @@
-"""A figure as a thumbnail of its curves.
+"""Thumbnail of the curves of a figure.
 
-Drawings of a report shrink to something that nobody can read. What is drawn here is from the
-numbers of `report.json`, which is read as anybody's: what is no number is left out.
+Small drawings of a report are illegible. Therefore the thumbnail is drawn from the numbers of
+`report.json`. This file is untrusted: entries that are no numbers are ignored.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from campaign.report.palette import looks
 
 WIDTH, HEIGHT, EDGE = 240, 135, 9
 CURVES = 12
-"""Most curves of a panel that are drawn."""
+"""Maximum number of drawn curves of a panel."""
 POINTS, DOTS = 220, 90
-"""Most points of a line, and of a curve of single points, that are drawn."""
+"""Maximum number of drawn points of a line, and of a curve of single points."""
 LARGEST = 1e300
-"""What is no larger has a place in a drawing."""
+"""Limit of the absolute value of drawn numbers."""
 
 Array = NDArray[np.float64]
 Series = tuple[str, bool, Array]
-"""Name of a series, whether it is of single points, and its points along the axes, (2, n)."""
+"""Name of a series, whether it has single points, and its points along the axes, (2, n)."""
 
 
 def sketch(figure: Mapping[str, Any]) -> str:
-    """SVG of the first panel that has something to draw; the empty text for none."""
+    """SVG of the first panel with curves to draw; "" without any."""
     panels = figure.get("panels")
     for panel in panels if isinstance(panels, list) else ():
         curves = list(_curves(panel)) if isinstance(panel, dict) else []
@@ -51,16 +51,16 @@ def _curves(panel: Mapping[str, Any]) -> Iterator[Series]:
 
 
 def _numbers(values: object, axis: object) -> Array:
-    """Places along an axis; NaN for what has none there."""
-    told = values if isinstance(values, list) else []
-    plain = [v if isinstance(v, int | float) and not isinstance(v, bool) else None for v in told]
+    """Coordinates along an axis; NaN for values without one."""
+    items = values if isinstance(values, list) else []
+    plain = [v if isinstance(v, int | float) and not isinstance(v, bool) else None for v in items]
     try:
-        found = np.array(plain, dtype=float)
-    except OverflowError:  # a whole number beyond all floating-point ones
+        places = np.array(plain, dtype=float)
+    except OverflowError:  # an integer beyond the range of floats
         return np.empty(0)
     if isinstance(axis, dict) and axis.get("scale") == "log":
-        found = np.log10(found, out=np.full(len(found), np.nan), where=found > 0)
-    return found
+        places = np.log10(places, out=np.full(len(places), np.nan), where=places > 0)
+    return places
 
 
 def _drawn(curves: Sequence[Series]) -> str:
@@ -73,7 +73,7 @@ def _drawn(curves: Sequence[Series]) -> str:
         colour = chosen[series].light
         step = -(-points.shape[1] // DOTS)
         kept = points[:, ::step] if single else np.stack(decimate(points[0], points[1], POINTS))
-        share = np.full(kept.shape, 0.5)  # a lone value is in the middle
+        share = np.full(kept.shape, 0.5)  # a single value is in the middle
         np.divide(kept.T - low, span, out=share.T, where=span > 0)
         placed = [(EDGE + x, HEIGHT - EDGE - y) for x, y in (share.T * room).tolist()]
         if single:

@@ -1,1 +1,1 @@
-"""The page: content and drawings, numbered, and filled into templates."""
+"""The page: numbered content and drawings, rendered by templates."""

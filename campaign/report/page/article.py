@@ -21,7 +21,7 @@ class Part:
     """A section.
 
     Attributes:
-        contents: what the table of contents calls it; its heading when empty.
+        contents: its entry in the table of contents; default: its heading.
     """
 
     anchor: str
@@ -33,15 +33,15 @@ class Part:
 
 @dataclass(frozen=True)
 class Article:
-    """A page, in its order.
+    """A page: title, facts and sections in order.
 
     Attributes:
-        name: of its files, without suffix.
-        kind: what it is, in a word.
-        command: what to type for it.
-        facts: with a letter where there are several of a kind.
-        folder: the figures and tables beside it.
-        content: what is said of it to programs alone, as JSON has it.
+        name: name of its files, without suffix.
+        kind: kind of page, in a word.
+        command: command that writes it.
+        facts: groups of facts, with a letter if there are several.
+        folder: figures and tables beside it.
+        content: data for its JSON file only.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Article:
     content: Mapping[str, Any] = field(default_factory=dict)
 
     def pieces(self) -> Iterator[Piece]:
-        """All of it, one piece after another."""
+        """All pieces of the page, in order."""
         yield Heading(1, self.title)
         yield Paragraph(self.lede)
         for letter, pairs in self.facts:
@@ -67,25 +67,25 @@ class Article:
 
 @dataclass
 class PageParts:
-    """What is collected while a page is laid out."""
+    """Files and problems that the layout of a page collects."""
 
     folder: Folder = field(default_factory=Folder)
     problems: list[str] = field(default_factory=list)
 
     def attempt(self, what: str, make: Callable[[], T]) -> T | None:
-        """What `make` makes; one bad figure must not cost the page."""
+        """Result of `make`, or None and a problem: one bad figure must not prevent the page."""
         try:
             return make()
-        except Exception as error:  # noqa: BLE001 (it may be a plug-in's)
+        except Exception as error:  # noqa: BLE001 (a plug-in may raise anything)
             self.problems.append(f"{what} cannot be shown: {one_line(error)}")
             return None
 
     def drawn(
         self, figure: Figure, prefix: str = "", looks: Mapping[str, Look] | None = None
     ) -> ShownFigure | None:
-        """A figure of the page; None, and a problem, where it cannot be drawn.
+        """A figure of the page; None, and a problem, if it cannot be drawn.
 
-        prefix: of its file's name. looks: of the page's series; its own where they are not given.
+        prefix: prefix of its file name. looks: looks of the page's series; default: its own.
         """
 
         def shown() -> ShownFigure:
@@ -96,13 +96,13 @@ class PageParts:
 
 
 def damage_text(what: str, damaged: Sequence[object]) -> str:
-    """That an archive is damaged, and what that costs."""
+    """Sentence on the damage of an archive and its effect."""
     places = f"{len(damaged)} place{'s' if len(damaged) > 1 else ''}"
     return f"{what}: the archive is damaged in {places}; what cannot be read takes no part."
 
 
 def problems_part(what: str, told: Sequence[str]) -> tuple[Part, ...]:
-    """What a reader must know first; nothing without problems."""
+    """Section of problems; none without problems."""
     if not told:
         return ()
     return (Part("problems", f"Problems with {what}", (Items(tuple(told)),), role="problems"),)

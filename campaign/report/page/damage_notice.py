@@ -12,17 +12,17 @@ from campaign.archive.reading.damage_words import FILE, damaged_csv, heading, in
 from campaign.report.page.folder import Download, Folder
 
 TRIALS = 12
-"""Most trials that the notice names."""
+"""Maximum number of trials in the notice."""
 
 
 @dataclass(frozen=True)
 class Notice:
-    """What stands above everything else on the page.
+    """Notice at the top of the page.
 
     Attributes:
-        heading: the run's file, and in how many places it is damaged.
-        trials: names of the trials concerned, as text; empty when it is none in particular.
-        download: the table of all damage.
+        heading: the run's file, and the number of damaged places.
+        trials: names of the damaged trials, as text; empty without any.
+        download: table of all damage.
     """
 
     heading: str
@@ -31,7 +31,7 @@ class Notice:
 
 
 def notice_on_page(run: RunReader, damaged: Sequence[Damage], folder: Folder) -> Notice:
-    """The notice; adds `tables/damaged.csv` to the folder, and a word to its figures' files."""
+    """Make the notice; add `tables/damaged.csv` to the folder, and a description to SVG files."""
     name = Path(run.path.name)
     words = in_one_line(name, damaged)
     for file, text in folder.files.items():
@@ -48,7 +48,7 @@ def _trials(damaged: Sequence[Damage]) -> str:
 
 
 def _with_word(svg: str, words: str) -> str:
-    """The figure's file with a description that says so; on the page, the notice does."""
+    """Add a description to a figure's file; on the page, the notice has this text."""
     from markupsafe import escape
 
     place = svg.index(">", svg.index("<svg")) + 1

@@ -1,7 +1,7 @@
 """Drawing jobs of the figures of a page.
 
-Looks are the same on the whole page, and published values stand beside curves: both follow from all
-of a document, and neither needs a drawing. So drawings can be made in any order, and anywhere.
+Looks are the same on the whole page, and curves have published values. Both depend on the whole
+document, but not on other drawings. Therefore any process can make drawings in any order.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 AXES = 10
-"""Curves that take as long to draw as the axes that they are in."""
+"""Time to draw axes, in units of the time of a curve."""
 
 Key = tuple[str, str]
 """Name of a test and key of its figure."""
 OVERVIEW: Key = ("", "scoreboard")
-"""The picture on top of the page, which is of no test."""
+"""Key of the scoreboard's picture, which belongs to no test."""
 
 
 class Drawable(Protocol):
-    """What can be drawn in any process."""
+    """Drawing job for any process."""
 
     @property
     def work(self) -> int:
-        """How long it takes, compared with others."""
+        """Relative time of the job."""
 
     def made(self) -> DrawingFiles | None:
-        """The drawing; None when there is nothing to draw."""
+        """Make the drawing; None when there is nothing to draw."""
 
 
 @dataclass(frozen=True)
 class Overview:
-    """The scoreboard as a picture."""
+    """Drawing job of the scoreboard's picture."""
 
     scoreboard: Scoreboard
 
@@ -61,7 +61,7 @@ class Overview:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure, whose caption says what is published beside it, and how it looks on its page."""
+    """Drawing job of a figure with its published values, and with the looks of its page."""
 
     figure: Figure
     marks: Marks = field(default_factory=dict)
@@ -69,15 +69,15 @@ class Drawing:
 
     @property
     def work(self) -> int:
-        # Laying out axes takes most of the time, however many curves they have.
+        # The layout of axes takes most of the time, for any number of curves.
         return sum(AXES + len(panel.curves) for panel in self.figure.panels)
 
     def svg(self) -> str:
-        """The drawing as a complete SVG document."""
+        """Draw as a complete SVG document."""
         return draw(self.figure, self.marks, self.looks)
 
     def sheet(self) -> Canvas:
-        """The drawing as a matplotlib figure."""
+        """Draw as a matplotlib figure."""
         return draw_sheet(self.figure, self.marks, self.looks)
 
     def made(self) -> DrawingFiles:
@@ -85,14 +85,14 @@ class Drawing:
 
 
 def drawings_of(tests: Sequence[AnalysedTest], compared: Published) -> dict[Key, Drawing]:
-    """The drawings of all tests; a figure that no drawing can be made of is missing.
+    """Drawing jobs of all tests; a figure that causes an error is missing.
 
-    compared: the values that the run's protocol compares with.
+    compared: published values of the run's protocol.
     """
     series: dict[Key, list[str]] = {}
     for test in tests:
         for figure in test.result.figures:
-            with suppress(Exception):  # a plug-in's, which is told where it is shown
+            with suppress(Exception):  # of a plug-in; the layout reports it
                 series[test.name, figure.key] = series_of(figure)
     looks = looks_of_page(series.values())
     drawings: dict[Key, Drawing] = {}

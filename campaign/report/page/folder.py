@@ -1,4 +1,4 @@
-"""Numbered items of the page, and the files beside it."""
+"""Numbered items of the page, and its files."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from campaign.text import of_trials
 
 FOUND = ("Published", "Reproduced")
 LINKED = 6_000
-"""Characters of a CSV file up to which the page carries it; a longer one is only a file beside it.
+"""Maximum length of a CSV file within the page (characters), which delays its display.
 
-What the page carries has to arrive before anything is seen of it.
+A longer one is only a file beside the page.
 """
 
 
 @dataclass(frozen=True)
 class Download:
-    """A CSV file: its name in the folder, and where the page's link leads."""
+    """A CSV file: its name in the folder, and the target of the page's link."""
 
     file: str
     href: str
@@ -36,17 +36,18 @@ class Download:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A figure on the page. `svg` is markup that is safe to write as it stands.
+    """A figure on the page.
 
     Attributes:
-        data: what was drawn; None for a picture that no analysis made.
-        download: its numbers; None likewise.
-        trials: whose recordings it shows, in words; may be empty.
-        trial_numbers: the same as numbers.
-        command: what makes it again.
+        svg: safe markup.
+        data: drawn figure; None for a picture that is not from an analysis.
+        download: its numbers; None as for `data`.
+        trials: trials of the shown recordings, as text; may be empty.
+        command: command that draws it again.
         box: width and height of the drawing in its own units.
-        looks: of its series on this page; None where it has no drawing of its own.
-        least: CSS pixels that it must be wide for its smallest label to be legible.
+        least: minimum width for a legible smallest label (CSS pixels).
+        looks: looks of its series on this page; None without a drawing of its own.
+        trial_numbers: `trials` as numbers.
     """
 
     form: ClassVar = "figure"
@@ -71,7 +72,7 @@ class ShownFigure:
 class ShownTable:
     """A numbered table of a test.
 
-    `stacked`: on a small screen each of its rows is a block of its own.
+    `stacked`: on a small screen, each row is a block.
     """
 
     form: ClassVar = "table"
@@ -88,7 +89,7 @@ class ShownTable:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A published table beside what the run found; `table` is its name there."""
+    """A published table beside the reproduced numbers; `table` is its published name."""
 
     number: int
     anchor: str
@@ -101,28 +102,29 @@ class Comparison:
 
     @property
     def unit(self) -> str:
-        """The unit of all its numbers, for their heads; "" where it is not one."""
+        """Common unit of all numbers, for the headings; "" without one."""
         units = {line.unit for line in self.lines}
         return units.pop() if len(units) == 1 else ""
 
     @property
     def heads(self) -> tuple[str, ...]:
-        """Of the columns, without that of the unit where the heads say it."""
-        found = [f"{head} ({self.unit})" if self.unit else head for head in FOUND]
+        """Headings of the columns; a common unit replaces the unit column."""
+        heads = [f"{head} ({self.unit})" if self.unit else head for head in FOUND]
         units = () if self.unit else ("Unit",)
-        return ("Cell", *units, *found, "Deviation (%)", "Verdict", "Status")
+        return ("Cell", *units, *heads, "Deviation (%)", "Verdict", "Status")
 
 
 @dataclass(frozen=True)
 class Section:
-    """One test on the page; `left_out` are those of the `problems` that are damaged trials.
+    """One test on the page.
 
     Attributes:
-        truth: what it found beside what is true, where that is known.
-        prediction: what it found beside what its bench file states, where that is tested.
-        references: what it found beside files of reference values.
         figures: pictures of changes against references, then those of its analysis.
-        summary: its conditions in a line.
+        left_out: those of the `problems` that are damaged trials.
+        truth: findings beside true values, if known.
+        prediction: findings beside the values of the bench file, if tested.
+        references: findings beside files of reference values.
+        summary: conditions in one line.
     """
 
     anchor: str
@@ -147,9 +149,9 @@ class Section:
 
 @dataclass
 class Folder:
-    """What the report's folder will contain, collected while the page is laid out.
+    """Content of the report's folder, collected during the layout of the page.
 
-    `pdfs`: the figures once more, for formats that want them so; nothing of the page.
+    `pdfs`: figures as PDF, for formats that need them; not for the page.
     """
 
     files: dict[str, str] = field(default_factory=dict)
@@ -160,7 +162,7 @@ class Folder:
     tables: int = 0
 
     def table(self, text: str, *candidates: str) -> Download:
-        """Add a CSV file and say where its link leads."""
+        """Add a CSV file; return its download."""
         file = f"tables/{self.table_names.unique(*candidates)}.csv"
         text = on_a_page(text)
         self.files[file] = text
@@ -176,7 +178,7 @@ class Folder:
         command: str = "",
         looks: Mapping[str, Look] | None = None,
     ) -> ShownFigure:
-        """Add an SVG file, a CSV file of its numbers, and the numbered figure that shows them."""
+        """Add an SVG file, and a CSV file of its numbers; return the numbered figure."""
         alt = figure.alt or figure.caption
         shown = self.picture(drawn, figure.title, figure.caption, alt, *names, command=command)
         file = shown.file.removesuffix(".svg") + ".csv"
@@ -202,7 +204,7 @@ class Folder:
         *names: str,
         command: str = "",
     ) -> ShownFigure:
-        """The same for a picture that no analysis made."""
+        """Add an SVG file of a picture that is not from an analysis; return the numbered figure."""
         from markupsafe import Markup
 
         svg = drawn.svg
@@ -214,7 +216,7 @@ class Folder:
             self.pdfs[f"figures/{name}.pdf"] = pdf
         self.figures += 1
         anchor = f"figure-{self.figures}"
-        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (ours, and `inline` escapes)
+        markup = Markup(inline(svg, anchor, title, alt))  # noqa: S704 (`inline` escapes texts)
         return ShownFigure(
             self.figures,
             anchor,
@@ -230,9 +232,9 @@ class Folder:
     def shown_table(
         self, table: Table, published: tuple[str, ...], *names: str, page: Table | None = None
     ) -> ShownTable:
-        """Add a CSV file and the numbered table that shows it; on the page in other units: `page`.
+        """Add a CSV file; return its numbered table. `page`: the table in the page's units.
 
-        The columns of the file are as the analysis named them.
+        The file has the column names of the analysis.
         """
         content = tables.show(page or table)
         download = self.table(tables.table_csv(table), *names)

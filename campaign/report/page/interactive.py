@@ -1,7 +1,7 @@
 """Interactive figures: zoom and values at the cursor.
 
-The page carries the points that its drawings show, and one script. Without the script, or before
-somebody turns it on, the page is the static one. uPlot draws (`vendor/`, MIT).
+The page contains the points of its drawings, and one script. Without the script, or before the
+reader enables it, the page is static. The script draws with uPlot (`vendor/`, MIT).
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent
 FEWEST = 8
-"""Points of a line from which on a zoom shows more than the picture does."""
+"""Minimum number of points of a line for a useful zoom."""
 MOST = 5_000
-"""Points of a scatter up to which the page carries them."""
+"""Maximum number of points of a scatter on the page."""
 LINES = ("line", "line+points", "thin")
 
 
 @dataclass(frozen=True)
 class Interactive:
-    """What the page has besides the static one.
+    """Additions to the static page.
 
     Attributes:
         style: CSS.
-        data: JSON, by the anchor of each figure that can be zoomed, escaped for the text of an
-            element, where quotes may stand: with each of them escaped a page would be 2 % larger.
-        script: what the page's policy allows, letter by letter.
+        data: JSON by the anchor of each figure with zoom, escaped for the text of an element.
+            Quotes are not escaped, which would make a page 2 % larger.
+        script: script that the page's policy allows by its hash.
     """
 
     style: Markup
@@ -54,19 +54,19 @@ class Interactive:
 
 
 def interactive(figures: Iterable[ShownFigure]) -> Interactive:
-    """Style, data and script for those of the figures that are lines over something that grows."""
+    """Style, data and script for the figures with zoom (`zooms`)."""
     from markupsafe import Markup
 
-    found = {
+    zoomed = {
         each.anchor: _figure(each.data, each.looks)
         for each in figures
         if each.data and zooms(each.data)
     }
-    data = json.dumps(found, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    data = json.dumps(zoomed, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     script = f"{_vendored('uPlot.iife.min.js')}\n{_text('interactive.js')}"
     style = f"{_vendored('uPlot.min.css')}\n{_text('interactive.css')}"
-    told = Markup(html.escape(data, quote=False))  # noqa: S704 (escaped)
-    return Interactive(Markup(style), told, Markup(script))  # noqa: S704 (files of ours)
+    text = Markup(html.escape(data, quote=False))  # noqa: S704 (escaped)
+    return Interactive(Markup(style), text, Markup(script))  # noqa: S704 (packaged files)
 
 
 def _vendored(name: str) -> str:
@@ -78,7 +78,7 @@ def _text(name: str) -> str:
 
 
 def zooms(figure: Figure) -> bool:
-    """Whether every panel has a line worth zooming into, and its lines go from left to right."""
+    """Whether every panel has a line with enough points, and all lines go from left to right."""
     return bool(figure.panels) and all(_panel_zooms(figure, panel) for panel in figure.panels)
 
 
@@ -97,13 +97,13 @@ def _panel_zooms(figure: Figure, panel: Panel) -> bool:
 
 
 class _Arrays:
-    """Arrays as base64 of little-endian float32, each kept once."""
+    """Unique arrays as base64 of little-endian float32."""
 
     def __init__(self) -> None:
         self._places: dict[str, int] = {}
 
     def place(self, values: Array | NDArray[np.float32]) -> int:
-        """Where the array stands among all."""
+        """Index of the array, which is added if it is new."""
         raw = np.asarray(values, dtype="<f4").tobytes()
         return self._places.setdefault(base64.b64encode(raw).decode(), len(self._places))
 
@@ -140,7 +140,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _mark(mark: Mark, panel: Panel) -> dict[str, Any]:
-    """A labelled line; a stretch is told by its beginning and its end."""
+    """A labelled line; of a stretch, only its beginning."""
     ends = {"x": (mark.x, panel.x), "y": (mark.y, panel.y)}
     shown = {
         name: value * scale_of(axis)
@@ -153,7 +153,7 @@ def _mark(mark: Mark, panel: Panel) -> dict[str, Any]:
 def _curve(
     figure: Figure, panel: Panel, curve: Curve, look: Look, arrays: _Arrays
 ) -> dict[str, Any]:
-    """One curve: its look, and where its coordinates stand among the arrays."""
+    """One curve: its look, and the indices of its coordinates in the arrays."""
     x, y, y_low = drawn_points(curve, panel, points_of_each(figure))
     columns = {"y": y} | ({} if y_low is None else {"low": y_low, "high": y})
     ends = drawn_interval(curve, panel)
@@ -174,7 +174,7 @@ def _curve(
 
 
 def _at(x: Array, whole_x: Array, whole: Array) -> Array:
-    """An interval's end at those of the curve's points that are drawn."""
+    """An end of an interval, interpolated at the drawn points of the curve."""
     if len(x) == len(whole_x):
         return whole
     known = np.isfinite(whole_x)
@@ -182,10 +182,10 @@ def _at(x: Array, whole_x: Array, whole: Array) -> Array:
 
 
 def growing(x: Array) -> NDArray[np.float32]:
-    """x, sorted, (n,), as float32 of which each is above the one before.
+    """Convert sorted x, (n,), to strictly increasing float32.
 
-    What is equal in float32 goes up by one unit in the last place: a joined axis has room for one
-    sample of a curve at each place.
+    Values that are equal in float32 increase by one unit in the last place: a joined axis allows
+    only one sample of a curve at each place.
     """
     narrow = x.astype(np.float32)
     while (stuck := np.flatnonzero(narrow[1:] <= narrow[:-1])).size:

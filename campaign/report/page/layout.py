@@ -1,4 +1,4 @@
-"""The data that templates receive: numbered, ordered, complete."""
+"""Data of the templates: complete, numbered, in the order of the page."""
 
 from __future__ import annotations
 
@@ -48,29 +48,29 @@ from campaign.trial import Role
 OF_A_TABLE = (*COLUMNS[1:8], "reason", "test", *COLUMNS[8:])
 """Columns of the file of one published table."""
 Drawn = Callable[[Key], DrawingFiles | None]
-"""Waits for a drawing that was begun; None when it cannot be made so."""
+"""Waits for a started drawing; None when it is not available."""
 DrawAll = Callable[[Mapping[Key, Drawable]], Drawn]
-"""Begins to make drawings."""
+"""Starts drawings."""
 
 
 def draw_on_demand(drawings: Mapping[Key, Drawable]) -> Drawn:
-    """Nothing is drawn beforehand: each drawing is made where it is laid out."""
+    """Start no drawing: each drawing is made during layout."""
     return lambda key: None
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A document with its figures and tables drawn and numbered, for every format alike.
+    """A document with its figures and tables drawn and numbered, for all formats.
 
     Attributes:
-        picture: the scoreboard's; None where nothing was compared.
+        picture: picture of the scoreboard; None without a comparison.
         strips: published values among draws; None without draws.
-        closeness: how many published values deviate by how much; None without any.
-        scoreboard_download: None where no published value takes part.
-        incidents_figures, incidents_tables: what happened besides the plan.
-        problems: what could not be shown or compared, one line each, damage apart.
-        scored: by published table, its numbers at a glance, in the order of the scoreboard.
-        symbols: of the source document, and what files call them.
+        closeness: counts of published values by deviation; None without any.
+        scoreboard_download: None without published values.
+        incident_figures, incident_tables: incidents of the run.
+        problems: items that could not be shown or compared, one line each, without damage.
+        scored: summary of each published table, in the order of the scoreboard.
+        symbols: symbols of the source document, and their names in files.
     """
 
     document: Document
@@ -88,7 +88,7 @@ class Layout:
 
     @property
     def figures(self) -> tuple[ShownFigure, ...]:
-        """Every figure of the page, by its number."""
+        """All figures of the page, sorted by number."""
         overview = (each for each in (self.picture, self.strips) if each is not None)
         of_tests = (figure for section in self.sections for figure in section.figures)
         every = (*overview, *of_tests, *self.incident_figures)
@@ -96,24 +96,24 @@ class Layout:
 
     @property
     def groups(self) -> tuple[tuple[str, tuple[Section, ...]], ...]:
-        """Sections of the tests by group; "" of those before the first that names one."""
-        found: list[tuple[str, list[Section]]] = []
+        """Sections of the tests by group; "" for tests before the first named group."""
+        groups: list[tuple[str, list[Section]]] = []
         for section in self.sections:
-            if not found or section.test.group not in ("", found[-1][0]):
-                found.append((section.test.group, []))
-            found[-1][1].append(section)
-        return tuple((name, tuple(own)) for name, own in found)
+            if not groups or section.test.group not in ("", groups[-1][0]):
+                groups.append((section.test.group, []))
+            groups[-1][1].append(section)
+        return tuple((name, tuple(own)) for name, own in groups)
 
     @property
     def figure_groups(self) -> tuple[tuple[ShownFigure, ...], ...]:
-        """The figures in groups of about ten, few enough that any of them is soon reached."""
+        """The figures in groups of ten or more, for short navigation."""
         figures = self.figures
         size = max(10, math.isqrt(len(figures)) + 1)
         return tuple(figures[n : n + size] for n in range(0, len(figures), size))
 
     @property
     def tests_of_figures(self) -> Mapping[str, str]:
-        """By a figure's anchor, the title of its test: several tests have figures of one title."""
+        """Title of the test by a figure's anchor: figures of several tests may share a title."""
         of = (
             (section.test.title, figure) for section in self.sections for figure in section.figures
         )
@@ -121,12 +121,12 @@ class Layout:
 
     @property
     def long_tables(self) -> tuple[ShownTable, ...]:
-        """The tables whose further rows stand in the appendix."""
+        """Tables with further rows in the appendix."""
         of_tests = (item for section in self.sections for item in section.items)
-        found = (
+        tables = (
             each for each in (*of_tests, *self.incident_tables) if isinstance(each, ShownTable)
         )
-        return tuple(each for each in found if each.content.as_text)
+        return tuple(each for each in tables if each.content.as_text)
 
     @property
     def telling(self) -> ShownFigure | None:
@@ -137,9 +137,9 @@ class Layout:
 
 
 def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str = "") -> Layout:
-    """Draw and number everything, in the order of the page; `draw_all` draws the tests' figures.
+    """Draw and number everything, in the order of the page; `draw_all` starts the drawings.
 
-    command: what a reader is told to type for this report; made from the run's name when empty.
+    command: shown command for this report; default: from the run's name.
     """
     folder, scoreboard = Folder(), document.scoreboard
     command = command or f"campaign report {quote(document.run.header.name)}"
@@ -186,9 +186,9 @@ def lay_out(document: Document, draw_all: DrawAll = draw_on_demand, command: str
 
 
 def _problems(section: Section) -> Iterator[str]:
-    """What could not be shown of a test, and the trials that its analysis does without."""
-    told_before = (*section.left_out, NOT_EXECUTED)
-    yield from (each for each in section.problems if each not in told_before)
+    """Problems of a test, and the trials that its analysis does not use."""
+    reported = (*section.left_out, NOT_EXECUTED)
+    yield from (each for each in section.problems if each not in reported)
     yield from section.test.account
 
 
@@ -199,7 +199,7 @@ def _makers(
     drawings: Mapping[Key, Drawing],
     drawn: Drawn,
 ) -> Mapping[str, _Maker]:
-    """By test, who makes its figures and tables."""
+    """Maker of figures and tables, by test."""
     units, again = units_of(document.tests, document.run.header), f"{command} --only-figure"
     return {
         test.name: _Maker(
@@ -217,7 +217,7 @@ def _makers(
 
 
 def _make_first(document: Document, makers: Mapping[str, _Maker]) -> None:
-    """The figure on top of the page is its first; one that cannot be shown is told in its test."""
+    """Make the leading figure first, for number 1; its test reports it if it cannot be shown."""
     wanted = document.opening.telling
     for test in document.tests:
         for figure in test.result.figures:
@@ -227,14 +227,14 @@ def _make_first(document: Document, makers: Mapping[str, _Maker]) -> None:
 
 
 def _sections(document: Document, makers: Mapping[str, _Maker]) -> tuple[Section, ...]:
-    """In the protocol's order; each published table stands with its first test."""
-    spoken: set[str] = set()
+    """Sections in the protocol's order; each published table is in that of its first test."""
+    used: set[str] = set()
     sections = []
     published = document.published
     for place, test in enumerate(document.tests, start=1):
-        mine = [n for n in published if n in test.reproduces and n not in spoken]
-        spoken.update(mine)
-        tables_ = [published[n] for n in mine]
+        own = [n for n in published if n in test.reproduces and n not in used]
+        used.update(own)
+        tables_ = [published[n] for n in own]
         stated = document.references.stated.get(test.name)
         files = document.references.files.get(test.name, ())
         expected = document.truths.get(test.name), (stated, *files)
@@ -253,7 +253,7 @@ def _table_of_incident(table: Table, folder: Folder) -> ShownTable:
 
 
 def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
-    """`tables/scoreboard.csv`; cells that were found again are in a file beside it."""
+    """Add `tables/scoreboard.csv`, and a file with the repeated results of cells."""
     download = folder.table(to_csv(scoreboard.lines), "scoreboard")
     if scoreboard.further:
         folder.table(to_csv(scoreboard.further, (*COLUMNS, "test")), "scoreboard-runs")
@@ -261,11 +261,11 @@ def scoreboard_download(scoreboard: Scoreboard, folder: Folder) -> Download:
 
 
 Expected = tuple[Table | None, Sequence[ReferenceComparison | None]]
-"""What is true of a test, and its references: the bench file first."""
+"""True values of a test, and its references: the bench file first."""
 
 
 def _changes(compared: ReferenceComparison, maker: _Maker) -> ShownFigure | None:
-    """The picture of a comparison of two numbers or more."""
+    """Picture of a comparison of two or more numbers; None for fewer."""
     if len(compared.pairs) < 2:
         return None
     key = f"{maker.test.name}-{compared.table.key}"
@@ -311,22 +311,23 @@ def _section(
 
 
 def _left_out(test: AnalysedTest) -> Iterator[str]:
-    """What is damaged of the test's trials, and whether that cost it the trial."""
-    there = {archived.trial.name for archived in test.trials}
+    """Damage of the test's trials, and whether the trial is omitted."""
+    used = {archived.trial.name for archived in test.trials}
     for damage in test.damaged:
-        is_what = "is damaged" if damage.trial in there else "is left out"
+        is_what = "is damaged" if damage.trial in used else "is left out"
         yield f"{damage.trial or test.name} {is_what}: {damage}"
 
 
 @dataclass(kw_only=True)
 class _Maker(PageParts):
-    """Makes the figures and tables of one test; `problems`: why there are not all of them.
+    """Makes the figures and tables of one test; `problems`: reasons for missing ones.
 
     Attributes:
-        command: what draws one of its figures again.
-        drawings: of all tests, and what waits for one that is drawn elsewhere.
-        published: what the run is compared with, by table.
-        shown: its figures that are made already, by their keys.
+        command: command that draws one of its figures, without the figure's name.
+        drawings: drawings of all tests.
+        awaited: waits for a drawing of another process.
+        published: published values of the run, by table.
+        shown: figures that are already made, by key.
     """
 
     test: AnalysedTest
@@ -367,9 +368,9 @@ class _Maker(PageParts):
 
 
 def _measurements(test: AnalysedTest) -> list[int]:
-    """The numbers of its completed trials that measure; of all completed where none measures.
+    """Numbers of the completed measurements of a test, or of all completed trials without any.
 
-    A test that seeks instability learns from those that did not complete as well.
+    A test that seeks instability also uses trials that did not complete.
     """
     sought = test.experiment is not None and test.experiment.seeks_instability
     failed = () if sought else {each.trial.number for each in test.failed}

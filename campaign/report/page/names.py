@@ -1,4 +1,4 @@
-"""Names on the page and in the folder: safe, unique, stable; links to the pages of trials."""
+"""Safe, unique and stable names on the page and in the folder; links to the pages of trials."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import re
 from collections.abc import Callable, Collection, Sequence
 
 FOLDER = "trials"
-"""Of the report's folder, with the trials' own pages."""
+"""Subfolder of the report's folder with the pages of trials."""
 
 TrialLink = Callable[[int], str | None]
 
 
 class Names:
-    """Hands out names that nobody had before."""
+    """Generator of unique names."""
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
 
     def unique(self, *candidates: str) -> str:
-        """The first free one of `candidates`, else the last with the first free number."""
+        """First free name of `candidates`, else the last one with the first free number."""
         wanted = [slug(candidate) for candidate in candidates]
         numbered = (f"{wanted[-1]}-{n}" for n in range(2, len(self._taken) + 3))
         name = next(name for name in (*wanted, *numbered) if name not in self._taken)
@@ -32,25 +32,25 @@ def slug(text: str) -> str:
 
 
 def stood_for(numbers: Sequence[str], reproduces: Sequence[str], prefix: str) -> tuple[str, ...]:
-    """Which of the numbers that a figure or table can stand for its test says it reproduces."""
+    """Numbers of published figures or tables that the test declares to reproduce."""
     return tuple(number for number in numbers if f"{prefix}{number}" in reproduces)
 
 
 def figure_name(thesis: Sequence[str], test: str, key: str) -> tuple[str, ...]:
-    """Candidates for a figure: the published number it stands for, then its own key."""
+    """Candidates for a figure's name: its published number, then its own key."""
     own = f"{test}-{key}"
     return (f"figure-{thesis[0]}", f"figure-{thesis[0]}-{own}") if thesis else (own,)
 
 
 def trial_file(number: int) -> str:
-    """The page of a trial within the report's folder."""
+    """Path of a trial's page within the report's folder."""
     return f"{FOLDER}/trial-{number:05d}.html"
 
 
 def trial_links(written: Collection[int]) -> TrialLink:
-    """A function from a trial's number to the link from the report's page; None without a page.
+    """Function from a trial's number to the link from the report's page; None without a page.
 
-    `written`: the trials that have a page.
+    `written`: numbers of the trials with a page.
     """
-    there = frozenset(written)
-    return lambda number: trial_file(number) if number in there else None
+    with_page = frozenset(written)
+    return lambda number: trial_file(number) if number in with_page else None

@@ -1,7 +1,7 @@
-"""Mistakes in custom templates that Jinja2 does not report.
+"""Errors in custom templates that Jinja2 does not report.
 
-A file that no template is called like, a block that the extended template does not have and text
-outside of all blocks would silently not be shown; a template that extends itself would never end.
+Jinja2 silently ignores a file without a template of this name, a block that the extended template
+lacks, and text outside of all blocks. A template that extends itself would never end.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from campaign.errors import UsageError
 from campaign.text import nearest
 
 SUFFIXES = (".html", ".htm", ".css", ".jinja", ".jinja2", ".j2")
-"""What a template's name ends with; other files of the folder are the laboratory's business."""
+"""Suffixes of templates; other files of the folder are ignored."""
 
 
 @dataclass(frozen=True)
 class _Reference:
-    """A template that another one names; `name` is None where it is worked out while filling."""
+    """A template that another one names; `name` is None if it is computed during rendering."""
 
     line: int
     name: str | None
@@ -30,13 +30,13 @@ class _Reference:
 
 
 def check_own_templates(environment: Environment, own: Path, packaged: Path, prefix: str) -> None:
-    """Raise UsageError with all that is wrong with the templates in `own`, a line each.
+    """Raise UsageError with all errors in the templates of `own`, a line each.
 
     Args:
-        environment: whose loader finds them, and the packaged ones.
+        environment: its loader loads these and the packaged templates.
         own: the laboratory's folder.
-        packaged: the folder of those that come with the program.
-        prefix: what the packaged ones are called by besides: `campaign/report.html`.
+        packaged: folder of the packaged templates.
+        prefix: prefix of the packaged templates: `campaign/report.html`.
     """
     parsed: dict[str, nodes.Template] = {}
     problems: list[str] = []
@@ -45,14 +45,14 @@ def check_own_templates(environment: Environment, own: Path, packaged: Path, pre
             parsed[name] = _read(environment, own / name)
         except UsageError as error:
             problems.append(str(error))
-    if problems:  # what a template refers to is known of those alone that can be read
+    if problems:  # only readable templates have known references
         raise UsageError("\n".join(problems))
     references = {name: tuple(_references(tree)) for name, tree in parsed.items()}
     names = template_names(packaged)
-    there = [*parsed, *names, *(f"{prefix}/{name}" for name in names)]
+    known = [*parsed, *names, *(f"{prefix}/{name}" for name in names)]
     problems += _misnamed(own, references, names)
     for name, tree in parsed.items():
-        wrong = list(_wrong_references(environment, name, references[name], prefix, there))
+        wrong = list(_wrong_references(environment, name, references[name], prefix, known))
         wrong = wrong or list(_wrong_blocks(environment, tree, references[name]))
         problems += [f"{own / name}:{line}: {message}" for line, message in wrong]
     if problems:
@@ -60,7 +60,7 @@ def check_own_templates(environment: Environment, own: Path, packaged: Path, pre
 
 
 def template_names(folder: Path) -> list[str]:
-    """The templates of a folder, sorted; what lies deeper is found by who names it."""
+    """Templates of a folder, sorted; templates in subfolders are loaded by reference only."""
     return sorted(
         path.name
         for path in folder.iterdir()
@@ -98,10 +98,10 @@ def _references(tree: nodes.Template) -> Iterator[_Reference]:
 def _misnamed(
     own: Path, references: Mapping[str, tuple[_Reference, ...]], names: list[str]
 ) -> Iterator[str]:
-    """Files that stand for no template, and that none of the others names."""
+    """Files that replace no template, and that no other template names."""
     every = [reference for each in references.values() for reference in each]
     if any(reference.name is None for reference in every):
-        return  # a name that is worked out may be any of them
+        return  # a computed name may be any of them
     named = {reference.name for reference in every}
     for name in references:
         if name not in names and name not in named:
@@ -134,7 +134,7 @@ def _found(environment: Environment, name: str) -> bool:
 
 
 def _source(environment: Environment, name: str) -> tuple[str, str | None]:
-    """A template's text and file."""
+    """Text and file of a template."""
     if environment.loader is None:
         raise TemplateNotFound(name)
     source, file, _ = environment.loader.get_source(environment, name)
@@ -144,7 +144,7 @@ def _source(environment: Environment, name: str) -> tuple[str, str | None]:
 def _wrong_blocks(
     environment: Environment, tree: nodes.Template, references: tuple[_Reference, ...]
 ) -> Iterator[tuple[int, str]]:
-    """What a template says outside of the blocks of the one that it extends."""
+    """Blocks that the extended template lacks, and text outside of all blocks."""
     parents = [reference.name for reference in references if reference.extends]
     if not parents or None in parents:
         return
@@ -163,7 +163,7 @@ def _wrong_blocks(
 
 
 def _blocks(environment: Environment, name: str, seen: tuple[str, ...]) -> Iterator[str]:
-    """The blocks of a template and of all that it extends."""
+    """Names of the blocks of a template and of all that it extends."""
     if name in seen:
         return
     source, file = _source(environment, name)
@@ -175,13 +175,13 @@ def _blocks(environment: Environment, name: str, seen: tuple[str, ...]) -> Itera
 
 
 def nearest_name(word: str, names: Iterable[str]) -> str:
-    """The nearest of the names, or all of them where none is near."""
+    """Suggestion of the nearest name, or the list of all names if none is near."""
     known = sorted(names)
     return nearest(word, known) or (f"; there are {', '.join(known)}" if known else "")
 
 
 def _outermost_blocks(node: nodes.Node) -> Iterator[nodes.Block]:
-    """Blocks that are in no other: one within another is new there, and is shown."""
+    """Blocks that are not within another block: an inner block may be new, and is shown."""
     for child in node.iter_child_nodes():
         if isinstance(child, nodes.Block):
             yield child
@@ -190,7 +190,7 @@ def _outermost_blocks(node: nodes.Node) -> Iterator[nodes.Block]:
 
 
 def _line_of_words(node: nodes.Node) -> int:
-    """Where a node writes something other than space; 0 when it writes nothing."""
+    """Line where a node writes something other than space; 0 if it writes nothing."""
     if isinstance(node, nodes.Include):
         return node.lineno
     for each in node.nodes if isinstance(node, nodes.Output) else ():

@@ -1,4 +1,4 @@
-"""Pictures of a page that no analysis made: scoreboard, draws, changes against references."""
+"""Pictures of a page that are not from an analysis: scoreboard, draws, changes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from campaign.report.page.folder import Folder, ShownFigure
 def changes_figure(
     pairs: Sequence[tuple[JudgedNumber, str]], folder: Folder, key: str
 ) -> ShownFigure | None:
-    """Pairs with their names, those declared different first; None without a change to draw."""
+    """Picture of changes against references, declared ones first; None without any change."""
     pairs = sorted(pairs, key=lambda each: each[0].verdict is not Verdict.DIFFERENT)
     shown = with_change(pairs)
     if not shown:
@@ -35,7 +35,7 @@ def changes_figure(
 def overview(
     scoreboard: Scoreboard, folder: Folder, drawn: DrawingFiles | None
 ) -> ShownFigure | None:
-    """The picture on top of the page."""
+    """Picture of the scoreboard; None without a drawing."""
     if drawn is None:
         return None
     return folder.picture(
@@ -50,7 +50,7 @@ def overview(
 
 
 def draws(scoreboard: Scoreboard, folder: Folder) -> ShownFigure | None:
-    """Where published values stand among the draws of a random bench."""
+    """Picture of published values among the draws of a random bench; None without draws."""
     svg = draw_strips(scoreboard)
     if svg is None:
         return None

@@ -11,7 +11,7 @@ from campaign.report.page.folder import Download, ShownFigure, ShownTable
 
 @dataclass(frozen=True)
 class Heading:
-    """`level` 1 is the title; `anchor` is the page's, where it has one."""
+    """A heading; `level` 1 is the title; `anchor`: anchor on the page, or ""."""
 
     form: ClassVar = "heading"
     level: int
@@ -21,7 +21,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences; `role` is what they are to a reader."""
+    """Sentences with their role on the page."""
 
     form: ClassVar = "paragraph"
     text: str
@@ -30,7 +30,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Items:
-    """Things said one below the other."""
+    """A list of texts."""
 
     form: ClassVar = "items"
     texts: tuple[str, ...]
@@ -38,7 +38,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and what stands for them."""
+    """Pairs of name and value."""
 
     form: ClassVar = "facts"
     pairs: tuple[tuple[str, str], ...]
@@ -49,10 +49,10 @@ class Grid:
     """A table as text.
 
     Attributes:
-        number: the page's; None for a table that has none.
-        right: per column, whether its cells stand to the right.
-        notes: sentences below it.
-        file: all of it, as CSV in the folder; empty without.
+        number: number on the page; None without one.
+        right: whether cells are right-aligned, by column.
+        notes: sentences below the table.
+        file: CSV file of the whole table in the folder; empty without one.
     """
 
     form: ClassVar = "grid"
@@ -68,7 +68,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Source:
-    """A text that is shown as it stands, letter by letter."""
+    """A verbatim text."""
 
     form: ClassVar = "source"
     title: str
@@ -78,7 +78,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Files:
-    """Files beside the page, each behind what is said of it."""
+    """Files beside the page, each with the text before it."""
 
     form: ClassVar = "files"
     told: tuple[tuple[str, Download], ...]
@@ -86,7 +86,7 @@ class Files:
 
 @dataclass(frozen=True)
 class FoldedSection:
-    """What a reader unfolds; formats that cannot fold show it."""
+    """A section that is folded at first; formats without folds show it."""
 
     form: ClassVar = "folded"
     summary: str
@@ -108,7 +108,7 @@ Piece = (
 
 
 def grid_of(shown: ShownTable) -> Grid:
-    """A table of the page as text."""
+    """Convert a table of the page to text."""
     content = shown.content
     left_out = [f"{content.left_out} more rows are in the file."] if content.left_out else []
     return Grid(
@@ -124,18 +124,18 @@ def grid_of(shown: ShownTable) -> Grid:
 
 
 def all_plain(pieces: Iterable[Piece]) -> tuple[Piece, ...]:
-    """Pieces as formats write them that know neither folds nor downloads."""
+    """Convert pieces for formats without folds and downloads."""
     return tuple(each for piece in pieces for each in plain(piece))
 
 
 def plain(piece: Piece) -> tuple[Piece, ...]:
-    """A piece as such formats write it."""
+    """Convert a piece for formats without folds and downloads."""
     match piece:
         case ShownTable():
             return (grid_of(piece),)
         case Files():
-            told = (f"{text} {download.file}" for text, download in piece.told)
-            return (Paragraph("; ".join(told) + "."),)
+            texts = (f"{text} {download.file}" for text, download in piece.told)
+            return (Paragraph("; ".join(texts) + "."),)
         case FoldedSection():
             return Paragraph(f"{piece.summary}:"), *all_plain(piece.pieces)
         case _:
@@ -143,12 +143,12 @@ def plain(piece: Piece) -> tuple[Piece, ...]:
 
 
 def caption(shown: ShownFigure) -> str:
-    """A figure's caption, with what to compare it with."""
+    """Caption of a figure, with the published figures to compare."""
     return f"{shown.caption}{published(shown.published, 'Figure')}"
 
 
 def published(numbers: Sequence[str], what: str) -> str:
-    """Which tables or figures of the source to compare with; empty without any."""
+    """Sentence on the tables or figures of the source to compare; empty without any."""
     if not numbers:
         return ""
     return f" Compare {what}{'s' * (len(numbers) > 1)} {', '.join(numbers)} of the source."

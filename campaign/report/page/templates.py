@@ -1,7 +1,7 @@
-"""Rendering templates: packaged ones, and custom ones that override them.
+"""Rendering of packaged templates, and of custom ones that override them.
 
-A file of the laboratory's folder stands in for the packaged one of the same name. The packaged ones
-stay within reach under the prefix `campaign/`, so that one's own `report.html` can extend it:
+A file of the laboratory's folder replaces the packaged one of the same name. The packaged ones are
+also available with the prefix `campaign/`, so that a custom `report.html` can extend them:
 `{% extends "campaign/report.html" %}`.
 """
 
@@ -36,21 +36,21 @@ from campaign.errors import UsageError
 from campaign.report.page.own_templates import check_own_templates, nearest_name
 
 PREFIX = "campaign"
-"""What the packaged templates are called by, where a laboratory's own has taken their name."""
+"""Prefix of the packaged templates, for use in custom ones of the same name."""
 
 
 class _Compiled(BytecodeCache):
-    """Templates that this process has compiled, by name, file and text: half of their time."""
+    """Cache of compiled templates by name, file and text, which saves half of their time."""
 
     def __init__(self) -> None:
         self._codes: dict[tuple[str, str], CodeType] = {}
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        """The code of a template; none, where its text is another now."""
+        """Load the code of a template, unless its text has changed."""
         bucket.code = self._codes.get((bucket.key, bucket.checksum))
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep what was compiled."""
+        """Store compiled code."""
         if bucket.code is not None:
             self._codes[bucket.key, bucket.checksum] = bucket.code
 
@@ -59,10 +59,10 @@ _COMPILED = _Compiled()
 
 
 class Templates:
-    """The templates of a report, ready to be filled: autoescaped, unknown names are errors."""
+    """Templates of a report: autoescaped; unknown names are errors."""
 
     def __init__(self, packaged: Path, own: Path | None) -> None:
-        """Raises UsageError when `own` is no folder of templates, or when one of them is wrong."""
+        """Raise UsageError when `own` is no folder of templates, or one of them has an error."""
         if own is not None and not own.is_dir():
             raise UsageError(f"{own}: is no folder of templates")
         self._own = own
@@ -79,9 +79,9 @@ class Templates:
             check_own_templates(self._environment, own, packaged, PREFIX)
 
     def fill(self, name: str, context: Mapping[str, Any]) -> str:
-        """The text that the template `name` makes of `context`, with a line's end behind it.
+        """Render the template `name` with `context`; the text ends with a newline.
 
-        Raises UsageError, with file and line, for what a template does wrong.
+        Raises UsageError, with file and line, for an error in a template.
         """
         try:
             return self._environment.get_template(name).render(context) + "\n"
@@ -98,23 +98,23 @@ class Templates:
             ) from None
         except UndefinedError as error:
             unknown = re.fullmatch(r"'(\w+)' is undefined", str(error))
-            told = (
+            suggestion = (
                 f"there is no name '{unknown[1]}'{nearest_name(unknown[1], context)}"
                 if unknown
                 else ""
             )
-            raise UsageError(f"{self._place(error) or name}: {told or error}") from None
+            raise UsageError(f"{self._place(error) or name}: {suggestion or error}") from None
         except TemplateError as error:
             raise UsageError(f"{self._place(error) or name}: {one_line(error)}") from None
         except Exception as error:
-            # What fails in a laboratory's own template is theirs; in a packaged one it is ours.
+            # Only an error in a custom template is a usage error.
             place = self._place(error)
             if self._own is None or not place.startswith(str(self._own)):
                 raise
             raise UsageError(f"{place}: cannot be filled: {one_line(error)}") from None
 
     def _place(self, error: BaseException) -> str:
-        """File and line of the innermost template that the error came from; empty without any."""
+        """File and line of the innermost template of an error; empty without any."""
         folders = [str(folder) for folder in (self._own, self._packaged) if folder is not None]
         frames = traceback.extract_tb(error.__traceback__)
         inside = [f for f in frames if any(f.filename.startswith(folder) for folder in folders)]
@@ -122,32 +122,32 @@ class Templates:
 
 
 def _loader(packaged: Path, own: Path | None) -> BaseLoader:
-    ours = FileSystemLoader(packaged)
-    theirs = [] if own is None else [FileSystemLoader(own)]
-    return ChoiceLoader([PrefixLoader({PREFIX: ours}), *theirs, ours])
+    packaged_loader = FileSystemLoader(packaged)
+    own_loaders = [] if own is None else [FileSystemLoader(own)]
+    return ChoiceLoader([PrefixLoader({PREFIX: packaged_loader}), *own_loaders, packaged_loader])
 
 
 class _Told(StrictUndefined):
-    """A name that does not exist is an error that says the nearest one that does, or all."""
+    """Undefined name whose error suggests the nearest known name, or lists all."""
 
     __slots__ = ()
 
     @property
     def _undefined_message(self) -> str:
-        there, wanted = self._undefined_obj, self._undefined_name
-        if self._undefined_hint or there is missing:
+        value, wanted = self._undefined_obj, self._undefined_name
+        if self._undefined_hint or value is missing:
             return super()._undefined_message
-        if isinstance(there, Sequence) and not isinstance(wanted, str):
-            return f"a {type(there).__name__} of {len(there)} has no element {wanted!r}"
-        told = f"{_called(there)} has no {wanted!r}"
-        names = [*map(str, there)] if isinstance(there, Mapping) else dir(there)
+        if isinstance(value, Sequence) and not isinstance(wanted, str):
+            return f"a {type(value).__name__} of {len(value)} has no element {wanted!r}"
+        message = f"{_called(value)} has no {wanted!r}"
+        names = [*map(str, value)] if isinstance(value, Mapping) else dir(value)
         names = [name for name in names if name[:1] != "_" and name != wanted]
-        plain = there is None or isinstance(there, str | int | float)
-        return told if plain else told + nearest_name(str(wanted), names)
+        plain = value is None or isinstance(value, str | int | float)
+        return message if plain else message + nearest_name(str(wanted), names)
 
 
 def _called(thing: object) -> str:
-    """What a template has in its hands, in a word: the manual names the program's own kinds."""
+    """Short description of a value in a template; the manual describes the program's own types."""
     if thing is None:
         return "nothing (None)"
     for kinds, word in (

@@ -1,4 +1,4 @@
-"""The page of a trial: channels, settings, metrics, outcome."""
+"""Page of a trial: channels, settings, metrics, outcome."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from campaign.units import convert
 Array = NDArray[np.float64]
 
 FINEST = 0.02
-"""Rate that must be told apart from encoder counts, as a share of the largest in the chart ..."""
+"""Required resolution of a filtered encoder rate, as a share of the largest rate ..."""
 LONGEST = 0.005
-"""... and the longest filter for that, as a share of the time shown: a few pixels."""
+"""... and the longest filter for it, as a share of the shown time: a few pixels."""
 FEWEST = 10
-"""Samples of a rate that is filtered."""
+"""Minimum number of samples of a filtered rate."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a line of a chart is: a piece of it, and the channel's label and name.
+    """Legend entry of a chart: a piece of the line, and the channel's label and name.
 
-    `measured`: False for what only a simulator can know. `filtered`: how, in words; empty for what
-    is drawn as it was recorded.
+    `measured`: False for a channel that only a simulator has. `filtered`: description of the
+    filter; empty for a channel that is drawn as recorded.
     """
 
     line: Markup
@@ -52,9 +52,9 @@ class Key:
 
 @dataclass(frozen=True)
 class Chart:
-    """Channels of one unit over time: a picture, and what its lines are.
+    """Channels of one unit over time: a picture and its legend.
 
-    `least`: CSS pixels that the picture must be wide for its labels to be legible.
+    `least`: minimum width of the picture for legible labels (CSS pixels).
     """
 
     unit: str
@@ -66,20 +66,20 @@ class Chart:
 def trial_pages(
     layout: Layout, numbers: Sequence[int], templates: Templates
 ) -> Iterator[tuple[str, str]]:
-    """File within the report's folder and text of each trial's page, one after the other.
+    """Path within the report's folder and text of each trial's page.
 
     Args:
-        layout: the report's page, which they link back to.
-        numbers: of executed trials, ascending.
-        templates: `trial.html` is filled.
+        layout: the report's page, to which they link.
+        numbers: numbers of executed trials, ascending.
+        templates: contains `trial.html`.
     """
     document = layout.document
     run, story = document.run, document.run.story
-    there = {archived.trial.number: archived for archived in run.trials}
+    archived_trials = {archived.trial.number: archived for archived in run.trials}
     tests = {test.name: test for test in document.tests}
     anchors = {section.test.name: section.anchor for section in layout.sections}
     for before, trial, behind in zip((0, *numbers), numbers, (*numbers[1:], 0), strict=False):
-        archived = there.get(trial)
+        archived = archived_trials.get(trial)
         if archived is None:
             account, anchor = lost_account(run, trial), ""
         else:
@@ -103,12 +103,12 @@ def trial_pages(
 
 
 def _beside(number: int) -> str:
-    """The link to another trial's page; empty for none."""
+    """Link to another trial's page; empty for 0."""
     return trial_file(number).removeprefix(f"{FOLDER}/") if number else ""
 
 
 def charts(account: TrialAccount) -> tuple[Chart, ...]:
-    """A chart for each unit, in the order in which the channels have them."""
+    """One chart per unit, in the order of the channels."""
     recording = account.recording
     if recording is None or not len(recording.time):
         return ()
@@ -140,10 +140,10 @@ def _chart(
 
 
 def legible(recording: Recording, channel: Channel) -> tuple[Array, str]:
-    """A channel's samples as they are drawn, and how they were filtered.
+    """Drawn samples of a channel, and a description of their filter ("" for none).
 
-    A rate from encoder counts is a band of spikes that hides whatever is behind it: it is filtered
-    until one sees the rate, by what the encoder tells alone.
+    A rate from encoder counts is a band of spikes that hides other lines. It is filtered until the
+    rate is visible, using the encoder only.
     """
     samples, time = channel.samples, recording.time
     known = samples[np.isfinite(samples)]
@@ -152,7 +152,7 @@ def legible(recording: Recording, channel: Channel) -> tuple[Array, str]:
         return samples, ""
     angle = recording[RELATIVE_ANGLE] if RELATIVE_ANGLE in recording.channels else None
     step, longest = float(np.median(np.diff(time))), LONGEST * float(np.ptp(time))
-    held = np.zeros_like(samples)  # of the hull: without a gyro it is not asked for
+    held = np.zeros_like(samples)  # motion of the base, which is not used without a gyro
     seen = relative_rate(samples, angle, None, held, step, FINEST * largest, longest)
     if not seen.window:
         return samples, ""
