@@ -55,7 +55,7 @@ class Heartbeat:
     Attributes:
         counter: increases by 1; STATUS returns it.
         trial, next: every record of this trial before `next` has arrived; the device frees them.
-        session: session of the host; for another one, the device frees nothing, and may time out.
+        session: session of the host; another session frees nothing and does not prevent a timeout.
     """
 
     counter: int

@@ -320,7 +320,7 @@ def read_not_kept(texts: SealedTexts) -> dict[str, str]:
 
 
 def _good_trees(raw: bytes) -> Trees:
-    """The trees of undamaged lines; trials that need a damaged one do not get it."""
+    """The trees of undamaged lines; damaged lines are skipped, so trials may lack a tree."""
     trees: dict[str, Tree] = {}
     for line in raw.decode("utf-8", "replace").splitlines():
         try:

@@ -19,8 +19,8 @@ INDEX = "index"
 def put_table(parent: h5py.Group, name: str, table: Table, signal: str = "") -> bool:
     """Write a table; return whether it has a column of numbers to plot over the row number.
 
-    `signal` is the column to plot; by default the first with estimates, or else the first with
-    numbers that are not exact. A table without numbers is not an NXdata.
+    `signal` is the column to plot; by default the first with estimates, else with inexact numbers,
+    else with exact numbers. A table without numbers is not an NXdata.
     """
     if not table.rows:
         return False
