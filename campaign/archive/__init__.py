@@ -1,7 +1,7 @@
-"""The archive: a run in progress is a folder that no crash can spoil; a sealed run is one file.
+"""The archive: a run in progress is a crash-safe folder; a sealed run is one file.
 
-`RunWriter` writes, `open_run` reads, `find_run` and `list_runs` look around a results folder. The
-format is that of `docs/developers/archive-format.md`. Importing this package does not import h5py.
+`RunWriter` writes, `open_run` reads, `find_run` and `list_runs` search a results folder. The
+format: `docs/developers/archive-format.md`. Importing this package does not import h5py.
 """
 
 from campaign.archive.layout.header import PlannedTrial, RunHeader, RunStatus

@@ -1,5 +1,5 @@
-"""The rehearsal controller: the other end of the serial line, with a simulated bench behind it.
+"""The rehearsal controller: the other end of the serial line, with a simulated bench.
 
-It stands in for a servo controller while a campaign is rehearsed: a process of its own that speaks
-the serial protocol, keeps step with the clock, and fails on demand.
+It replaces a servo controller in the rehearsal of a campaign: a separate process that implements
+the serial protocol in real time and simulates faults on request.
 """

@@ -11,14 +11,14 @@ Now = Callable[[], float]
 
 
 class Pace:
-    """How many samples of a trial are due.
+    """Clock that determines the number of due samples of a trial.
 
-    Everything is reckoned from the instant at which the trial began, so that no error adds up: the
-    n-th sample is due at n / rate after it, however late the one before was sent.
+    All times count from the start of the trial, so errors do not accumulate: sample n is due
+    n / rate after it, even if earlier samples were sent late.
 
     Attributes:
-        speed: seconds of the trial per second of the wall clock; infinite for as fast as the host
-            takes them.
+        speed: seconds of the trial per second of the wall clock; infinite: as fast as the host
+            takes samples.
     """
 
     def __init__(self, speed: float, now: Now = time.monotonic) -> None:
@@ -28,22 +28,22 @@ class Pace:
 
     @property
     def unlimited(self) -> bool:
-        """Whether the clock is that of the messages."""
+        """Whether the messages of the host drive the clock."""
         return math.isinf(self.speed)
 
     def begin(self) -> None:
-        """The trial begins now."""
+        """Start the trial now."""
         self._began = self._now()
 
     def due(self, rate: float) -> float:
-        """Samples that the trial has had time for at `rate` (Hz); infinite at unlimited speed."""
+        """Number of samples due now at `rate` (Hz); infinite at unlimited speed."""
         if self.unlimited:
             return math.inf
         elapsed = (self._now() - self._began) * self.speed
-        return math.floor(elapsed * rate + 1e-6) + 1  # the first one is due at time zero
+        return math.floor(elapsed * rate + 1e-6) + 1  # the first sample is due at time zero
 
     def deadline(self, sample: int, rate: float) -> float:
-        """When (of the steady clock) the `sample`-th, from 0, is due; now at unlimited speed."""
+        """Due time (steady clock, s) of sample number `sample` (from 0); now at unlimited speed."""
         if self.unlimited:
             return self._now()
         return self._began + sample / (rate * self.speed)

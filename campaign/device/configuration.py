@@ -1,4 +1,4 @@
-"""From parameters set by a host to a trial on the simulated bench."""
+"""Conversion of parameters from a host to a trial on the simulated bench."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from campaign.wire.configuration import REHEARSAL, SIMULATED_TASK, nest
 from campaign.wire.parameters import Value
 
 TABLES = ("task", "controller", "limits", "compensation", REHEARSAL)
-"""First parts of the names that there are."""
+"""Valid first parts of names."""
 
 
 @dataclass(frozen=True)
-class ConfigurationRefusal(Exception):  # noqa: N818 - a refusal is an answer, not a mishap
-    """Why a configuration cannot be armed: what a NAK says."""
+class ConfigurationRefusal(Exception):  # noqa: N818 - a refusal is an answer, not an error
+    """Reason for the refusal of a configuration: the content of a NAK."""
 
     code: NakCode
     name: str
@@ -30,7 +30,7 @@ class ConfigurationRefusal(Exception):  # noqa: N818 - a refusal is an answer, n
 
 
 def check_name(name: str) -> None:
-    """Raises ConfigurationRefusal when no parameter can be called so."""
+    """Raise ConfigurationRefusal if `name` is not a valid parameter name."""
     if name.partition(".")[0] not in TABLES:
         raise ConfigurationRefusal(
             NakCode.UNKNOWN_NAME, name, f"names begin with one of {', '.join(TABLES)}"
@@ -38,11 +38,11 @@ def check_name(name: str) -> None:
 
 
 def make_trial(bench: CompleteBench, parameters: Mapping[str, Value]) -> Trial:
-    """The trial that `parameters` describe, on `bench` (what the controller stands before).
+    """The trial that `parameters` describe, on `bench` (the bench of the controller).
 
-    Limits and the gains of each loop that the host sets are wholly the host's, those of a loop that
-    it does not name are the controller's own; of the bench itself only what a person can have set
-    to it. Raises ConfigurationRefusal.
+    If the host sets limits or the gains of a loop, they replace the controller's own completely;
+    other loops keep their gains. Of the bench itself, only fields set by the operator change.
+    Raises ConfigurationRefusal.
     """
     try:
         tree = nest(parameters)
@@ -88,7 +88,7 @@ def _bench(
 
 def _task(tree: Mapping[str, Any], rehearsal: Mapping[str, Any]) -> Task:
     simulated = {name: rehearsal[name] for name in SIMULATED_TASK if name in rehearsal}
-    window = (0.0, tree.get("duration", 0.0))  # the host's business: a bench records everything
+    window = (0.0, tree.get("duration", 0.0))  # the host selects a window: a bench records all
     try:
         return Task.model_validate({**tree, **simulated, "window": window}, context={"si": True})
     except ValidationError as error:
@@ -118,7 +118,7 @@ def _merged(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _refused(error: ValidationError, prefix: str) -> ConfigurationRefusal:
-    """What pydantic finds wrong first."""
+    """Refusal from the first error of pydantic."""
     first = error.errors(include_url=False)[0]
     name = prefix + ".".join(str(key) for key in first["loc"])
     kind = first["type"]

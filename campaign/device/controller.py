@@ -1,6 +1,6 @@
 """The emulated controller: commands in, answers and records out, no I/O.
 
-What a command does to the state is `campaign.wire.statemachine`; here is what it does besides.
+`campaign.wire.statemachine` defines the state changes of commands; this module their other effects.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from campaign.wire.statemachine import (
 HEARTBEAT_TIMEOUT = 0.1
 """s of the wall clock."""
 PATIENCE = 3.0
-"""s of silence that count as a loss where the clock is the messages'."""
+"""Heartbeat timeout (s) if the messages of the host drive the clock."""
 FASTEST_RECORDING = 1e5
 """Hz."""
 STOPPED = Ending(Outcome.INTERRUPTED, "stopped by the operator")
@@ -64,15 +64,15 @@ FEATURES = (
 )
 
 Send = Callable[[int | None, Message], None]
-"""Sends a message to one client, or to all of them (None)."""
+"""Sends a message to one client, or to all clients (None)."""
 
 
 @dataclass(frozen=True)
 class Interruption:
-    """What a fault has done to the line, until a moment of the steady clock.
+    """Interruption of the line by a fault, until a time of the steady clock.
 
     Attributes:
-        unplugged: the line is cut, and the controller goes on; else the controller hangs.
+        unplugged: the line is cut, and the controller continues; else the controller hangs.
     """
 
     until: float = -math.inf
@@ -80,17 +80,17 @@ class Interruption:
 
 
 class Controller:
-    """One controller with its bench, whoever talks to it.
+    """One controller with its bench, for all clients.
 
     Attributes:
         machine: the axis.
         state: as in STATUS.
-        interruption: whoever keeps the line must look at it.
-        bad_frames: how many had to be thrown away; whoever decodes them counts.
+        interruption: of the line; the owner of the line must apply it.
+        bad_frames: number of discarded frames, set by the decoder's owner.
     """
 
     def __init__(self, setup: Setup, send: Send, timeout: float = HEARTBEAT_TIMEOUT) -> None:
-        """`timeout`: heartbeats must not be further apart (s of the wall clock)."""
+        """`timeout`: largest interval of heartbeats (s of the wall clock)."""
         self._setup = setup
         self._now = setup.now
         self._timeout = timeout
@@ -104,9 +104,9 @@ class Controller:
         self._switch_on()
 
     def handle(self, client: int, frame: Frame) -> None:
-        """Do what a frame says that `client` sent, and answer."""
+        """Execute a frame from `client`, and answer."""
         if frame.kind & 0x80:
-            return  # an echo of what a device said
+            return  # an echo of a device's message
         if frame.kind == Kind.SAFE:
             self._safe(client, frame)
         elif frame.kind == Kind.HELLO:
@@ -119,7 +119,7 @@ class Controller:
             self._command(client, frame)
 
     def tick(self) -> None:
-        """Do what is due."""
+        """Execute all due actions."""
         self._latch.remember()
         if self.state in WATCHED and self._now() >= self._silent_at():
             self._silence()
@@ -131,14 +131,14 @@ class Controller:
             self._enter(after_end(self.state, codes.Outcome[self.machine.outcome.name]))
 
     def deadline(self) -> float:
-        """When (of the steady clock) `tick` is due at the latest; infinite when nothing is."""
+        """Latest time (steady clock, s) for the next `tick`; infinite if nothing is due."""
         silent_at = self._silent_at() if self.state in WATCHED else math.inf
         return min(silent_at, self.machine.deadline())
 
     # Answers
 
     def status(self) -> Status:
-        """How it is now."""
+        """Present STATUS."""
         ring, now = self.machine.ring, self._now()
         heard = self._session.heard_at
         return Status(
@@ -254,7 +254,7 @@ class Controller:
         try:
             message = decode(frame.kind, frame.body)
         except WireError:
-            return  # it would come again if it mattered
+            return  # these messages are not acknowledged; the host repeats important ones
         ring = self.machine.ring
         if isinstance(message, Heartbeat):
             if message.session == self._session.number:
@@ -285,7 +285,7 @@ class Controller:
             return
         if turn is Turn.REPEATED:
             for answer in self._session.answers:
-                # There may have been a stop since.
+                # A stop may have occurred since.
                 self._send(client, self._latch.message() if isinstance(answer, Latch) else answer)
             return
         message = self._decoded(client, frame)
@@ -294,7 +294,7 @@ class Controller:
         )
 
     def _decoded(self, client: int, frame: Frame) -> Message:
-        """The message; else the refusal of what is none."""
+        """The message; refuse a malformed one and return the NAK."""
         try:
             return decode(frame.kind, frame.body)
         except WireError as error:
@@ -303,7 +303,7 @@ class Controller:
             return self._refuse(client, frame, ConfigurationRefusal(code, "", str(error)))
 
     def _carried_out(self, client: int, frame: Frame, message: Message) -> tuple[Message, ...]:
-        """Carry out a new command; what was answered."""
+        """Execute a new command; return the answers."""
         state = after(self.state, Kind(frame.kind))
         if isinstance(state, NakCode):
             text = f"not in state {self.state.text}"
@@ -312,7 +312,7 @@ class Controller:
             further = self._do(message, frame)
         except ConfigurationRefusal as why:
             return (self._refuse(client, frame, why),)
-        # STOP leaves the state to the end of the trial; START's motion may have none to wait for.
+        # STOP does not change the state; the end of the trial does.
         ack = Ack(frame.sequence, Kind(frame.kind), state, self._boot)
         for answer in (ack, *further):
             self._send(client, answer)
@@ -320,7 +320,7 @@ class Controller:
         return (ack, *further)
 
     def _do(self, message: Message, frame: Frame) -> tuple[Message, ...]:
-        """What a command does besides changing the state. Raises ConfigurationRefusal."""
+        """Effect of a command other than the state change. Raises ConfigurationRefusal."""
         match message:
             case Set():
                 self._configuration.add(frame.body, message.items)
@@ -384,7 +384,7 @@ class Controller:
                 NakCode.NO_HEARTBEAT, "", "no heartbeat has been heard lately"
             )
 
-    # What happens by itself
+    # Actions of the controller without a command
 
     def _silent_at(self) -> float:
         return self._session.heard_at + self._timeout
@@ -400,7 +400,7 @@ class Controller:
         self._enter(State.FAULT)
 
     def _strike(self, strike: Strike) -> None:
-        """A fault that was asked for."""
+        """Apply a requested fault."""
         fault = strike.fault
         until = self._now() + fault.seconds
         match fault.name:
@@ -421,7 +421,7 @@ class Controller:
                 self._fail(Fault.LIMIT_SWITCH, "the axis has run into a limit switch")
 
     def _switch_on(self) -> None:
-        """As after a reset: nothing is remembered, and the boot number is another one."""
+        """Start as after a reset: with an empty memory except the latch, and a new boot number."""
         self.machine.drop()
         self.machine.ring.begin(0)
         self.machine.outcome = None

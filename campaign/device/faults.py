@@ -1,4 +1,4 @@
-"""Faults on demand: `--fault NAME[=VALUE][@trial=N][@time=T]`."""
+"""Faults on request: `--fault NAME[=VALUE][@trial=N][@time=T]`."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from campaign.errors import UsageError
 
 
 class FaultName(StrEnum):
-    """What can go wrong. The first five are of the line and have a rate, the others a moment."""
+    """Kinds of faults. The first five concern the line and have a rate, the others a time."""
 
     DROP = "drop"  # a byte is lost
-    DUPLICATE = "duplicate"  # a byte comes twice
-    REORDER = "reorder"  # a byte changes places with its neighbour
-    CORRUPT = "corrupt"  # a byte arrives as another one
+    DUPLICATE = "duplicate"  # a byte arrives twice
+    REORDER = "reorder"  # a byte is swapped with its neighbor
+    CORRUPT = "corrupt"  # a byte is changed
     LOST_BLOCKS = "lost-blocks"  # a whole frame of records is lost
-    STALL = "stall"  # the controller neither speaks nor listens for a while
-    REBOOT = "reboot"  # it starts anew, and knows nothing of what was
-    UNPLUG = "unplug"  # the plug is pulled, and put back
-    SENSOR = "sensor"  # a channel freezes, and the controller notices
+    STALL = "stall"  # the controller neither sends nor receives for some time
+    REBOOT = "reboot"  # the controller restarts and loses its state
+    UNPLUG = "unplug"  # the line is disconnected and connected again
+    SENSOR = "sensor"  # a channel freezes, and the controller detects it
     OVER_TEMPERATURE = "over-temperature"  # the motor is too hot
-    LIMIT_SWITCH = "limit-switch"  # the axis runs into its switch
+    LIMIT_SWITCH = "limit-switch"  # the axis reaches its limit switch
 
 
 BYTE_FAULTS = (FaultName.DROP, FaultName.DUPLICATE, FaultName.REORDER, FaultName.CORRUPT)
@@ -38,23 +38,23 @@ SECONDS = {
     FaultName.UNPLUG: 1.0,
     FaultName.OVER_TEMPERATURE: 0.0,
 }
-"""Faults that last a while, with how long when the user names no time (s of the wall clock)."""
+"""Faults with a duration, and its default (s of the wall clock)."""
 DEFAULT_TIME = 0.5
-"""s into the trial."""
+"""s after the start of the trial."""
 STUCK_CHANNELS = tuple(info.name for info in CHANNELS if info.measured and info.name != COMMAND)
 
 
 @dataclass(frozen=True)
 class FaultSpec:
-    """One fault that was asked for.
+    """One requested fault.
 
     Attributes:
-        rate: of a line fault: share of bytes, or of frames, that it meets; both directions.
-        seconds: how long it lasts on the wall clock.
-        channel: what is stuck, of a sensor fault.
-        trial: in which trial since the controller was switched on, from 1; None for every one. A
-            line fault without it also meets what is said between trials.
-        time: when in the trial (s of its own time); of no meaning for a line fault.
+        rate: share of affected bytes or frames of a line fault, in both directions.
+        seconds: duration on the wall clock (s).
+        channel: frozen channel of a sensor fault.
+        trial: number of the trial since the start of the controller, from 1; None for all. A line
+            fault without it also affects messages between trials.
+        time: time of the fault in the trial (s of its own time); unused for a line fault.
     """
 
     name: FaultName
@@ -65,7 +65,7 @@ class FaultSpec:
     time: float = DEFAULT_TIME
 
     def meets(self, trial: int | None) -> bool:
-        """Whether it happens in that trial; `trial` is None while none runs."""
+        """Whether it occurs in that trial; `trial` is None while none runs."""
         return self.trial is None or self.trial == trial
 
 
@@ -75,7 +75,7 @@ def parse_faults(texts: Sequence[str]) -> tuple[FaultSpec, ...]:
 
 
 def parse_fault(text: str) -> FaultSpec:
-    """`NAME[=VALUE][@trial=N][@time=T]`, T in seconds. Raises UsageError saying what is allowed."""
+    """Parse `NAME[=VALUE][@trial=N][@time=T]`, T in seconds. Raises UsageError with the syntax."""
     what, *places = text.split("@")
     word, has_value, value = (part.strip() for part in what.partition("="))
     name = _name(text, word)

@@ -1,8 +1,8 @@
 """The latch: after a stop by another host the controller refuses to arm.
 
-It is in lasting memory, here a file, before anybody is told of it. A controller that cannot
-remember does not know whether it was stopped, so it starts latched. A missing file is no memory:
-only a file that says so is of a controller that was never stopped.
+It is written to permanent memory, here a file, before it is reported. A controller without such
+memory does not know whether it was stopped, so it starts latched. A missing file is no memory: only
+a file can state that the controller was never stopped.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ MOST = 2**32
 
 @dataclass(frozen=True)
 class Stop:
-    """What is remembered.
+    """Content of the permanent memory.
 
     Attributes:
-        count: stops so far; whoever clears one names it.
-        by: who sent the SAFE.
-        at: when, on the wall clock (s since 1970): the only clock that outlives a reset; None when
-            it is not known.
+        count: number of stops so far, required to clear the latest one.
+        by: sender of the SAFE.
+        at: its time on the wall clock (s since 1970), the only clock that continues over a reset;
+            None if unknown.
     """
 
     latched: bool = False
@@ -45,34 +45,34 @@ class Stop:
 
 
 class LatchMemory:
-    """The latch of one controller, in a file or, for want of one, in nothing that lasts."""
+    """The latch of one controller, in a file or, without a file, in no permanent memory."""
 
     def __init__(
         self, file: Path | None, boot: int, wall_clock: Callable[[], float] = time.time
     ) -> None:
-        """As after a reset. `boot`, which differs every time, numbers a latch out of ignorance."""
+        """Start as after a reset. Without memory, the stop has the number `boot`, new each time."""
         self._file = file
         self._wall_clock = wall_clock
-        self._session = 0  # who stopped it last, for the same stop sent again
+        self._session = 0  # session of the last stop, to recognize its repetition
         self._remembered = True
         self.stop = _read(file) or Stop(True, boot, LatchCause.NO_MEMORY)
 
     @property
     def latched(self) -> bool:
-        """Whether nothing may arm."""
+        """Whether arming is refused."""
         return self.stop.latched
 
     def message(self) -> Latch:
-        """As it is told to a host."""
+        """Message to a host."""
         stop = self.stop
         age = None if stop.at is None else max(0.0, self._wall_clock() - stop.at)
         return Latch(stop.latched, stop.count, stop.cause, age, stop.by)
 
     def set(self, session: int, by: str) -> bool:
-        """Somebody has stopped the controller; whether that is news.
+        """Register a stop by SAFE; return whether it is a new one.
 
-        One session's SAFE, sent until it is confirmed, is one stop. What does not say whose it is
-        counts each time: it might be another one, which nobody has seen.
+        Repeated SAFE messages of one session are one stop. Each SAFE without a session is a new
+        stop: it may be from another sender, and not yet noticed by a user.
         """
         again = self.latched and session != 0 and session == self._session
         self._session = session
@@ -86,17 +86,17 @@ class LatchMemory:
         return True
 
     def remember(self) -> None:
-        """Try again what could not be remembered: a full disk must not hinder a stop, which holds
-        all the same until the controller is switched off.
+        """Retry a failed write: a full disk must not prevent a stop, which remains in effect
+        until the controller is switched off.
         """
         if not self._remembered:
             with contextlib.suppress(OSError):
                 self._keep(self.stop)
 
     def clear(self, count: int) -> bool:
-        """A person has seen stop number `count`; False when that is not what it is latched by.
+        """Clear stop number `count`; return False if it is not the present one.
 
-        Raises OSError when that cannot be remembered: it then stays latched.
+        Raises OSError if the write fails: it then stays latched.
         """
         if not self.latched or count != self.stop.count:
             return False
@@ -114,7 +114,7 @@ class LatchMemory:
 def new_memory(file: Path) -> None:
     """Write the memory of a controller that was never stopped.
 
-    Raises FileExistsError for whatever has that name, as it may hold a stop; OSError.
+    Raises FileExistsError if the path exists, because it may contain a stop; OSError.
     """
     if os.path.lexists(file):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(file))
@@ -122,7 +122,7 @@ def new_memory(file: Path) -> None:
 
 
 def _read(file: Path | None) -> Stop | None:
-    """What the file says; None for one that is missing or cannot be understood."""
+    """Content of the file; None if it is missing or invalid."""
     if file is None:
         return None
     try:

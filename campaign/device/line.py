@@ -15,16 +15,16 @@ class Stream(Protocol):
     """Bytes to and from one client."""
 
     def fileno(self) -> int:
-        """For a selector."""
+        """File descriptor for a selector."""
 
     def read(self) -> bytes | None:
-        """What has come; None when the client has gone."""
+        """Received bytes; None if the client has disconnected."""
 
     def write(self, data: bytes) -> int:
-        """Send some of `data`; how many bytes were taken."""
+        """Send a part of `data`; return the number of bytes sent."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the connection."""
 
 
 class TcpStream:
@@ -32,16 +32,16 @@ class TcpStream:
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
-        # A status must not wait for company.
+        # Send a status at once, not together with later data.
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection = connection
 
     def fileno(self) -> int:
-        """For a selector."""
+        """File descriptor for a selector."""
         return self._connection.fileno()
 
     def read(self) -> bytes | None:
-        """What has come; None when the client has gone."""
+        """Received bytes; None if the client has disconnected."""
         try:
             return self._connection.recv(CHUNK) or None
         except BlockingIOError:
@@ -50,7 +50,7 @@ class TcpStream:
             return None
 
     def write(self, data: bytes) -> int:
-        """Send some of `data`; a client that has gone is noticed by reading."""
+        """Send a part of `data`; reading detects a disconnected client."""
         try:
             return self._connection.send(data)
         except BlockingIOError:
@@ -59,7 +59,7 @@ class TcpStream:
             return len(data)
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the connection."""
         self._connection.close()
 
 
@@ -67,7 +67,7 @@ class TcpLine:
     """A listening socket.
 
     Attributes:
-        name: as `--port` takes it.
+        name: address in the form of `--port`.
     """
 
     def __init__(self, address: str) -> None:
@@ -79,7 +79,7 @@ class TcpLine:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._listener = socket.socket(family, socket.SOCK_STREAM)
         try:
-            if os.name != "nt":  # there it would let two controllers share a port
+            if os.name != "nt":  # on Windows it would let two controllers share a port
                 self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._listener.bind((host, int(port)))
             self._listener.listen()
@@ -93,11 +93,11 @@ class TcpLine:
         self.name = f"socket://{shown}:{bound[1]}"
 
     def fileno(self) -> int:
-        """For a selector: readable when somebody connects."""
+        """File descriptor for a selector: readable when a client connects."""
         return self._listener.fileno()
 
     def accept(self) -> TcpStream | None:
-        """The next connection; None when nobody waits any more."""
+        """The next connection; None if no client waits."""
         try:
             connection, _ = self._listener.accept()
         except OSError:
@@ -105,19 +105,19 @@ class TcpLine:
         return TcpStream(connection)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._listener.close()
 
 
 class PtyStream:
-    """The controller's end of a pseudo-terminal; whoever opens the other end is the one client.
+    """The controller's end of a pseudo-terminal; the process at the other end is the only client.
 
     Attributes:
-        name: as `--port` takes it.
+        name: path in the form of `--port`.
     """
 
     def __init__(self) -> None:
-        """Raises UsageError where there are none."""
+        """Open a pseudo-terminal. Raises UsageError if the system has none."""
         try:
             import pty
             import tty
@@ -127,30 +127,30 @@ class PtyStream:
             self._ours, self._theirs = pty.openpty()
         except OSError as error:
             raise UsageError(f"--pty: {error.strerror}") from None
-        # Kept open on our side as well: with nobody at the other end, reading would be an error.
+        # The client's end stays open here, too: without a client, reading would fail.
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.name = os.ttyname(self._theirs)
 
     def fileno(self) -> int:
-        """For a selector."""
+        """File descriptor for a selector."""
         return self._ours
 
     def read(self) -> bytes | None:
-        """What has come."""
+        """Received bytes."""
         try:
             return os.read(self._ours, CHUNK)
         except OSError:
             return b""
 
     def write(self, data: bytes) -> int:
-        """Send some of `data`."""
+        """Send a part of `data`."""
         try:
             return os.write(self._ours, data)
         except OSError:
             return 0
 
     def close(self) -> None:
-        """Both ends go."""
+        """Close both ends."""
         os.close(self._ours)
         os.close(self._theirs)

@@ -1,4 +1,4 @@
-"""The plant of the emulated controller: axis, drive, current trial; and the log of the drive."""
+"""The plant of the emulated controller: axis, drive, current trial; and the log of the device."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from campaign.wire.messages import Record
 
 RING_RECORDS = 4096
 COAST = 0.05
-"""s of the trial's time from drive off to standstill."""
+"""Time from drive off to standstill (s of the trial's time)."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a rehearsal stands for, as the command line says.
+    """Settings of a rehearsal controller, from the command line.
 
     Attributes:
         speed: seconds of a trial per second of the wall clock; infinite: as fast as the host takes
-            them.
-        wake: called from a thread when samples are there that were waited for.
-        busy: whether the line has enough to do for now; asked where the speed is infinite.
+            samples.
+        wake: called from a thread when new samples are available.
+        busy: whether the line is saturated; used at infinite speed.
         now: a steady clock.
-        log: is told whenever the drive goes on or off.
-        latch_file: where the latch is remembered (`new_memory` makes it); None: nowhere, as
-            without lasting memory.
+        log: log of switching the drive, stops and connections.
+        latch_file: permanent memory of the latch (`new_memory` creates it); None: no permanent
+            memory.
     """
 
     bench: CompleteBench
@@ -57,7 +57,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class ArmedTrial:
-    """A trial that is ready to start, with its simulation under way."""
+    """A trial that is ready to start, with its running simulation."""
 
     trial: Trial
     channels: tuple[Channel, ...]
@@ -69,13 +69,13 @@ class Machine:
 
     Attributes:
         ring: the records of the trial.
-        winding: how warm the motor is.
-        trials: started since it was switched on.
-        outcome: how the trial ended, from its END on.
+        winding: temperature of the motor.
+        trials: number of trials started since switching on.
+        outcome: outcome of the trial, set at its END.
     """
 
     def __init__(self, setup: Setup, emit: Callable[[Record], None]) -> None:
-        """`emit` is told of every new record."""
+        """`emit` is called with every new record."""
         self._setup = setup
         self._emit = emit
         self._backend = SimBackend(SimOptions())
@@ -95,20 +95,20 @@ class Machine:
 
     @property
     def at_rest(self) -> bool:
-        """Whether the axis stands still."""
+        """Whether the axis is at rest."""
         return self._motion is None
 
     @property
     def running(self) -> int | None:
-        """Which trial it is in, from 1 since it was switched on; None while it is in none."""
+        """Number of the running trial, from 1 since switching on; None without one."""
         return None if self._motion is None else self.trials
 
     def refuses(self, trial: Trial) -> str | None:
-        """Why this bench cannot be simulated in `trial`, or None."""
+        """Reason why this bench cannot be simulated in `trial`, or None."""
         return self._backend.refuses(trial)
 
     def arm(self, trial: Trial) -> tuple[Channel, ...]:
-        """Get ready for `trial`; what it will record."""
+        """Prepare `trial`; return its channels."""
         self.drop()
         names = [channel.name for channel in CHANNELS]
         channels = tuple(
@@ -121,7 +121,7 @@ class Machine:
         return channels
 
     def start(self, number: int) -> None:
-        """Set the axis in motion; `number` is the host's for its records."""
+        """Start the motion; `number` is the host's number of the trial, for its records."""
         armed = self._armed
         if armed is None:
             raise RuntimeError("not armed")
@@ -142,7 +142,7 @@ class Machine:
         )
 
     def switch_off(self, ending: Ending, *, told: bool = False) -> None:
-        """Drive off; END follows at standstill. `told`: the reason becomes an event as well."""
+        """Switch the drive off; END follows at standstill. `told`: record an event, too."""
         if self._armed is not None:
             self.drop()
         if self._motion is None or self._ending is not None:
@@ -155,7 +155,7 @@ class Machine:
         self._rest_at = self._setup.now() + COAST / self._setup.speed
 
     def drop(self) -> None:
-        """Forget the trial, whatever has become of it."""
+        """Discard the trial in any state."""
         if self.drive_on:
             self._setup.log("drive off", why="dropped")
         for producer in (self._armed, self._motion):
@@ -166,7 +166,7 @@ class Machine:
         self._armed = self._motion = self._ending = None
 
     def tick(self) -> list[Strike]:
-        """Do what is due; returns the faults that the controller has to deal with."""
+        """Execute all due actions; return the faults that the controller must handle."""
         struck = []
         if self._motion is not None and self._ending is None:
             for strike in self._motion.advance():
@@ -181,7 +181,7 @@ class Machine:
         return struck
 
     def deadline(self) -> float:
-        """When (of the steady clock) `tick` is due at the latest; infinite when nothing is."""
+        """Latest time (steady clock, s) for the next `tick`; infinite if nothing is due."""
         if self._ending is not None:
             return self._rest_at
         due = self._motion.deadline() if self._motion is not None else None
@@ -196,20 +196,20 @@ class Machine:
 
 
 class DeviceLog:
-    """Appends what happens, in the order in which it happened; without a file, nothing."""
+    """Log of events in their order; without a file, it does nothing."""
 
     def __init__(self, file: Path | None) -> None:
         self._out: IO[str] | None = None
         if file is not None:
-            self._out = file.open("a", encoding="utf-8", buffering=1)  # a line is never torn
+            self._out = file.open("a", encoding="utf-8", buffering=1)  # writes whole lines
 
     def __call__(self, event: str, **facts: str | int | float | bool | None) -> None:
-        """Note `event`, such as `drive on`, with what belongs to it."""
+        """Log `event`, such as `drive on`, with its facts."""
         if self._out is not None:
             self._out.write(json.dumps({"at": time.time(), "event": event, **facts}) + "\n")
 
     def close(self) -> None:
-        """Nothing more happens."""
+        """Close the file."""
         if self._out is not None:
             self._out.close()
             self._out = None

@@ -1,4 +1,4 @@
-"""One trial in motion: due samples go into the ring, faults occur at their time."""
+"""One trial in motion: puts due samples into the ring, applies faults at their time."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from campaign.wire.messages import Outcome as OutcomeCode
 from campaign.wire.messages import Record, samples_per_record
 
 WINDOW = 1024
-"""Records that the host has not yet acknowledged, at most, where the clock is the messages'."""
+"""Largest number of unacknowledged records if the messages of the host drive the clock."""
 RECORD_INTERVAL = 0.02
-"""s of the wall clock between two records, or less when a frame is full before."""
+"""Interval of records (s of the wall clock); shorter if a frame is full earlier."""
 STUCK_AFTER = 0.1
-"""s that a frozen sensor takes to be noticed."""
+"""Time to detect a frozen sensor (s)."""
 LONGEST_REASON = 900
-"""bytes; it has to fit into a frame."""
+"""bytes; a reason must fit into a frame."""
 
 
 @dataclass(frozen=True)
 class Strike:
-    """A fault that strikes before the `sample`-th sample (from 0) is taken.
+    """A fault that occurs before sample number `sample` (from 0) is taken.
 
     Attributes:
-        noticed: of a sensor: it has been stuck long enough for the controller to notice.
+        noticed: whether a sensor has been frozen long enough for the controller to detect it.
     """
 
     sample: int
@@ -59,8 +59,8 @@ class Motion:
         emit: Callable[[Record], None],
         busy: Callable[[], bool],
     ) -> None:
-        """`rate` of the recording (Hz); `emit` is told of every record that the ring now has;
-        `busy` is whether the line has enough to do for now.
+        """`rate` of the recording (Hz); `emit` is called with every new record of the ring; `busy`
+        returns whether the line is saturated.
         """
         self._busy = busy
         self._rate = rate
@@ -80,15 +80,15 @@ class Motion:
             whole = min(whole, max(1, round(rate * pace.speed * RECORD_INTERVAL)))
         self._batch = whole
         self.released = 0
-        """Samples in all."""
+        """Total number of released samples."""
 
     @property
     def time(self) -> float:
-        """Of the next sample (s)."""
+        """Time of the next sample (s)."""
         return self.released / self._rate
 
     def advance(self) -> list[Strike]:
-        """Release what is due; returns the faults that struck, after which nothing more is."""
+        """Release due records up to the next fault; return the faults that occurred."""
         if not self._began:
             if not self._producer.ready:
                 return []
@@ -100,14 +100,14 @@ class Motion:
         return struck or self._struck()
 
     def ending(self) -> Ending | None:
-        """How the simulation ended, once everything before has been released."""
+        """Ending of the simulation, after all its samples are released; None before."""
         ending = self._producer.ending if self._began else None
-        if ending is not None:  # an event may have come after the last samples were taken
+        if ending is not None:  # events may follow the last samples
             self._take_events()
         return ending
 
     def deadline(self) -> float | None:
-        """When (of the steady clock) the next record is due; None: when something else happens."""
+        """Due time of the next record (steady clock, s); None if it depends on other events."""
         if not self._began or self._pace.unlimited:
             return None
         ready = self._ready()
@@ -116,7 +116,7 @@ class Motion:
         return self._pace.deadline(self.released + max(ready, 1) - 1, self._rate)
 
     def stop(self) -> None:
-        """Nothing more is simulated."""
+        """Stop the simulation."""
         self._producer.cancel()
 
     def event(self, time: float, text: str) -> None:
@@ -133,14 +133,14 @@ class Motion:
         self._add(End(trial, number, outcome, code, self.released, safe, reason))
 
     def freeze(self, strike: Strike) -> None:
-        """From now on the channel shows what it shows next, and somebody will notice."""
+        """Freeze the channel at its next value; schedule the detection."""
         self._frozen[self._names.index(strike.fault.channel)] = None
         notice = strike.sample + math.ceil(STUCK_AFTER * self._rate)
         self._strikes.append(replace(strike, sample=notice, noticed=True))
         self._strikes.sort(key=lambda each: each.sample)
 
     def _release(self, due: float) -> bool:
-        """Release one record's worth when it is due; whether it was."""
+        """Release one record if it is due; return whether it was."""
         if self._pace.unlimited and (self._ring.used >= WINDOW or self._busy()):
             return False
         ready = self._ready()
@@ -161,9 +161,9 @@ class Motion:
             self.event(event.time, event.text)
 
     def _ready(self) -> int:
-        """Samples of the next record, if the simulation has them all."""
+        """Number of samples of the next record; 0 until the simulation has all of them."""
         whole = min(self._batch, self._until_strike())
-        finished = self._producer.finished  # asked first: what is there then is all there is
+        finished = self._producer.finished  # read first: then `available` is final
         ready = min(whole, self._producer.available)
         return ready if ready == whole or finished else 0
 
@@ -179,7 +179,7 @@ class Motion:
         return max(0, self._strikes[0].sample - self.released)
 
     def _struck(self) -> list[Strike]:
-        """Take the faults whose time has come: all samples before them are out, theirs is due."""
+        """Take the due faults: all samples before them are released, and their sample is due."""
         struck = []
         while self._strikes and self._strikes[0].sample <= self.released:
             if self._pace.due(self._rate) <= self._strikes[0].sample:

@@ -1,4 +1,4 @@
-"""A noisy line: bytes lost, doubled, swapped or changed."""
+"""A noisy line: bytes lost, duplicated, swapped or changed."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from campaign.device.faults import BYTE_FAULTS, FaultName, FaultSpec
 
 
 class ByteNoise:
-    """One direction of a bad line.
+    """One direction of a noisy line.
 
-    Which bytes are met depends on the seed and on how many have passed, not on how they were
-    divided into chunks; only a swap at a chunk's end is with the byte before it.
+    The affected bytes depend on the seed and on the number of previous bytes, not on the division
+    into chunks; only a swap at the end of a chunk uses the previous byte.
     """
 
     def __init__(self, rates: Mapping[FaultName, float], seed: Sequence[int]) -> None:
@@ -25,21 +25,21 @@ class ByteNoise:
         self._left = {name: self._gap(name) for name in self._rates}
 
     def __call__(self, data: bytes) -> bytes:
-        """What arrives of `data`."""
+        """Bytes that arrive of `data`."""
         hits = sorted(at for name in self._rates for at in self._hits(name, len(data)))
         if not hits:
             return data
         out = bytearray(data)
-        for at, name, mask in reversed(hits):  # from the end: the places before stay right
+        for at, name, mask in reversed(hits):  # from the end: earlier positions stay valid
             _damage(out, at, name, mask)
         return bytes(out)
 
     def _gap(self, name: FaultName) -> int:
-        """How many bytes pass before the next one that is met."""
+        """Number of unaffected bytes before the next affected one."""
         return int(self._random[name].geometric(self._rates[name])) - 1
 
     def _hits(self, name: FaultName, count: int) -> list[tuple[int, FaultName, int]]:
-        """Where, how, and with which change of bits."""
+        """Position, fault and bit mask of each affected byte."""
         hits, at = [], self._left[name]
         while at < count:
             hits.append((at, name, int(self._random[name].integers(1, 256))))
@@ -63,7 +63,7 @@ def _damage(out: bytearray, at: int, name: FaultName, mask: int) -> None:
 
 
 class BadLine:
-    """Everything that the asked-for faults do to what passes between host and controller."""
+    """Effect of the requested faults on the bytes between host and controller."""
 
     def __init__(self, faults: Sequence[FaultSpec], seed: int) -> None:
         self._faults = [fault for fault in faults if fault.rate > 0.0]
@@ -73,21 +73,21 @@ class BadLine:
         self._make()
 
     def enter(self, trial: int | None) -> None:
-        """A trial begins (its number since the controller was switched on), or has ended (None)."""
+        """Set the running trial (its number since switching on), or None after its end."""
         if trial != self._trial and any(fault.trial is not None for fault in self._faults):
             self._trial = trial
             self._make()
 
     def received(self, data: bytes) -> bytes:
-        """What arrives of what the host sent."""
+        """Bytes that arrive at the controller, of `data` from the host."""
         return self._in(data)
 
     def sent(self, data: bytes) -> bytes:
-        """What arrives of what the controller sends."""
+        """Bytes that arrive at the host, of `data` from the controller."""
         return self._out(data)
 
     def loses_block(self) -> bool:
-        """Whether the frame of records that is to be sent now never arrives."""
+        """Whether the next frame of records is lost."""
         rate = self._rates.get(FaultName.LOST_BLOCKS, 0.0)
         return rate > 0.0 and bool(self._random.random() < rate)
 

@@ -13,17 +13,17 @@ from campaign.recording import Array, ChannelInfo, Ending, Event, Fault, Outcome
 from campaign.trial import Trial
 
 AHEAD = 50_000
-"""Samples that are kept ready at most, give or take a block of the simulation."""
+"""Largest number of samples in advance, plus up to one block of the simulation."""
 
 
 class CancelledError(Exception):
-    """The trial is over for the controller; the simulation need not go on."""
+    """The controller has discarded the trial; the simulation ends."""
 
 
 class Producer:
-    """Executes one trial on `backend` in a thread; the controller takes what it has made.
+    """Simulation of one trial on `backend` in a thread; the controller takes its samples.
 
-    It is a Recorder for the backend. `wake` is called from the thread whenever there is news.
+    It is a Recorder for the backend. The thread calls `wake` for new samples and at the end.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Producer:
         self._changed = threading.Condition()
         self._blocks: deque[Array] = deque()
         self._events: deque[tuple[int, Event]] = deque()
-        self._made = 0  # samples in all
+        self._made = 0  # total number of samples
         self._taken = 0
         self._cancelled = False
         self._ending: Ending | None = None
@@ -44,46 +44,46 @@ class Producer:
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
 
     def begin(self) -> None:
-        """Begin to simulate."""
+        """Start the simulation."""
         self._thread.start()
 
     def cancel(self) -> None:
-        """Forget the trial; the thread ends with its present block."""
+        """Cancel the trial; the thread ends after its present block."""
         with self._changed:
             self._cancelled = True
             self._changed.notify_all()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the simulation has ended or has made as much as it may; whether it has."""
+        """Wait until the simulation ends or reaches its largest advance; return whether it did."""
         with self._changed:
             return self._changed.wait_for(self._is_ahead, timeout)
 
     @property
     def ready(self) -> bool:
-        """Whether the first samples, or the ending, are there."""
+        """Whether the first samples, or the ending, are available."""
         with self._changed:
             return self._made > 0 or self._ending is not None
 
     @property
     def available(self) -> int:
-        """Samples that can be taken now."""
+        """Number of samples available now."""
         with self._changed:
             return self._made - self._taken
 
     @property
     def finished(self) -> bool:
-        """Whether the simulation has ended; samples of it may be left to take."""
+        """Whether the simulation has ended; some samples may still be available."""
         with self._changed:
             return self._ending is not None
 
     @property
     def ending(self) -> Ending | None:
-        """How the simulation ended; None until it has and all its samples were taken."""
+        """Ending of the simulation; None until it has ended and all its samples are taken."""
         with self._changed:
             return self._ending if self._made == self._taken else None
 
     def take(self, most: int) -> Array:
-        """The next samples, at most `most`, shape (channels, n); n is 0 when there are none."""
+        """The next samples, at most `most`, shape (channels, n); n is 0 if there are none."""
         with self._changed:
             if not self._blocks or most <= 0:
                 return np.empty((len(self.channels), 0))
@@ -100,14 +100,14 @@ class Producer:
         return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
 
     def take_events(self) -> list[Event]:
-        """Events that come before the next sample to be taken."""
+        """Events before the next sample."""
         with self._changed:
             due = []
             while self._events and self._events[0][0] <= self._taken:
                 due.append(self._events.popleft()[1])
             return due
 
-    # What the backend calls, from the thread.
+    # Methods that the backend calls from the thread
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
         self.channels = channels
@@ -140,7 +140,7 @@ class Producer:
             ending = self._backend.execute(self._trial, self, lambda: self._cancelled)
         except CancelledError:
             ending = Ending(Outcome.INTERRUPTED, "cancelled")
-        except Exception as error:  # noqa: BLE001 - whatever it was, the controller has to say it
+        except Exception as error:  # noqa: BLE001 - the controller must report any error
             reason = f"the simulation failed: {type(error).__name__}: {error}"
             ending = Ending(Outcome.FAULT, reason, fault=Fault.OTHER)
         with self._changed:

@@ -1,4 +1,4 @@
-"""The controller's ring buffer: records of one trial until the host has them."""
+"""The controller's ring buffer: records of one trial until the host has received them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from campaign.wire.messages import Record
 
 
 class Ring:
-    """Numbered records, the oldest given up for the newest when it is full.
+    """Buffer of numbered records; if it is full, a new record replaces the oldest.
 
     Attributes:
-        capacity: how many it keeps.
-        trial: whose records these are; 0 for none.
-        first: number of the oldest one kept.
-        next: number of the next one to come; the first record of a trial is number 0.
+        capacity: largest number of records.
+        trial: trial of the records; 0 for none.
+        first: number of the oldest stored record.
+        next: number of the next new record; the first record of a trial is number 0.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -28,21 +28,21 @@ class Ring:
 
     @property
     def used(self) -> int:
-        """Records kept now."""
+        """Number of stored records."""
         return len(self._records)
 
     @property
     def room(self) -> int:
-        """Records that can be added before one is given up."""
+        """Number of records that fit before the oldest is replaced."""
         return self.capacity - len(self._records)
 
     def begin(self, trial: int) -> None:
-        """Forget everything; what comes belongs to `trial`."""
+        """Delete all records; further records belong to `trial`."""
         self._records.clear()
         self.trial, self.first, self.next = trial, 0, 0
 
     def add(self, record: Record) -> None:
-        """Keep `record`, whose number is `next`."""
+        """Store `record`, which has the number `next`."""
         if not self.room:
             self._records.popleft()
             self.first += 1
@@ -50,16 +50,16 @@ class Ring:
         self.next += 1
 
     def free(self, before: int) -> None:
-        """Give up every record with a number below `before`; the host has it.
+        """Delete every record with a number below `before`, which the host has received.
 
-        Nothing when there are not so many yet: no host can have what was not made.
+        Does nothing if `before` is above `next`: a host cannot have future records.
         """
         while self._records and self.first < before <= self.next:
             self._records.popleft()
             self.first += 1
 
     def again(self, first: int, count: int) -> Iterator[Record | LostRecords]:
-        """The records asked for again; those no longer kept as one LOST, future ones not at all."""
+        """Requested records again; deleted ones as one LOST, future ones not at all."""
         end = min(first + count, self.next)
         lost = min(end, self.first) - first
         if lost > 0:

@@ -1,4 +1,4 @@
-"""The loop of the emulated controller: read, work, write."""
+"""The loop of the emulated controller: read, execute, write."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from campaign.wire.frames import FrameDecoder, encode_frame
 from campaign.wire.messages import End, Event, Message, Samples, encode
 
 BACKLOG = 256 * 1024
-"""Bytes that wait to be sent at most; a frame beyond them is lost, as in a real controller."""
+"""Largest send buffer (bytes); a frame that exceeds it is lost, as in a real controller."""
 ENOUGH = 64 * 1024
-"""Bytes that wait, from which on the line counts as busy."""
+"""Bytes in the send buffer from which the line counts as busy."""
 
 
 @dataclass
 class Client:
-    """One connection: what waits to be sent, and what was found in what came."""
+    """One connection: send buffer, and decoder of received bytes."""
 
     stream: Stream
     decoder: FrameDecoder = field(default_factory=FrameDecoder)
@@ -34,10 +34,10 @@ class Client:
 
 
 class Server:
-    """Serves a controller until `stop`, or until an exception such as KeyboardInterrupt.
+    """Server of a controller until `stop`, or until an exception such as KeyboardInterrupt.
 
     Attributes:
-        controller: whom it serves.
+        controller: the controller.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Server:
         setup = replace(setup, faults=faults, wake=self.wake, busy=self._busy)
         self._noise = BadLine(faults, fault_seed)
         self._clients: dict[int, Client] = {}
-        self._gone_bad = 0  # bad frames of connections that have gone
+        self._gone_bad = 0  # bad frames of closed connections
         self._names = 0
         self._sequence = 0
         self._stopped = False
@@ -69,17 +69,17 @@ class Server:
             self._selector.register(line, selectors.EVENT_READ, None)
 
     def wake(self) -> None:
-        """Make the loop look again; from any thread."""
-        with contextlib.suppress(OSError):  # full: it will look anyway; closed: it has left
+        """Wake the loop; from any thread."""
+        with contextlib.suppress(OSError):  # full: it wakes anyway; closed: it has ended
             self._waker.send(b"\0")
 
     def stop(self) -> None:
-        """Leave the loop; from any thread."""
+        """End the loop; from any thread."""
         self._stopped = True
         self.wake()
 
     def serve(self) -> None:
-        """Serve, and let go of the line in the end."""
+        """Serve, then close the line."""
         try:
             while not self._stopped:
                 self._turn()
@@ -111,12 +111,12 @@ class Server:
         self._flush()
 
     def _cut(self) -> Interruption | None:
-        """What a fault does to the line now."""
+        """Present interruption of the line by a fault, or None."""
         interruption = self.controller.interruption
         return interruption if time.monotonic() < interruption.until else None
 
     def _patience(self, cut: Interruption | None) -> float | None:
-        """How long the loop may wait (s); None for as long as nothing comes."""
+        """Longest wait of the loop (s); None without a limit."""
         if cut is not None and not cut.unplugged:
             due = cut.until
         else:
@@ -167,7 +167,7 @@ class Server:
             self._leave(number)
             return
         if cut is not None:
-            return  # nobody listens
+            return  # received bytes are lost
         for frame in client.decoder.feed(self._noise.received(data)):
             self.controller.bad_frames = self._bad_frames()
             self.controller.handle(number, frame)

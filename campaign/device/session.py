@@ -14,20 +14,20 @@ from campaign.wire.statemachine import SequenceNumbers
 
 LONGEST_ARRAY = 65536
 MOST_BYTES = 4 * 1024 * 1024
-"""of a configuration."""
+"""Largest size of a configuration (bytes)."""
 
 
 @dataclass
 class Session:
-    """One host's session, until another one's begins.
+    """One host's session, until another session begins.
 
     Attributes:
-        client: the connection that holds the line; None before the first HELLO.
-        number: of the session, as HELLO said.
-        host: who it is, as HELLO said.
-        numbering: of its commands.
-        answers: to the last numbered command, for when it comes again.
-        heard_at: when (of the steady clock) the last heartbeat came.
+        client: the connection that holds the controller; None before the first HELLO.
+        number: number of the session, from HELLO.
+        host: identity of the host, from HELLO.
+        numbering: sequence numbers of its commands.
+        answers: answers to the last numbered command, for its repetition.
+        heard_at: time of the last heartbeat (steady clock, s).
         heartbeat: its counter.
     """
 
@@ -40,15 +40,15 @@ class Session:
     heartbeat: int = 0
 
     def begin(self, client: int, number: int, sequence: int, host: str, now: float) -> None:
-        """A HELLO was accepted: `client` holds the line, and commands are numbered from it on."""
+        """Accept a HELLO: `client` holds the controller; commands are numbered from it on."""
         if not self.numbering.same_session(number):
-            self.heard_at, self.heartbeat = now, 0  # heartbeats take a moment to follow
+            self.heard_at, self.heartbeat = now, 0  # the first heartbeat arrives later
         self.client, self.number, self.host = client, number, host
         self.numbering.begin(number, sequence)
 
 
 class Configuration:
-    """What SET has brought since the controller was idle."""
+    """Parameters received by SET since the controller was idle."""
 
     def __init__(self) -> None:
         self._bodies: list[bytes] = []
@@ -56,7 +56,7 @@ class Configuration:
         self._size = 0
 
     def add(self, body: bytes, items: Sequence[Item]) -> None:
-        """Add one SET. Raises ConfigurationRefusal, and then has added nothing."""
+        """Add one SET. Raises ConfigurationRefusal without adding anything."""
         for item in items:
             check_name(item.name)
             if isinstance(item.value, ArraySlice) and item.value.total > LONGEST_ARRAY:
@@ -71,7 +71,7 @@ class Configuration:
         self._items += items
 
     def whole(self, crc: int) -> dict[str, Value]:
-        """All parameters, if they are what the host meant. Raises ConfigurationRefusal."""
+        """All parameters, checked against the host's CRC. Raises ConfigurationRefusal."""
         if configuration_crc(self._bodies) != crc:
             text = "the parameters that arrived are not those that were sent"
             raise ConfigurationRefusal(NakCode.CHECKSUM, "", text)

@@ -1,4 +1,4 @@
-"""Winding temperature: one thermal mass, heated by current, cooled by ambient."""
+"""Winding temperature: one thermal mass, heated by current, cooled by the room."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ZERO_CELSIUS = 273.15
 ROOM = 293.15
 """K."""
 THERMAL_RESISTANCE = 0.4
-"""K/W, winding to room, of a servo motor of some hundred watts."""
+"""K/W, winding to room, of a servo motor of several hundred watts."""
 TIME_CONSTANT = 600.0
 """s."""
 LIMIT = 393.15
@@ -20,7 +20,7 @@ LIMIT = 393.15
 
 
 class Winding:
-    """Temperature of the winding, for the status only: the simulated bench does not change with it.
+    """Temperature of the winding, only for the status: it does not affect the simulated bench.
 
     Attributes:
         temperature: K.
@@ -36,12 +36,12 @@ class Winding:
         return self.temperature - ZERO_CELSIUS
 
     def overheat(self) -> float:
-        """Be too hot all of a sudden; how hot (degree Celsius)."""
+        """Set the temperature 5 K above the limit; return it (degree Celsius)."""
         self.temperature = LIMIT + 5.0
         return self.celsius
 
     def heat(self, current: Array, duration: float) -> None:
-        """`duration` (s) has passed with `current` (A), shape (n,), in the motor."""
+        """Update the temperature after `duration` (s) with `current` (A), shape (n,)."""
         loss = self._resistance * float(np.mean(np.square(current))) if len(current) else 0.0
         goal = ROOM + THERMAL_RESISTANCE * loss
         if math.isfinite(goal):

@@ -1,4 +1,4 @@
-"""Compiling the simulation ahead."""
+"""Compilation of the simulation in advance."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from campaign.trial import Task, Trial
 
 
 def warm_up(bench: CompleteBench) -> None:
-    """Simulate some milliseconds, so that everything is compiled and imported afterwards."""
+    """Simulate 2.5 sample periods, so that everything is compiled and imported afterwards."""
     rate = bench.controller.sample_rate or 1000.0
     task = Task(mode="rate", duration=2.5 / rate, window=(0.0, 0.0), sample_rate=rate)
     tree = bench.model_dump(mode="json")

@@ -1,1 +1,1 @@
-"""The host's end of the line to a controller: port, heartbeats, session."""
+"""Host end of the line to a controller: port, heartbeats, session."""

@@ -1,4 +1,4 @@
-"""Collecting the records of a running trial; a lost sample is NaN and noted."""
+"""Collecting the records of a running trial; lost samples become NaN and are noted."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from campaign.wire.messages import (
 from campaign.wire.messages import Fault as FaultCode
 
 ACKNOWLEDGE_EVERY = 64
-"""Records after which the controller is told at once, and not with the next heartbeat."""
+"""Records after which the acknowledgment is sent at once, before the next heartbeat."""
 BRAKING = 5.0
-"""s that a trial may take to end after STOP; then the drive is switched off."""
+"""Time limit (s) for the end of a trial after STOP; then the drive is switched off."""
 ENDING = 3.0
-"""s that END may take to come once the controller is no longer running."""
+"""Time limit (s) for END after the controller has left the state running."""
 STANDSTILL = 60.0
-"""s without any record until a running trial is given up."""
+"""Time (s) without any record after which a running trial is aborted."""
 
 
 class Collector:
     """Writes one running trial into a recorder.
 
     Attributes:
-        lost: records that could not be had.
+        lost: number of lost records.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Collector:
         recorder: Recorder,
         longest: float,
     ) -> None:
-        """`rate` of the recording (Hz); `longest` (s) that it can be."""
+        """`rate` of the recording (Hz); `longest`: its maximum duration (s)."""
         self._session = session
         self._trial = trial
         self._rate = rate
@@ -65,11 +65,11 @@ class Collector:
         self._most = math.floor(longest * rate + 1e-9) + 1
         self._order = RecordOrder()
         self._blocks: list[Array] = []
-        self._first = 0  # of the blocks
-        self._samples = 0  # that are written or in the blocks
+        self._first = 0  # number of the first sample in the blocks
+        self._samples = 0  # number of samples, written or in the blocks
         self._acknowledged = 0
-        self._moved = time.monotonic()  # when a record came last
-        self._over: float | None = None  # since when it has not been running
+        self._moved = time.monotonic()  # time of the last record
+        self._over: float | None = None  # time at which it stopped running
         self._end: End | None = None
         self._missing = 0
         self.lost = 0
@@ -78,7 +78,7 @@ class Collector:
         session.records = self._arrived
 
     def run(self, stopped: Callable[[], bool]) -> Ending:
-        """Until the trial has ended. Raises LinkFaultError; what had come is recorded then too."""
+        """Collect until the trial ends. Raises LinkFaultError after writing received samples."""
         braking: float | None = None
         try:
             while self._end is None:
@@ -101,7 +101,7 @@ class Collector:
         return self._ending()
 
     def telemetry(self) -> Mapping[str, JsonValue]:
-        """What the trial asked of the line."""
+        """Statistics of the line during the trial."""
         traffic, status = self._session.traffic, self._session.status
         trips = traffic.round_trips
         return {
@@ -148,7 +148,7 @@ class Collector:
             self._session.safe(time.monotonic() + BRAKING)
 
     def _is_over(self, now: float) -> bool:
-        """Whether the trial has ended without an END that could be had."""
+        """Whether the trial has ended and its END is lost."""
         if now - self._moved > STANDSTILL:
             raise SilenceError(f"no record has come for {STANDSTILL:g} s")
         status = self._session.status
@@ -156,7 +156,7 @@ class Collector:
             self._over = None
             return False
         if status.trial == self._trial and self._order.next < status.next_record:
-            self._over = None  # there is more to come
+            self._over = None  # further records are expected
             return False
         self._over = self._over or now
         return now - self._over > ENDING
@@ -192,7 +192,7 @@ class Collector:
         self._samples += record.count
 
     def _fill(self, first: int) -> None:
-        """Mark the samples before number `first` that have not come."""
+        """Mark the missing samples before number `first`."""
         count = first - self._samples
         if count == 0:
             return
@@ -231,10 +231,10 @@ class Collector:
         if outcome is Outcome.FAULT:
             fault = fault or Fault.OTHER
         if self.lost or self._missing:
-            told = f" (the controller: {outcome}{f', {reason}' if reason else ''})"
+            report = f" (the controller: {outcome}{f', {reason}' if reason else ''})"
             if outcome is not Outcome.FAULT:
                 outcome, fault = Outcome.FAULT, Fault.LOST_SAMPLES
-            reason = f"samples were lost and are marked{self._how_much()}{told}"
+            reason = f"samples were lost and are marked{self._how_much()}{report}"
         return Ending(outcome, reason, safe, fault)
 
     def _how_much(self) -> str:

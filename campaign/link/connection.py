@@ -1,4 +1,4 @@
-"""The host's side of the relay: start, frames out, frames in."""
+"""Host side of the relay: start, frames out, frames in."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from campaign.errors import UsageError
 from campaign.link.pipe import BEAT, WANTED, Kind, receive, send
 
 OPENING = 15.0
-"""s that the relay may take to open the port: a process has to start first."""
+"""Time limit (s) for the relay to open the port, including the start of its process."""
 LEAVING = 5.0
-"""s that it may take to leave; it sends SAFE for up to two of them."""
+"""Time limit (s) for the exit of the relay; it sends SAFE for up to 2 s."""
 
 BEATS = 400
-"""Heartbeats that are remembered: ten seconds of them."""
+"""Number of stored heartbeats: 10 s."""
 
 
 class LineLostError(Exception):
-    """The line to the controller is gone; never seen by a user, who is told by an Ending."""
+    """The line to the controller is lost; users see an Ending, never this error."""
 
 
 class Connection:
-    """An open line to a controller, kept by a relay process.
+    """An open line to a controller, owned by a relay process.
 
-    Any thread may write; one at a time may receive.
+    Any thread may write; one thread at a time may receive.
 
     Attributes:
-        beats: when (steady clock, s) the latest heartbeats were sent, by counter.
+        beats: send times (steady clock, s) of the latest heartbeats, by counter.
     """
 
     def __init__(self, port: str, baud: int, session: int) -> None:
-        """Open `port` for the host of `session`. Raises UsageError saying why it cannot be."""
+        """Open `port` for the host of `session`. Raises UsageError with the reason."""
         self._incoming: queue.SimpleQueue[tuple[Kind, bytes]] = queue.SimpleQueue()
         self.beats: dict[int, float] = {}
         self._lost = ""
         self._sending = threading.Lock()
-        # A session of its own: Ctrl-C in a terminal is for the host, which then stops in order.
-        # -P: nothing in the user's folder can stand in for a module of ours.
+        # New process session: Ctrl-C in a terminal reaches only the host, which stops in order.
+        # -P: no file in the user's folder can replace a module of this program.
         self._relay = subprocess.Popen(  # noqa: S603 - our own program, no shell
             [sys.executable, "-P", "-m", "campaign.link.relay", port, str(baud), str(session)],
             stdin=subprocess.PIPE,
@@ -75,23 +75,23 @@ class Connection:
 
     @property
     def relay(self) -> int:
-        """Its process id."""
+        """Process id of the relay."""
         return self._relay.pid
 
     def write(self, data: bytes) -> None:
-        """Hand bytes to the port. Raises LineLostError."""
+        """Send bytes to the port. Raises LineLostError."""
         self._send(Kind.WRITE, data)
 
     def wanted(self, trial: int, record: int, *, at_once: bool = False) -> None:
-        """Say in every heartbeat from now on which record is wanted next. Raises LineLostError."""
+        """Set the next wanted record in all further heartbeats. Raises LineLostError."""
         self._send(Kind.WANTED, WANTED.pack(trial, record, at_once))
 
     def holds(self, *, held: bool) -> None:
-        """Whether the controller is ours: only then the relay says SAFE when it leaves."""
+        """Set whether this host holds the controller: only then the relay sends SAFE at exit."""
         self._send(Kind.HOLDS, bytes((held,)))
 
     def receive(self, timeout: float) -> bytes:
-        """What has come from the port; empty after `timeout` (s). Raises LineLostError."""
+        """Bytes from the port; empty after `timeout` (s). Raises LineLostError."""
         if self._lost:
             raise LineLostError(self._lost)
         deadline = time.monotonic() + timeout
@@ -111,7 +111,7 @@ class Connection:
                 raise LineLostError(self._lost)
 
     def close(self, *, last_words: bool = True) -> None:
-        """Let the relay go; with `last_words` it sends SAFE to a controller that it holds."""
+        """End the relay; with `last_words` it sends SAFE to a controller held by this host."""
         if not last_words:
             with contextlib.suppress(LineLostError):
                 self.holds(held=False)
@@ -122,7 +122,7 @@ class Connection:
         except subprocess.TimeoutExpired:
             self._relay.kill()
             self._relay.wait()
-        self._reader.join(LEAVING)  # it drains the pipe until the relay has left
+        self._reader.join(LEAVING)  # it drains the pipe until the relay exits
         with contextlib.suppress(OSError):
             self._in.close()
 

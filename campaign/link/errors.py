@@ -7,23 +7,23 @@ from campaign.wire.messages import Nak
 
 
 class LinkFaultError(Exception):
-    """The session cannot go on as it was.
+    """The session cannot continue.
 
     Attributes:
-        fault: what failed, in the words of a protocol.
+        fault: kind of the fault, in the terms of a protocol.
     """
 
     fault = Fault.OTHER
 
 
 class SilenceError(LinkFaultError):
-    """No word, or no answer, from the controller."""
+    """No message, or no answer, from the controller."""
 
     fault = Fault.LOST_CONNECTION
 
 
 class ResetError(LinkFaultError):
-    """The controller has started anew and knows nothing of what was."""
+    """The controller has restarted and lost its state."""
 
     fault = Fault.RESET
 
@@ -32,7 +32,7 @@ class RefusedError(LinkFaultError):
     """The controller refused a command.
 
     Attributes:
-        nak: its answer, None when the host refuses in its place.
+        nak: its answer; None if the host refuses in its place.
     """
 
     fault = Fault.REFUSED
@@ -43,10 +43,10 @@ class RefusedError(LinkFaultError):
 
 
 class StoppedError(LinkFaultError):
-    """Somebody stopped the controller from outside, and it does not arm before that is cleared.
+    """The controller is latched by a panic stop, and does not arm before it is cleared.
 
     Attributes:
-        stop: as the controller tells of it.
+        stop: the stop that the controller reports.
     """
 
     def __init__(self, stop: PanicStop) -> None:
@@ -55,7 +55,7 @@ class StoppedError(LinkFaultError):
 
 
 class HeldError(LinkFaultError):
-    """Another host holds the controller; the text says who."""
+    """Another host holds the controller; the text names it."""
 
     fault = Fault.REFUSED
 

@@ -1,4 +1,4 @@
-"""The identity of a host, as a controller keeps and reports it."""
+"""The identity of a host, stored and reported by a controller."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import random
 from campaign.plain_text import printable
 
 LONGEST = 120
-"""Bytes of UTF-8; a controller may have little memory."""
+"""Largest size (bytes of UTF-8); a controller may have little memory."""
 
 
 def new_session() -> int:
-    """A random number for one process' time with a controller; 0 would be nobody's."""
+    """A random session number of a process; 0 means no session."""
     return random.SystemRandom().randrange(1, 2**32)
 
 
 def identity(purpose: str) -> str:
-    """User, machine, process and what it is about: `ada@lab-3 pid 4711, run 2026-11-21T09-...`."""
+    """User, machine, process and purpose: `ada@lab-3 pid 4711, run 2026-11-21T09-...`."""
     try:
         user = getpass.getuser()
-    except Exception:  # noqa: BLE001 - an account without a name; a stop must not fail for it
+    except Exception:  # noqa: BLE001 - an account without a name; a stop must not fail by it
         user = "unknown"
     text = f"{user}@{platform.node() or 'unknown'} pid {os.getpid()}, {purpose}"
     return printable(text).encode("utf-8", "replace")[:LONGEST].decode("utf-8", "ignore")

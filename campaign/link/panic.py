@@ -1,4 +1,4 @@
-"""A controller's latch as seen by the host."""
+"""Panic stop from a controller's latch."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FORGETFUL = "unknown: the controller restarted and has no record of stops"
 
 
 def panic_stop_of(latch: Latch) -> PanicStop | None:
-    """The stop that a latch tells of; None when it is not latched."""
+    """The stop reported by a latch; None if it is not latched."""
     if not latch.latched:
         return None
     forgetful = latch.cause is LatchCause.NO_MEMORY

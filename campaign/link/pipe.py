@@ -13,29 +13,29 @@ class Kind(IntEnum):
     """Parent to relay: WRITE, WANTED, HOLDS. Relay to parent: all others."""
 
     WRITE = 1  # bytes for the port
-    WANTED = 2  # what the heartbeats from now on say; see WANTED
+    WANTED = 2  # content of further heartbeats; see WANTED
     OPENED = 3  # the port is open
-    REFUSED = 4  # it cannot be opened: why
+    REFUSED = 4  # the port cannot be opened: reason
     BYTES = 5  # bytes from the port
-    LOST = 6  # the line is lost: why
-    BEAT = 7  # a heartbeat is being sent; see BEAT
-    HOLDS = 8  # one byte: whether the controller is the host's, so that last words are due
+    LOST = 6  # the line is lost: reason
+    BEAT = 7  # a heartbeat is sent; see BEAT
+    HOLDS = 8  # one byte: whether the host holds the controller, so that SAFE is sent at exit
 
 
 WANTED = struct.Struct("<II?")
-"""Trial, number of the next record wanted of it, and whether a heartbeat shall say so at once."""
+"""Trial, number of its next wanted record, and whether to send a heartbeat at once."""
 BEAT = struct.Struct("<Id")
-"""Counter, and the steady clock (s), which all processes of a machine share."""
+"""Counter, and steady clock (s), common to all processes of a machine."""
 
 
 def send(pipe: BinaryIO, kind: Kind, payload: bytes = b"") -> None:
-    """Write one item at once. Raises OSError (BrokenPipeError) when nobody reads any more."""
+    """Write and flush one item. Raises OSError (BrokenPipeError) if the reader has closed."""
     pipe.write(_HEAD.pack(kind, len(payload)) + payload)
     pipe.flush()
 
 
 def receive(pipe: BinaryIO) -> tuple[Kind, bytes] | None:
-    """The next item; None when the other end has gone."""
+    """The next item; None if the other end has closed."""
     head = _exactly(pipe, _HEAD.size)
     if head is None:
         return None

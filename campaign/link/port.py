@@ -12,31 +12,31 @@ from urllib.parse import urlsplit
 from campaign.errors import UsageError
 
 POLL = 0.05
-"""s a read waits for the first byte."""
+"""Time limit (s) of a read for the first byte."""
 CHUNK = 65536
 ANSWER = 2.0
-"""s that the process that owns a CAN bus may take to answer."""
+"""Time limit (s) for the answer of the process that owns a CAN bus."""
 STOLEN_READS = 20
-"""Empty reads in a row until a serial port counts as lost: another process may read it as well."""
+"""Successive empty reads until a serial port counts as lost: another process may read it, too."""
 
 
 class Port(Protocol):
-    """Bytes both ways. Every method raises OSError when the line is lost."""
+    """Bytes in both directions. Every method raises OSError if the line is lost."""
 
     def read(self) -> bytes:
-        """What has come, after at most POLL; empty when nothing has."""
+        """Received bytes, after at most POLL; may be empty."""
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
 
     def close(self) -> None:
-        """Let go of the line; never raises."""
+        """Close the line; never raises."""
 
 
 def open_port(name: str, baud: int, *, exclusive: bool) -> Port:
-    """Open `name`; `exclusive` keeps another exclusive opener of a serial port out.
+    """Open `name`; `exclusive` excludes other exclusive users of a serial port.
 
-    Raises UsageError, with what to do, when it cannot be opened.
+    Raises UsageError, with an action, if it cannot be opened.
     """
     if name.startswith("socket://"):
         return _open_socket(name)
@@ -63,7 +63,7 @@ def _open_socket(name: str) -> Port:
 
 
 def _open_drive(name: str) -> Port:
-    """At the process that owns the bus; on the bus where none is, or where it hangs."""
+    """Connect to the process that owns the bus; if there is none or it hangs, use the bus."""
     from campaign.canopen_drive.address import address_of
     from campaign.canopen_drive.line import DirectLine
     from campaign.link.safe import query_frame
@@ -87,15 +87,15 @@ class SocketPort:
 
     def __init__(self, connection: socket.socket) -> None:
         connection.settimeout(None)
-        # A heartbeat must not wait for company.
+        # Send a heartbeat at once, not together with later data.
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection = connection
 
     def read(self) -> bytes:
-        """What has come, after at most POLL."""
+        """Received bytes, after at most POLL."""
         try:
             ready, _, _ = select.select([self._connection], [], [], POLL)
-        except ValueError as error:  # closed meanwhile
+        except ValueError as error:  # closed by another thread
             raise ConnectionError("the connection is closed") from error
         if not ready:
             return b""
@@ -105,11 +105,11 @@ class SocketPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
         self._connection.sendall(data)
 
     def close(self) -> None:
-        """Let go of the line, whatever a thread waits for on it."""
+        """Close the line, even if a thread waits for data."""
         with contextlib.suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
@@ -141,13 +141,13 @@ class SerialPort:
         self._empty = 0
 
     def read(self) -> bytes:
-        """What has come, after at most POLL."""
+        """Received bytes, after at most POLL."""
         try:
             data = bytes(self._device.read(max(1, self._device.in_waiting)))
-        except (TypeError, AttributeError) as error:  # closed meanwhile, by another thread
+        except (TypeError, AttributeError) as error:  # closed by another thread
             raise ConnectionError("the port is closed") from error
         except OSError as error:
-            # "Ready, but nothing there" is a plug pulled, or `campaign stop` reading beside us.
+            # "Ready, but no data": the adapter was removed, or `campaign stop` reads the port, too.
             self._empty += 1
             if "no data" not in str(error) or self._empty > STOLEN_READS:
                 raise
@@ -158,14 +158,14 @@ class SerialPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
         try:
             self._device.write(data)
         except (TypeError, AttributeError) as error:
             raise ConnectionError("the port is closed") from error
 
     def close(self) -> None:
-        """Let go of the line."""
+        """Close the line."""
         with contextlib.suppress(OSError):
             self._device.close()
 

@@ -1,8 +1,8 @@
 """Ordered records of a trial: received, missing, to be requested again.
 
-A device numbers everything that it records in a trial in one sequence. Here the numbers are put in
-order, doubles are dropped, and a number that stays away is asked for again with growing patience.
-Pure: time is an argument, nothing is sent from here.
+A device numbers all records of a trial in one sequence. This module sorts them, drops duplicates,
+and requests missing records again at increasing intervals. Pure: time is an argument, and the
+caller sends the requests.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from campaign.link.errors import ViolationError
 from campaign.wire.messages import End, Record
 
 FIRST_PATIENCE = 0.1
-"""s after a request until the next; each one doubles it."""
+"""Interval (s) from the first request to the next; each request doubles it."""
 LONGEST_PATIENCE = 0.5
 TRIES = 12
-"""Requests until a record counts as lost: more than four seconds."""
+"""Requests until a record counts as lost: more than 4 s."""
 MOST = 32
-"""Records asked for in one request: an answer must not drown what is new."""
+"""Largest number of records per request, so that answers do not delay new records."""
 
 
 FARTHEST = 1_000_000
-"""Records a device may be ahead; beyond any ring buffer, and few enough to keep in mind."""
+"""Largest lead of a device (records): above any ring buffer, and limited in memory here."""
 
 
 @dataclass(frozen=True)
 class MissingRecords:
-    """Records `first` to `first + count - 1` cannot be had."""
+    """Records `first` to `first + count - 1` are lost."""
 
     first: int
     count: int
@@ -43,8 +43,8 @@ class RecordOrder:
     """The records of one trial, from number 0.
 
     Attributes:
-        next: the number of the next record that has not been taken.
-        resends: requests made.
+        next: number of the next record that `take` returns.
+        resends: number of requests.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class RecordOrder:
         self._end: int | None = None
 
     def add(self, record: Record, now: float) -> None:
-        """A record has come, in whatever order."""
+        """Add a received record, in any order."""
         number = record.number
         if number < self.next or number in self._come:
             return
@@ -69,9 +69,9 @@ class RecordOrder:
         self.exists(number + 1, now)
 
     def exists(self, beyond: int, now: float) -> None:
-        """Every record before number `beyond` has been made and was sent once.
+        """Note that every record before number `beyond` exists and was sent once.
 
-        Raises ViolationError for a number that no device can have come to.
+        Raises ViolationError for a number that no device can have reached.
         """
         if beyond - self.next > FARTHEST:
             raise ViolationError(f"the controller announces record {beyond - 1} after {self.next}")
@@ -83,14 +83,14 @@ class RecordOrder:
         self._beyond = max(self._beyond, beyond)
 
     def lost(self, first: int, count: int) -> None:
-        """The device no longer has these."""
+        """Note that the device no longer has these records."""
         for number in range(max(first, self.next), min(first + count, self._beyond)):
             if number not in self._come:
                 self._lost.add(number)
                 self._wanted.pop(number, None)
 
     def take(self) -> list[Record | MissingRecords]:
-        """What can be taken in order; a run of lost records as one Missing."""
+        """Remove and return the next records in order; a run of lost ones as a MissingRecords."""
         taken: list[Record | MissingRecords] = []
         while True:
             if self.next in self._come:
@@ -107,7 +107,7 @@ class RecordOrder:
             self.next += 1
 
     def requests(self, now: float) -> list[tuple[int, int]]:
-        """(first, count) to ask for again now; what was asked for too often is given up."""
+        """Ranges (first, count) to request now; records beyond TRIES requests become lost."""
         due = []
         for number, wanted in sorted(self._wanted.items()):
             if wanted.due > now:

@@ -1,4 +1,4 @@
-"""Plans that no controller can execute, refused before a connection."""
+"""Refusal of plans that no controller can execute, before a connection."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 from campaign.trial import Tree, Trial
 
 COMMANDED = ("controller", "compensation", "limits")
-"""The tables of a bench that its controller is told; the others describe the plant."""
+"""The tables of a bench that are sent to its controller; the others describe the plant."""
 WORDS = ("name", "description", "known")
-"""What a bench says about itself."""
+"""Descriptive fields of a bench."""
 _ABSENT = "absent"
 
 
 class Refusal:
-    """Why a real bench cannot execute a trial; asked of all trials of a plan, in order.
+    """Check whether a real bench can execute a trial; call it for all trials of a plan in order.
 
-    A real plant is what it is. It may differ from one trial to the next only in what the trial says
-    a person sets, and it stays that way until a person sets it again.
+    Between trials, a real plant may differ only in fields that the operator sets according to the
+    trial; they stay until the operator sets them again.
     """
 
     def __init__(
@@ -27,14 +27,14 @@ class Refusal:
         base_motion: bool,
         remedy: str = "`--set backend.motion=emulated` has a rehearsal controller emulate one",
     ) -> None:
-        """`base_motion`: whether a device moves the hull; `remedy`: how there would be one."""
+        """`base_motion`: whether a device moves the hull; `remedy`: how to provide one."""
         self._base_motion = base_motion
         self._remedy = remedy
         self._plants: dict[str, dict[str, Any]] = {}  # by the name of the bench
         self._trials: dict[str, str] = {}  # the trial that last had it
 
     def __call__(self, trial: Trial) -> str | None:
-        """Naming the field; None when it can be executed."""
+        """Reason with the field; None if the bench can execute the trial."""
         return self._of_task(trial) or self._of_sweep(trial) or self._of_plant(trial)
 
     def _of_task(self, trial: Trial) -> str | None:

@@ -1,9 +1,9 @@
 """The process that owns the port: `python -m campaign.link.relay PORT BAUD SESSION`.
 
-The host starts it. It is a process of its own so that no analysis, disk or crash of the host can
-starve the heartbeats, and so that somebody is left to send SAFE when the host is killed. It imports
-neither numpy nor pydantic, forwards bytes both ways, and speaks the protocol itself only for
-heartbeats and its last words.
+The host starts it. As a separate process, it sends heartbeats independent of analyses, disk access
+and crashes of the host, and it sends SAFE if the host is killed. It imports neither numpy nor
+pydantic, and forwards bytes in both directions. Its own messages are only heartbeats and the last
+ones (SAFE, BYE).
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ from campaign.link.port import Port, open_port
 from campaign.link.safe import SafeWatch, bye_frame, heartbeat_frame, safe_frame
 
 HEARTBEAT_INTERVAL = 0.025
-"""s; a controller stops by itself after 100 ms without one."""
+"""s; a controller stops after 100 ms without a heartbeat."""
 LAST_WORDS = 2.0
-"""s for which an orphaned relay goes on sending SAFE unless it is confirmed before."""
+"""Longest time (s) for which an orphaned relay sends SAFE until it is confirmed."""
 SAFE_INTERVAL = 0.02
 LAPSE = 0.05
-"""s that a heartbeat may be late; later, a controller may have taken it for silence."""
+"""Longest delay (s) of a heartbeat; after a longer one, the controller may have timed out."""
 ECHO = 0.3
-"""s in which the controller says whose it is."""
+"""Time limit (s) for the controller to echo a heartbeat of its host."""
 BEATS = 400
-"""Heartbeats whose echo is remembered."""
+"""Number of latest heartbeats whose echo is recognized."""
 
 
 class Relay:
-    """Bytes both ways between an open port and the parent, with heartbeats beside them."""
+    """Forwarder of bytes between an open port and the parent, with heartbeats."""
 
     def __init__(self, port: Port, parent: BinaryIO, session: int) -> None:
-        """`session`: the host's, which the heartbeats and the last words carry."""
+        """`session`: session of the host, sent in heartbeats and last messages."""
         self._port = port
         self._session = session
         self._holds = False  # whether the controller has accepted the session
         self._parent: BinaryIO | None = parent
         self._writing, self._telling = threading.RLock(), threading.RLock()
         self._wanted = (0, 0)  # trial, record
-        self._counter = random.SystemRandom().randrange(2**32)  # no other relay's echo is ours
-        self._lapsed = False  # whether heartbeats were late enough to lose the controller
+        self._counter = random.SystemRandom().randrange(2**32)  # differs from other relays'
+        self._lapsed = False  # whether heartbeats were so late that the controller may be lost
         self._beats: deque[tuple[int, float]] = deque(maxlen=BEATS)
         self._watch: SafeWatch | None = None
         self._quiet = threading.Event()  # set: no more heartbeats
         self._lost = threading.Event()
 
     def start(self) -> None:
-        """Begin to read the port and to send heartbeats."""
+        """Start reading the port and sending heartbeats."""
         for work in (self._read, self._beat):
             threading.Thread(target=work, daemon=True).start()
 
     def serve(self, commands: BinaryIO) -> None:
-        """Do what the parent says until its pipe closes or the line is lost."""
+        """Execute commands of the parent until its pipe closes or the line is lost."""
         while not self._lost.is_set():
             item = receive(commands)
             if item is None:
@@ -75,10 +75,10 @@ class Relay:
                 self._holds = bool(payload[0])
 
     def make_safe(self) -> bool:
-        """Nobody is left to command: send SAFE until it is confirmed; False when it never was.
+        """Send SAFE without a host until it is confirmed, then BYE; return whether it was.
 
-        Nothing is sent to a controller that has not accepted the session, or no longer answers it:
-        a SAFE would be a stranger's there, and stop another host's run.
+        Sends nothing, and returns True, if the controller has not accepted the session, or another
+        host holds it now: SAFE would stop that host's run.
         """
         self._quiet.set()
         if not self._holds or (self._lapsed and self._is_anothers()):
@@ -88,7 +88,7 @@ class Relay:
         return seen
 
     def _is_anothers(self) -> bool:
-        """Whether the controller answers a heartbeat of ours with the counter of another host's."""
+        """Whether the controller echoes heartbeats of another host, not of this relay."""
         watch = SafeWatch()
         self._watch = watch
         end = time.monotonic() + ECHO
@@ -122,7 +122,7 @@ class Relay:
             self._lose(error)
 
     def _tell_beats(self) -> None:
-        """Here and not where they are sent: a host that hangs must not stop the heartbeats."""
+        """Report sent heartbeats, in the reading thread: a hanging host must not block sending."""
         while self._beats:
             self._tell(Kind.BEAT, BEAT.pack(*self._beats.popleft()))
 
@@ -159,12 +159,12 @@ class Relay:
             with self._telling:
                 send(self._parent, kind, payload)
         except (OSError, ValueError):
-            self._parent = None  # it has gone; what is left to do needs no listener
+            self._parent = None  # the parent has exited; the remaining work does not need it
 
 
 def main(name: str, baud: int, session: int) -> int:
-    """Serve one parent until it goes; 0 when the bench was then seen safe, else 5 (2: no port)."""
-    # Ctrl-C and a closing terminal are the parent's business: it stops in order, with our help.
+    """Serve one parent until it exits; return 0 if the bench is then safe, else 5 (2: no port)."""
+    # The parent handles Ctrl-C and a closing terminal: it stops in order, through this relay.
     for stop in ("SIGINT", "SIGHUP"):
         if hasattr(signal, stop):
             signal.signal(getattr(signal, stop), signal.SIG_IGN)
@@ -185,5 +185,5 @@ def main(name: str, baud: int, session: int) -> int:
 if __name__ == "__main__":
     import os
 
-    # Not sys.exit: a thread that waits for a port or a pipe must not keep the process.
+    # Not sys.exit: a thread that waits for a port or a pipe must not keep the process alive.
     os._exit(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))

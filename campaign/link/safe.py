@@ -1,6 +1,6 @@
 """Frames without a session, and the wait for a confirmed safe state.
 
-The relay imports this: nothing heavy may be imported here.
+The relay imports this module: it must import quickly.
 """
 
 from __future__ import annotations
@@ -25,44 +25,44 @@ from campaign.wire.messages import (
 
 
 def heartbeat_frame(counter: int, trial: int, wanted: int, session: int) -> bytes:
-    """The host of `session` lives, and has every record of `trial` before number `wanted`."""
+    """Heartbeat of the host of `session`, which has all records of `trial` before `wanted`."""
     return _frame(Heartbeat(counter, trial, wanted, session))
 
 
 def safe_frame(session: int = 0, host: str = "", sequence: int = 0) -> bytes:
-    """Drive off, now. It is obeyed whoever sends it, whatever its sequence number."""
+    """SAFE: drive off, now. A controller obeys it from any sender, with any sequence number."""
     return _frame(Safe(session, host), sequence)
 
 
 def bye_frame(session: int) -> bytes:
-    """The host of `session` leaves."""
+    """BYE: the host of `session` leaves."""
     return _frame(Bye(session))
 
 
 def query_frame() -> bytes:
-    """How are you, and who holds you?"""
+    """QUERY: requests status and latch."""
     return _frame(Query())
 
 
 def is_safe(status: Status) -> bool:
-    """Whether the device says that it obeyed, stands still, and has its drive off."""
+    """Whether the device reports a safe or fault state, at rest, with its drive off."""
     return status.state in (State.SAFE, State.FAULT) and status.at_rest and not status.drive_on
 
 
 class SafeWatch:
-    """Reads what a device sends until it says that it is safe.
+    """Parser of a device's messages that waits for a report of the safe state.
 
-    What it said before it heard our SAFE counts for nothing: it may have moved since.
+    Reports before the acknowledgment of SAFE are ignored: the device may have moved since.
 
     Attributes:
-        confirmed: whether its newest word, after it heard our SAFE, is that it is safe.
-        acknowledged: whether it has answered a SAFE with the sequence number that is waited for.
-        latch: the newest one told since, None before the first.
+        confirmed: set while the newest status after the acknowledgment reports the safe state.
+        acknowledged: whether the device has answered a SAFE with the expected sequence number.
+        latch: the newest latch since then, None before the first.
         last: the newest status, None before the first.
     """
 
     def __init__(self, sequence: int = 0, told: Callable[[Message], None] | None = None) -> None:
-        """`told` is handed every message."""
+        """`told` is called with every message."""
         self.confirmed = threading.Event()
         self.acknowledged = False
         self.latch: Latch | None = None
@@ -72,7 +72,7 @@ class SafeWatch:
         self._decoder = FrameDecoder()
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the port, damaged or not."""
+        """Parse bytes from the port, damaged or not."""
         for frame in self._decoder.feed(data):
             self._take(frame)
 

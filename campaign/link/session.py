@@ -51,32 +51,32 @@ from campaign.wire.messages import (
 )
 
 FIRST_WAIT = 0.1
-"""s for an answer until a command is sent again; each repetition waits longer, up to LONGEST."""
+"""Time (s) without an answer until a command is repeated; it increases up to LONGEST_WAIT."""
 LONGEST_WAIT = 0.5
 POLL = 0.02
-"""s that a look at the line waits at most."""
+"""Longest wait (s) of a read from the line."""
 SAFE_INTERVAL = 0.03
 ASKING = 0.5
-"""s for an answer to a question about the latch."""
+"""Time limit (s) for the answer to a query of the latch."""
 ASLEEP = 1.0
-"""s between two looks at the line that say that this program itself did not run (SIGSTOP, a
-suspended machine): what was not heard meanwhile is nobody's silence."""
+"""Time (s) between two reads of the line from which this program itself was suspended (SIGSTOP,
+machine suspend); that time does not count as silence of the controller."""
 LETTING_GO = 0.5
-"""s that a controller may think it is held by a host that has just left."""
+"""Time (s) for which a controller may still report a host that has just left."""
 GREETING = 0.3
-"""s for an answer to HELLO before a SAFE that must not wait."""
+"""Time limit (s) for the answer to HELLO before an urgent SAFE."""
 FRESH = 0.5
-"""s for which an echo of one of our heartbeats says that the controller is ours."""
+"""Time (s) for which an echoed heartbeat shows that this host holds the controller."""
 GIVEN_UP = "given up: the bench is being made safe"
 
 
 @dataclass
 class Traffic:
-    """What a session measures of its own work.
+    """Statistics of a session's traffic.
 
     Attributes:
-        round_trips: heartbeat to status and back, through relay, line and controller (s).
-        ring_used: most records that the controller ever held.
+        round_trips: times from heartbeat to status, through relay, line and controller (s).
+        ring_used: largest number of records in the ring buffer of the controller.
     """
 
     received: int = 0
@@ -86,15 +86,15 @@ class Traffic:
 
 
 class Session:
-    """Speaks the protocol over an open connection. Used by one thread at a time.
+    """Protocol session over an open connection. Use it in one thread at a time.
 
     Attributes:
-        silence, given_up: as given.
-        capabilities: of the controller, after `hello`.
-        status: the newest one, None before the first.
-        latch: the newest one told, None before the first.
-        records: called with every record and LOST that arrives, in the order of the line.
-        traffic: since it was last replaced.
+        silence, given_up: see `__init__`.
+        capabilities: capabilities of the controller, after `hello`.
+        status: the newest status, None before the first.
+        latch: the newest latch, None before the first.
+        records: called with every received record and LOST, in the order of the line.
+        traffic: statistics since it was last replaced.
     """
 
     def __init__(
@@ -105,10 +105,9 @@ class Session:
         host: str,
         given_up: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`silence` (s) without a word is a lost connection; `given_up` ends every waiting.
+        """`silence` (s) without a message is a lost connection; `given_up` ends every wait.
 
-        `number` is a random one of the host's, the same after a lost connection; `host` says who
-        it is.
+        `number`: random number of the host, the same after a lost connection. `host`: its identity.
         """
         self._connection = connection
         self.silence = silence
@@ -122,7 +121,7 @@ class Session:
         self.capabilities: Capabilities | None = None
         self.status: Status | None = None
         self.latch: Latch | None = None
-        self._echoed = -math.inf  # when the controller last echoed a heartbeat of ours
+        self._echoed = -math.inf  # send time of the latest own heartbeat that was echoed
         self.records: Callable[[Samples | Event | End | LostRecords], None] = lambda record: None
         self.traffic = Traffic()
 
@@ -132,10 +131,10 @@ class Session:
         return self._decoder.counts.bad
 
     def hello(self, patience: float | None = None) -> Capabilities:
-        """Begin the session; with `patience` (s) in that time, whoever is to give up meanwhile.
+        """Begin the session; with `patience`, within this time (s), regardless of `given_up`.
 
-        Raises BackendError when the two cannot talk, HeldError when another host has the
-        controller, else SilenceError.
+        Raises BackendError if the two are incompatible, HeldError if another host holds the
+        controller, SilenceError without an answer.
         """
         try:
             answer = self._greet(patience)
@@ -164,7 +163,7 @@ class Session:
         return answer
 
     def _greet(self, patience: float | None) -> Ack | Capabilities:
-        """HELLO; again for a moment where a host before us may just have left."""
+        """Send HELLO; repeat it for a short time while a previous host may just have left."""
         letting_go = time.monotonic() + (LETTING_GO if patience is None else 0.0)
         while True:
             try:
@@ -176,9 +175,9 @@ class Session:
                 self.look(POLL)
 
     def panic_stop(self) -> PanicStop | None:
-        """The stop from outside that the controller is latched by; asked anew.
+        """Query the panic stop that latches the controller.
 
-        None when there is none, or when there is no answer: the next ARM is then refused for it.
+        None without a stop, or without an answer: then a latched controller refuses the next ARM.
         """
         self._drain()
         self.latch = None
@@ -194,11 +193,11 @@ class Session:
         return None
 
     def clear_stop(self, count: int) -> None:
-        """Let the controller arm again after the stop number `count`. LinkFaultError."""
+        """Unlatch the controller after the stop number `count`. Raises LinkFaultError."""
         self._command(Unlatch(count, self._host))
 
     def configure(self, parameters: Mapping[str, Value]) -> tuple[float, tuple[Channel, ...]]:
-        """Clear, set, arm: what will be recorded, and at which rate (Hz). LinkFaultError."""
+        """Clear, set and arm; return recording rate (Hz) and channels. Raises LinkFaultError."""
         self._check_stopped()
         self._become_idle()
         self._channels.clear()
@@ -212,13 +211,13 @@ class Session:
         return first.sample_rate, tuple(channel for part in parts for channel in part.channels)
 
     def _check_stopped(self) -> None:
-        """What has been told already is not asked for."""
+        """Raise StoppedError if the latest latch reports a stop; sends no query."""
         stop = panic_stop_of(self.latch) if self.latch is not None else None
         if stop is not None:
             raise StoppedError(stop)
 
     def _become_idle(self) -> None:
-        """Whatever an earlier trial or host has left behind is over."""
+        """End any state left by an earlier trial or host."""
         deadline = time.monotonic() + self.silence
         while (state := self._fresh_status().state) is not State.IDLE:
             try:
@@ -237,7 +236,7 @@ class Session:
                 raise RefusedError(f"the controller does not leave the state {state.text}")
 
     def _fresh_status(self) -> Status:
-        """What the controller says of itself now."""
+        """Wait for a new status of the controller."""
         self._drain()
         self.status = None
         while True:
@@ -249,34 +248,34 @@ class Session:
                 raise SilenceError(GIVEN_UP)
 
     def start(self, trial: int) -> None:
-        """Set the axis in motion. LinkFaultError."""
+        """Start the trial: the axis moves. Raises LinkFaultError."""
         self._connection_wanted(trial, 0)
         self._command(Start(trial))
 
     def command(self, message: Message) -> None:
-        """Send a command until it is answered. LinkFaultError."""
+        """Send a command until it is answered. Raises LinkFaultError."""
         self._command(message)
 
     def send(self, message: Message) -> None:
-        """Send once, without waiting for an answer. SilenceError when the line is lost."""
+        """Send once, without waiting for an answer. Raises SilenceError if the line is lost."""
         kind, body = encode(message)
         self._write(encode_frame(kind, 0, body))
 
     def wanted(self, trial: int, record: int, *, at_once: bool) -> None:
-        """Have the heartbeats say which record is wanted next."""
+        """Set the next wanted record in the heartbeats."""
         self._connection_wanted(trial, record, at_once=at_once)
 
     def safe(self, deadline: float) -> bool:
-        """Send SAFE until the controller says that it is; False after `deadline` (steady clock).
+        """Send SAFE until the controller reports it; False after `deadline` (steady clock, s).
 
-        After a time in which this program did not run, another host may have the controller: SAFE
-        would stop that one's run. Raises HeldError then.
+        If this program was suspended, another host may hold the controller, and SAFE would stop its
+        run. Raises HeldError in this case.
         """
         self._drain()
         if self.capabilities is not None and time.monotonic() - self._echoed > FRESH:
-            with contextlib.suppress(SilenceError):  # who does not answer may still hear SAFE
+            with contextlib.suppress(SilenceError):  # without an answer, SAFE may still arrive
                 self.hello(GREETING)
-        self.status = None  # only what it says from now on counts
+        self.status = None  # only new reports are valid
         while time.monotonic() < deadline:
             self._write(safe_frame(self._number, self._host))
             again = time.monotonic() + SAFE_INTERVAL
@@ -288,7 +287,7 @@ class Session:
         return False
 
     def rested(self, deadline: float) -> bool:
-        """Whether the controller is seen at rest with its drive off, waiting until `deadline`."""
+        """Wait until `deadline` for a status at rest with the drive off; whether it arrived."""
         self._drain()
         self.status = None
         while time.monotonic() < deadline:
@@ -299,10 +298,10 @@ class Session:
         return False
 
     def look(self, timeout: float = POLL) -> bool:
-        """Take what has come, waiting up to `timeout` (s) for it; whether anything had.
+        """Process received bytes, waiting up to `timeout` (s); return whether there were any.
 
-        Raises SilenceError after too long without a word, ResetError when the controller has
-        started anew since `hello`.
+        Raises SilenceError after `silence` without a message, ResetError if the controller has
+        restarted since `hello`.
         """
         try:
             data = self._connection.receive(timeout)
@@ -321,7 +320,7 @@ class Session:
             try:
                 message = decode(frame.kind, frame.body)
             except WireError:
-                continue  # whole, but of no use: a newer firmware's, perhaps
+                continue  # an intact but unknown message, e.g. of a newer firmware
             self._heard = now
             self._take(message, now)
         return True
@@ -348,12 +347,12 @@ class Session:
 
     def _check_boot(self, boot: int) -> None:
         if self.capabilities is not None and boot != self.capabilities.boot:
-            self.capabilities = None  # said once; what comes next needs a new `hello`
-            self._hold(held=False)  # it does not know us any more
+            self.capabilities = None  # raise only once; a new `hello` is necessary
+            self._hold(held=False)  # the controller has lost this session
             raise ResetError("the controller started anew")
 
     def _command(self, message: Message, patience: float | None = None) -> Ack | Capabilities:
-        """Send until answered, with growing patience; with `patience` (s) at most so long."""
+        """Send until answered, at increasing intervals, for `patience` (s; default `silence`)."""
         kind, body = encode(message)
         if kind in (Kind.ARM, Kind.START) and self.given_up():
             raise SilenceError(GIVEN_UP)
@@ -398,7 +397,7 @@ class Session:
         return answer
 
     def _stop_behind(self, why: str) -> PanicStop:
-        """The stop for which a command was refused, told in full where that can be had."""
+        """The stop for which a command was refused; queried for details, if possible."""
         return self.panic_stop() or PanicStop(0, f"an unknown host; the controller says: {why}")
 
     def _hold(self, *, held: bool) -> None:

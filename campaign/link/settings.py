@@ -13,8 +13,8 @@ def settings_of(
 ) -> dict[str, Value]:
     """Every setting of `trial` for the controller with these `capabilities`, by name.
 
-    `emulated`: whether the controller is to emulate the hull's motion. Raises RefusedError for
-    what that controller cannot do; one whose capabilities are None may still say so itself.
+    `emulated`: whether the controller must emulate the hull's motion. Raises RefusedError if that
+    controller cannot do it; with unknown capabilities (None), the controller may refuse it itself.
     """
     settings = configuration_of(trial)
     if capabilities is None or REHEARSAL not in capabilities.features:

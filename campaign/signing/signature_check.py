@@ -17,19 +17,19 @@ _COMPLAINT = re.compile(r"^.*?:(\d+): (.+)$", re.MULTILINE)
 
 
 class SignatureError(ArchiveError):
-    """A signature that is not of this text, or not by the one who should have made it."""
+    """A signature that is not of this text, or not by the expected signer."""
 
 
 @dataclass(frozen=True)
 class AllowedSigners:
-    """A file that says which keys speak for whom (ssh-keygen(1), ALLOWED SIGNERS)."""
+    """A file that assigns keys to signers (ssh-keygen(1), ALLOWED SIGNERS)."""
 
     path: Path
     text: str
 
     @classmethod
     def read(cls, path: Path) -> AllowedSigners:
-        """Raises UsageError when it cannot be read."""
+        """Read the file. Raises UsageError if it is unreadable or too large."""
         try:
             with path.open("rb") as file:
                 content = file.read(_LARGEST + 1)
@@ -40,7 +40,7 @@ class AllowedSigners:
         return cls(path, content.decode("utf-8", "surrogateescape"))
 
     def names(self, signer: str) -> bool:
-        """Whether any line is about `signer`; for messages only."""
+        """Whether any line names `signer`; for messages only."""
         lines = (line.strip() for line in self.text.splitlines())
         fields = (
             line[1:].split('"')[0] if line.startswith('"') else line.split()[0]
@@ -51,11 +51,11 @@ class AllowedSigners:
 
 
 def verify(text: str, signature: str, signer: str, allowed: AllowedSigners) -> str:
-    """The key, kind and fingerprint, with which `signer` has signed `text`.
+    """Check that `signer` signed `text`; return kind and fingerprint of the key.
 
     Raises:
-        SignatureError: that is not so; says what is known instead.
-        UsageError: it cannot be found out.
+        SignatureError: the check fails; the message states what is known instead.
+        UsageError: the check is impossible.
     """
     with tempfile.TemporaryDirectory() as folder:
         sig = copy_for_it(folder, "signature", signature)
@@ -68,14 +68,14 @@ def verify(text: str, signature: str, signer: str, allowed: AllowedSigners) -> s
         made = ssh_keygen(check_novalidate(sig), text)
         if made.code:
             raise _made_otherwise(made.err)
-        found = ssh_keygen(["-Y", "find-principals", "-f", signers, "-s", sig], text)
-    by = found.out.replace(",", "\n").split("\n") if not found.code else []
+        principals = ssh_keygen(["-Y", "find-principals", "-f", signers, "-s", sig], text)
+    by = principals.out.replace(",", "\n").split("\n") if not principals.code else []
     by = [principal.strip() for principal in by if principal.strip()]
     raise _not_by(signer, allowed, key_in(made.out), by, done.err)
 
 
 def _made_otherwise(told: str) -> SignatureError:
-    """Of a signature that is not one of this text, whoever made it."""
+    """Error for a signature that is not of this text."""
     if "namespace" in told:
         return SignatureError(f"was made for another purpose, not in the namespace {NAMESPACE}")
     if "incorrect signature" in told:
@@ -88,7 +88,7 @@ def _made_otherwise(told: str) -> SignatureError:
 def _not_by(
     signer: str, allowed: AllowedSigners, key: str, by: Sequence[str], told: str
 ) -> SignatureError | UsageError:
-    """Of a signature of this text by the wrong one: the key is that of `by`, if of anybody."""
+    """Error for a signature of this text by another signer: `by` are the owners of the key."""
     if by and not any(fnmatchcase(signer, each) for each in by):
         return SignatureError(f"was made by {', '.join(by)} ({key}), not by {signer}")
     complaint = _COMPLAINT.search(told)

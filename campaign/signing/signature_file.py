@@ -24,12 +24,12 @@ _BEGINNING = "-----BEGIN SSH SIGNATURE-----"
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature that was just made.
+    """A new signature.
 
     Attributes:
-        text: the armoured text, for a file.
+        text: the armored text, for a file.
         key: kind and fingerprint, such as `ED25519 SHA256:...`.
-        asked: whether somebody had to type a passphrase at the terminal.
+        asked: whether the user had to type a passphrase at the terminal.
     """
 
     text: str
@@ -38,7 +38,7 @@ class Signature:
 
 
 def check_key(key: Path) -> None:
-    """Raises UsageError when there is no ssh-keygen or no readable key file."""
+    """Raise UsageError if ssh-keygen or a readable key file is missing."""
     check_tool()
     try:
         if not stat.S_ISREG(key.stat().st_mode):
@@ -50,7 +50,7 @@ def check_key(key: Path) -> None:
 
 
 def sign_test_text(key: Path, *, ask: bool) -> Signature:
-    """Sign a text that is no run's, to know that `key` can. Raises UsageError."""
+    """Sign a test text, to check that `key` is usable. Raises UsageError."""
     return sign(_TEST, key, ask=ask)
 
 
@@ -58,9 +58,9 @@ def sign(text: str, key: Path, *, ask: bool) -> Signature:
     """Sign `text` with a private key, or with a public one whose private half the agent has.
 
     Args:
-        ask: whether there is a terminal at which a person can be asked for a passphrase.
+        ask: whether the user can type a passphrase at a terminal.
 
-    Raises UsageError, telling what is wrong with the key.
+    Raises UsageError with the problem of the key.
     """
     check_key(key)
     command = ["-Y", "sign", "-n", NAMESPACE, "-f", str(key)]

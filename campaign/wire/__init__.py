@@ -1,1 +1,1 @@
-"""The serial protocol as bytes: frames and messages, without any input or output."""
+"""The serial protocol as bytes: frames and messages, without input or output."""

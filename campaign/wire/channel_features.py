@@ -1,4 +1,4 @@
-"""Channels named among a device's features: `channel:gyro_rate`."""
+"""Channels as features of a device: `channel:gyro_rate`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ CHANNEL = "channel:"
 
 
 def channel_features(names: Iterable[str]) -> tuple[str, ...]:
-    """The words of CAPABILITIES for channels that every trial of a device records."""
+    """Features in CAPABILITIES for the channels that every trial of a device records."""
     return tuple(f"{CHANNEL}{name}" for name in names)
 
 
 def named_channels(features: Iterable[str]) -> frozenset[str] | None:
-    """The channels that `features` name; None when they name none: it will not say before ARM."""
+    """The channels in `features`; None if there are none: then only ARM returns the channels."""
     named = frozenset(word.removeprefix(CHANNEL) for word in features if word.startswith(CHANNEL))
     return named or None

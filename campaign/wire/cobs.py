@@ -1,7 +1,7 @@
 """Consistent overhead byte stuffing (COBS).
 
 S. Cheshire and M. Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on Networking
-7(2), 1999. Costs one byte, and one more per 254 bytes.
+7(2), 1999. Adds one byte, and one more per 254 bytes.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ LONGEST_BLOCK = 254
 
 
 def encoded_length(length: int) -> int:
-    """The most bytes that `length` bytes may become."""
+    """Largest encoded size of `length` bytes."""
     return length + max(1, -(-length // LONGEST_BLOCK))
 
 
 def encode(data: bytes) -> bytes:
-    """`data` without a zero byte and without any delimiter."""
+    """Encode `data` without zero bytes; adds no delimiter."""
     out = bytearray()
     parts = data.split(b"\0")
     last = len(parts) - 1
@@ -27,7 +27,7 @@ def encode(data: bytes) -> bytes:
             out.append(0xFF)
             out += part[start : start + LONGEST_BLOCK]
             start += LONGEST_BLOCK
-        # A full block implies no zero; only at the very end nothing needs to follow it.
+        # A full block implies no zero; at the end of the data, no block follows it.
         if index < last or start < length or start == 0:
             out.append(length - start + 1)
             out += part[start:]
@@ -35,7 +35,7 @@ def encode(data: bytes) -> bytes:
 
 
 def decode(data: bytes) -> bytes:
-    """What `encode` was given; WireError when `data` cannot be an encoding of anything."""
+    """Inverse of `encode`. Raises WireError if `data` is not a valid encoding."""
     out = bytearray()
     position, length = 0, len(data)
     if not length:

@@ -1,6 +1,6 @@
 """Numbers of the protocol: message types, states, refusals, outcomes, faults, formats.
 
-Every enumeration is one byte on the wire; `.text` is the same word as elsewhere in the program,
+Every enumeration is one byte on the wire; `.text` is the value used in the rest of the program,
 e.g. `campaign.recording.Fault(Fault.OVER_TEMPERATURE.text)`.
 """
 
@@ -11,13 +11,13 @@ from enum import IntEnum
 from campaign.errors import BackendError
 
 VERSION = 2
-"""The version of the protocol that this package speaks, as HELLO negotiates it."""
+"""Version of the protocol in this package, negotiated by HELLO."""
 FRAME_VERSION = 1
-"""The version of frames. It never changes: whoever stops a device need not match its version."""
+"""Version of frames. It never changes, so that a host of any version can stop a device."""
 
 
 class WireError(BackendError):
-    """Bytes that are no message of this protocol, or a message that does not fit into a frame."""
+    """Bytes that are not a message of this protocol, or a message too large for a frame."""
 
 
 class Code(IntEnum):
@@ -25,7 +25,7 @@ class Code(IntEnum):
 
     @property
     def text(self) -> str:
-        """Its name in words: `over-temperature`."""
+        """Its name as text: `over-temperature`."""
         return self.name.lower().replace("_", "-")
 
 
@@ -64,47 +64,47 @@ COMMANDS = frozenset(
         Kind.UNLATCH,
     }
 )  # fmt: skip
-"""What a device acknowledges, by the frame's sequence number; the others it does not."""
+"""Messages that a device acknowledges, by the frame's sequence number."""
 
 
 class State(Code):
-    """What a device is doing. The drive is on in RUNNING only."""
+    """State of a device. The drive is on only in RUNNING."""
 
     IDLE = 0  # nothing configured
-    CONFIGURED = 1  # parameters are being received
-    ARMED = 2  # everything checked; START sets it in motion
+    CONFIGURED = 1  # receives parameters
+    ARMED = 2  # everything checked; START starts the motion
     RUNNING = 3
-    ENDED = 4  # the trial is over, its records are kept until released
-    SAFE = 5  # switched off by SAFE; CLEAR leaves it
-    FAULT = 6  # switched off by itself; CLEAR leaves it when the cause is gone
+    ENDED = 4  # the trial has ended; its records are kept until RELEASE
+    SAFE = 5  # switched off by SAFE; CLEAR leaves this state
+    FAULT = 6  # switched off by the device; CLEAR leaves this state after the cause is removed
 
 
 class NakCode(Code):
-    """Why a command was refused."""
+    """Reason for the refusal of a command."""
 
-    WRONG_STATE = 1  # not in this state
+    WRONG_STATE = 1  # not allowed in this state
     UNKNOWN_MESSAGE = 2  # no message of this type
-    MALFORMED = 3  # its body is not what its type demands
+    MALFORMED = 3  # its body does not match its type
     UNKNOWN_NAME = 4  # no parameter of this name
-    WRONG_TYPE = 5  # a parameter of another type
+    WRONG_TYPE = 5  # wrong type of a parameter
     OUT_OF_RANGE = 6  # a parameter's value
-    TOO_LARGE = 7  # more than this device can hold
-    CHECKSUM = 8  # the configuration differs from what the host meant
+    TOO_LARGE = 7  # exceeds the memory of this device
+    CHECKSUM = 8  # the received configuration differs from the sent one
     INCOMPLETE = 9  # a parameter is missing
-    LIMIT = 10  # what is commanded would break a limit
+    LIMIT = 10  # the command would exceed a limit
     NOT_READY = 11  # not at rest, not at the start angle, drive not available ...
     OUT_OF_ORDER = 12  # neither the next sequence number nor a repetition of the last
-    BUSY = 13  # another session is using it
+    BUSY = 13  # another session holds the device
     VERSION = 14  # no common version
-    WRONG_TRIAL = 15  # not the trial whose records are held
-    CAUSE_PERSISTS = 16  # the fault is still there
-    NO_HEARTBEAT = 17  # no heartbeat has been heard lately
-    LATCHED = 18  # somebody stopped the device; UNLATCH lets it go on
-    OTHER_STOP = 19  # not the stop that the latch is from
+    WRONG_TRIAL = 15  # not the trial of the stored records
+    CAUSE_PERSISTS = 16  # the cause of the fault persists
+    NO_HEARTBEAT = 17  # no recent heartbeat
+    LATCHED = 18  # latched by a panic stop; UNLATCH clears it
+    OTHER_STOP = 19  # not the stop of the latch
 
 
 class Outcome(Code):
-    """How a trial ended; `campaign.recording.Outcome` by `.text`."""
+    """Outcome of a trial; `campaign.recording.Outcome` by `.text`."""
 
     COMPLETED = 0
     LIMIT = 1
@@ -114,7 +114,7 @@ class Outcome(Code):
 
 
 class Fault(Code):
-    """What failed; all but NONE are `campaign.recording.Fault` by `.text`."""
+    """Kind of a fault; all except NONE are `campaign.recording.Fault` by `.text`."""
 
     NONE = 0
     LOST_CONNECTION = 1
@@ -130,15 +130,15 @@ class Fault(Code):
 
 
 class LatchCause(Code):
-    """Why a device is latched."""
+    """Cause of the latch of a device."""
 
-    NONE = 0  # it is not
-    STOPPED = 1  # by a SAFE that was not its session's
-    NO_MEMORY = 2  # it has started, and cannot know whether it was
+    NONE = 0  # not latched
+    STOPPED = 1  # by a SAFE from outside its session
+    NO_MEMORY = 2  # after a start without a memory of earlier stops
 
 
 class Format(Code):
-    """How one channel's sample is stored, little-endian."""
+    """Storage format of a channel's samples, little-endian."""
 
     F64 = 1
     F32 = 2
@@ -152,12 +152,12 @@ class Format(Code):
 
     @property
     def letter(self) -> str:
-        """For `struct`, after a `<`."""
+        """Format letter of `struct`, after a `<`."""
         return {Format.F64: "d", Format.F32: "f", Format.I32: "i", Format.I16: "h"}[self]
 
     @property
     def dtype(self) -> str:
-        """For numpy, e.g. `<f8`."""
+        """Type of numpy, e.g. `<f8`."""
         return {Format.F64: "<f8", Format.F32: "<f4", Format.I32: "<i4", Format.I16: "<i2"}[self]
 
 

@@ -1,8 +1,8 @@
 """A trial as named values for a controller, and back to a tree.
 
 Names are dotted paths; `docs/developers/serial-protocol.md` lists them. All values are SI. `task.`,
-`controller.`, `limits.` and `compensation.` are every controller's business; `rehearsal.` is what
-only a simulated bench can be told.
+`controller.`, `limits.` and `compensation.` apply to every controller, `rehearsal.` only to a
+simulated bench.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from campaign.wire.parameters import Value
 
 REHEARSAL = "rehearsal"
 ENDLESS = 1e300
-"""An `"unlimited"` limit as it is sent: numbers on the line are finite."""
+"""Sent in place of an `"unlimited"` limit: numbers on the line are finite."""
 SIMULATED_TASK = ("base_acceleration", "disturbance", "start_angle")
-"""Of the task: what only a simulated bench can be told."""
+"""Fields of the task that apply only to a simulated bench."""
 
 
 def configuration_of(trial: Trial) -> dict[str, Value]:
-    """Everything that a rehearsal controller is set to for `trial`, by name.
+    """All settings of a rehearsal controller for `trial`, by name.
 
-    Of the bench only what is the controller's: its gains, the limits and the chosen compensation;
-    and, under `rehearsal.bench.`, what a person has set.
+    Of the bench, it contains only the controller's part: gains, limits and selected compensation;
+    and, under `rehearsal.bench.`, the fields set by the operator.
     """
     task = trial.task.model_dump(mode="python", exclude={"window"})
     simulated = {name: task.pop(name) for name in SIMULATED_TASK}
@@ -50,7 +50,7 @@ def configuration_of(trial: Trial) -> dict[str, Value]:
 
 
 def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Value]]:
-    """Every leaf of `tree` with its dotted name; what is None is left out."""
+    """Every leaf of `tree` with its dotted name, except None."""
     for key, value in tree.items():
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
@@ -62,7 +62,7 @@ def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Va
 
 
 def nest(settings: Mapping[str, Value]) -> dict[str, Any]:
-    """The tree that `flatten` made `settings` of. Raises ValueError when a name is a table too."""
+    """Inverse of `flatten`. Raises ValueError if a name is both a value and a table."""
     tree: dict[str, Any] = {}
     for name, value in settings.items():
         *path, last = name.split(".")
@@ -78,8 +78,8 @@ def nest(settings: Mapping[str, Value]) -> dict[str, Any]:
 
 
 def at_path(tree: Mapping[str, Any], path: str) -> Any:
-    """What stands at the dotted `path`; None when nothing does."""
-    found: Any = tree
+    """The value at the dotted `path`, or None."""
+    value: Any = tree
     for key in path.split("."):
-        found = found.get(key) if isinstance(found, Mapping) else None
-    return found
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value

@@ -10,22 +10,22 @@ from campaign.wire.parameters import Item
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What the device is and can do: the answer to HELLO.
+    """Identity and capabilities of the device: the answer to HELLO.
 
     Attributes:
-        sequence: of the HELLO.
-        version: of the protocol from now on; 0 when there is none in common.
-        lowest, highest: versions that the device speaks.
+        sequence: sequence number of the HELLO.
+        version: version of the protocol for the session; 0 without a common version.
+        lowest, highest: versions that the device supports.
         boot: changes with every start of the device.
-        state: now.
-        heartbeat_timeout: it stops by itself after so long without a heartbeat (s).
-        ring_records: how many records it can keep.
-        longest_array: most values of an array parameter.
+        state: present state.
+        heartbeat_timeout: time without a heartbeat after which the device stops (s).
+        ring_records: capacity of the ring buffer (records).
+        longest_array: largest number of values of an array parameter.
         sample_rate: highest rate of a recording (Hz).
-        name, firmware: for people and for the archive.
-        features: words of the protocol's list: `rate`, `torque`, `rehearsal`, `message-clock` ...
-        compensations: methods it knows.
-        limits: what no configuration may exceed, SI: `limits.angle` ...
+        name, firmware: for display and for the archive.
+        features: keywords of the protocol: `rate`, `torque`, `rehearsal`, `message-clock` ...
+        compensations: supported methods.
+        limits: upper bounds of configured limits, SI: `limits.angle` ...
     """
 
     sequence: int
@@ -47,7 +47,7 @@ class Capabilities:
 
 @dataclass(frozen=True)
 class Ack:
-    """Command `sequence` was carried out, now or when it came first; the state afterwards."""
+    """Command `sequence` was executed, now or at its first arrival; `state` after it."""
 
     sequence: int
     kind: Kind
@@ -57,11 +57,11 @@ class Ack:
 
 @dataclass(frozen=True)
 class Nak:
-    """Command `sequence` was refused and nothing has changed.
+    """Command `sequence` was refused without any change.
 
     Attributes:
-        kind: of the command; may be one the device does not know.
-        name: the parameter it is about, or empty.
+        kind: type of the command; the device may not know it.
+        name: the affected parameter, or empty.
         text: one sentence for the user.
     """
 
@@ -88,10 +88,10 @@ class Channel:
 
 @dataclass(frozen=True)
 class Channels:
-    """Part of what the armed trial will record: channels `first` and following of `total`.
+    """Part of the channels of the armed trial: `first` and following of `total`.
 
     Attributes:
-        sequence: of the ARM it answers.
+        sequence: sequence number of the ARM that it answers.
         sample_rate: sample n is taken at n / sample_rate (Hz).
     """
 
@@ -104,20 +104,20 @@ class Channels:
 
 @dataclass(frozen=True)
 class Status:
-    """How the device is: the answer to HEARTBEAT and to SAFE, and sent when the state changes.
+    """Status of the device: the answer to HEARTBEAT and SAFE, and sent when the state changes.
 
     Attributes:
-        fault: why it is in state FAULT.
-        at_rest, drive_on: seen now; safe is at rest with the drive off.
+        fault: cause of the state FAULT.
+        at_rest, drive_on: measured now; safe means at rest with the drive off.
         boot: see Capabilities.
-        clock: of the device, since it started (s).
-        heartbeat: counter of the last one heard, 0 before the first.
+        clock: time since the start of the device (s).
+        heartbeat: counter of the last received heartbeat, 0 before the first.
         heartbeat_age: time since then (s).
-        trial: whose records it holds, 0 for none.
-        first_record, next_record: numbers of the oldest one held and of the next one to come.
-        ring_used: records held now.
-        bad_frames: frames it had to throw away since it started.
-        temperature: of the drive (degree Celsius); None when it has no sensor.
+        trial: trial of the stored records, 0 for none.
+        first_record, next_record: numbers of the oldest stored record and of the next new one.
+        ring_used: number of stored records.
+        bad_frames: number of frames discarded since the start.
+        temperature: temperature of the drive (degree Celsius); None without a sensor.
     """
 
     state: State
@@ -141,7 +141,7 @@ class Samples:
     """Record: `count` samples of all channels from sample number `first`.
 
     Attributes:
-        data: sample after sample, in each channel after channel, packed little-endian.
+        data: packed little-endian, sample by sample; within a sample channel by channel.
     """
 
     trial: int
@@ -153,7 +153,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Event:
-    """Record: something that happened at `time` of the trial (s)."""
+    """Record: an event at `time` of the trial (s)."""
 
     trial: int
     number: int
@@ -163,11 +163,11 @@ class Event:
 
 @dataclass(frozen=True)
 class End:
-    """Record: the trial is over; the last of its records.
+    """Record: the end of the trial; its last record.
 
     Attributes:
-        samples: how many were taken in all.
-        safe: whether the axis was seen at rest with its drive off.
+        samples: total number of samples.
+        safe: whether the axis is confirmed at rest with its drive off.
     """
 
     trial: int
@@ -181,7 +181,7 @@ class End:
 
 @dataclass(frozen=True)
 class LostRecords:
-    """Records `first` to `first + count - 1` are no longer held and can never be had again."""
+    """Records `first` to `first + count - 1` are no longer stored, and lost."""
 
     trial: int
     first: int
@@ -190,12 +190,12 @@ class LostRecords:
 
 @dataclass(frozen=True)
 class Latch:
-    """Whether somebody has stopped the device: then nothing arms until UNLATCH clears it.
+    """State of the latch: a latched device refuses to arm until UNLATCH clears it.
 
     Attributes:
-        count: of the latest stop; UNLATCH has to name it.
-        age: time since that stop (s); None when the device does not know.
-        by: who stopped it, as far as the SAFE said.
+        count: number of the latest stop, required in UNLATCH.
+        age: time since that stop (s); None if unknown.
+        by: sender of the stop, if its SAFE contained it.
     """
 
     latched: bool
@@ -207,12 +207,12 @@ class Latch:
 
 @dataclass(frozen=True)
 class Holder:
-    """Who holds the device.
+    """The host that holds the device.
 
     Attributes:
-        held: whether its heartbeats are heard, so that nobody else gets the device.
-        age: time since the last one (s); None when there was none.
-        host: as its HELLO said; of the last session when it is held no more.
+        held: whether its heartbeats arrive; this excludes other hosts.
+        age: time since the last one (s); None before the first.
+        host: identity from its HELLO; of the last session if the device is no longer held.
     """
 
     held: bool

@@ -16,7 +16,7 @@ C = TypeVar("C", bound=Code)
 
 
 class Writer:
-    """Collects a body."""
+    """Writer of a message body."""
 
     def __init__(self) -> None:
         self._parts = bytearray()
@@ -49,7 +49,7 @@ class Writer:
         return self
 
     def data(self, data: bytes) -> Writer:
-        """Add bytes as they are."""
+        """Add bytes unchanged."""
         self._parts += data
         return self
 
@@ -59,7 +59,7 @@ class Writer:
 
 
 class Reader:
-    """Takes a body apart; WireError as soon as it is not what it should be."""
+    """Parser of a message body. Raises WireError if it is malformed."""
 
     def __init__(self, body: bytes) -> None:
         self._body = body
@@ -82,7 +82,7 @@ class Reader:
         return int(struct.unpack("<" + letter, self.data(struct.calcsize("<" + letter)))[0])
 
     def real(self) -> float:
-        """The next f64, whatever it is."""
+        """The next f64, finite or not."""
         return float(struct.unpack("<d", self.data(8))[0])
 
     def finite(self) -> float:
@@ -120,7 +120,7 @@ class Reader:
         return tuple(self.text() for _ in range(self.integer("B")))
 
     def end(self) -> None:
-        """Nothing may be left."""
+        """Raise WireError if bytes are left."""
         if self.left:
             raise WireError(f"{self.left} bytes too many")
 

@@ -19,12 +19,12 @@ HEADER = struct.Struct("<BBH")
 CHECKSUM = struct.Struct("<I")
 OVERHEAD = HEADER.size + CHECKSUM.size
 MAX_ENCODED = cobs.encoded_length(MAX_BODY + OVERHEAD)
-"""Most bytes between two delimiters."""
+"""Largest number of bytes between two delimiters."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """What arrived whole: `kind` may still be unknown, `body` still be malformed."""
+    """An intact frame; its `kind` may be unknown, its `body` malformed."""
 
     kind: int
     sequence: int
@@ -34,7 +34,7 @@ class Frame:
 
 @dataclass
 class Counts:
-    """What a decoder has met so far."""
+    """Numbers of frames in a decoder, by result."""
 
     good: int = 0
     bad_cobs: int = 0
@@ -45,12 +45,12 @@ class Counts:
 
     @property
     def bad(self) -> int:
-        """Everything that was thrown away."""
+        """Number of discarded frames."""
         return self.bad_cobs + self.too_short + self.too_long + self.bad_crc + self.wrong_version
 
 
 def encode_frame(kind: int, sequence: int, body: bytes, version: int = FRAME_VERSION) -> bytes:
-    """The bytes to send, delimiters included; WireError when the body is too long."""
+    """The bytes to send, delimiters included. Raises WireError if the body is too long."""
     if len(body) > MAX_BODY:
         raise WireError(f"a message of {len(body)} bytes; a frame carries {MAX_BODY}")
     content = HEADER.pack(version, kind, sequence & 0xFFFF) + body
@@ -58,7 +58,7 @@ def encode_frame(kind: int, sequence: int, body: bytes, version: int = FRAME_VER
 
 
 def decode_frame(encoded: bytes, counts: Counts) -> Frame | None:
-    """The frame that stood between two delimiters, or None and one more in `counts`."""
+    """Decode the bytes between two delimiters; update `counts`; None if they are not a frame."""
     if len(encoded) > MAX_ENCODED:
         counts.too_long += 1
         return None
@@ -86,10 +86,10 @@ def decode_frame(encoded: bytes, counts: Counts) -> Frame | None:
 
 
 class FrameDecoder:
-    """Finds frames in a byte stream; tolerates anything, holds no more than one frame's bytes.
+    """Decoder of frames in any byte stream; buffers at most one frame.
 
     Attributes:
-        counts: what was found and what was thrown away.
+        counts: numbers of accepted and discarded frames.
     """
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ class FrameDecoder:
             return
         self._partial += part
         if len(self._partial) > MAX_ENCODED:
-            self._overlong = True  # counted once, when its delimiter comes
+            self._overlong = True  # counted once, at its delimiter
             self._partial.clear()
 
     def _complete(self, part: bytes) -> Frame | None:

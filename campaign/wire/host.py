@@ -12,9 +12,9 @@ class Hello:
     """Begin or renew a session; answered by CAPABILITIES.
 
     Attributes:
-        lowest, highest: versions of the protocol that the host speaks.
-        session: a random number; the same one after a lost connection.
-        host: who it is, for the device's log.
+        lowest, highest: versions of the protocol that the host supports.
+        session: a random number; unchanged after a lost connection.
+        host: its identity, for the device's log.
     """
 
     lowest: int
@@ -25,14 +25,14 @@ class Hello:
 
 @dataclass(frozen=True)
 class Set:
-    """Add parameters to the configuration. At least one item."""
+    """Add parameters (at least one item) to the configuration."""
 
     items: tuple[Item, ...]
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Check everything and be ready to start; answered by ACK and CHANNELS.
+    """Check everything and prepare the start; answered by ACK and CHANNELS.
 
     Attributes:
         crc: `configuration_crc` of all SET bodies since the device was idle.
@@ -43,19 +43,19 @@ class Arm:
 
 @dataclass(frozen=True)
 class Start:
-    """Set the axis in motion. `trial` (from 1) is chosen by the host and marks every record."""
+    """Start the motion. The host selects `trial` (from 1), which marks every record."""
 
     trial: int
 
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """The host is alive; answered by STATUS. Not a command: it is neither numbered nor repeated.
+    """Sign of life of the host; answered by STATUS. Not a command: neither numbered nor repeated.
 
     Attributes:
-        counter: one more each time; STATUS returns it.
-        trial, next: of this trial every record before `next` has arrived; the device frees them.
-        session: whose it is; another's than the device's keeps nothing alive and frees nothing.
+        counter: increases by 1; STATUS returns it.
+        trial, next: every record of this trial before `next` has arrived; the device frees them.
+        session: session of the host; another session frees nothing and does not prevent a timeout.
     """
 
     counter: int
@@ -75,25 +75,25 @@ class Resend:
 
 @dataclass(frozen=True)
 class Release:
-    """Every record of an ended trial is safe; the device forgets it and is idle."""
+    """Every record of an ended trial is stored; the device deletes the trial and becomes idle."""
 
     trial: int
 
 
 @dataclass(frozen=True)
 class Stop:
-    """End the running trial in a controlled way; its END follows."""
+    """End the running trial under control; its END follows."""
 
 
 @dataclass(frozen=True)
 class Safe:
-    """Drive off now: accepted in every state and from anybody; answered by ACK and STATUS.
+    """Drive off now: accepted in every state and from any sender; answered by ACK and STATUS.
 
-    Unless it is of the session that holds the device, it latches it; then LATCH follows.
+    If it is not from the session that holds the device, it latches the device; LATCH follows.
 
     Attributes:
-        session: whose it is; 0, or no body at all, for nobody's.
-        host: who sends it, for whoever asks later.
+        session: session of the sender; 0, or an empty body, without a session.
+        host: identity of the sender, for later queries.
     """
 
     session: int = 0
@@ -102,24 +102,24 @@ class Safe:
 
 @dataclass(frozen=True)
 class Clear:
-    """Leave SAFE or FAULT, or give up a configuration: the device is idle and remembers nothing.
+    """Leave SAFE or FAULT, or discard a configuration: the device becomes idle.
 
-    All but the latch: see Unlatch.
+    It deletes everything except the latch: see Unlatch.
     """
 
 
 @dataclass(frozen=True)
 class Query:
-    """How is the device? Changes nothing; answered by STATUS, LATCH and HOLDER, to anybody."""
+    """Query the device without a change; answered by STATUS, LATCH and HOLDER, for any sender."""
 
 
 @dataclass(frozen=True)
 class Unlatch:
-    """A person has seen that the device was stopped and lets it move again.
+    """The user has noticed the stop of the device and allows motion again.
 
     Attributes:
-        count: of the stop that the person has seen.
-        host: who it is, for the device's log.
+        count: number of the stop that the user has noticed.
+        host: identity of the host, for the device's log.
     """
 
     count: int
@@ -128,6 +128,6 @@ class Unlatch:
 
 @dataclass(frozen=True)
 class Bye:
-    """The host of `session` leaves: from now on it counts as not heard. Not acknowledged."""
+    """The host of `session` leaves: the device no longer counts it as present. No answer."""
 
     session: int

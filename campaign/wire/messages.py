@@ -1,8 +1,8 @@
 """Every message of the protocol, and its body as bytes.
 
-`encode` makes (kind, body) of a message, `decode` the message of (kind, body) or a WireError: every
-length is exact, every code known, every number finite. Times are seconds, the rest SI as well.
-`LAYOUTS` is the whole truth about bodies: field after field, in the order of the bytes.
+`encode` converts a message to (kind, body), `decode` the reverse, or raises WireError: every length
+is exact, every code known, every number finite. Times are in seconds, all values SI. `LAYOUTS`
+defines the bodies completely: field by field, in the order of the bytes.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ Message = (
 
 @dataclass(frozen=True)
 class Layout:
-    """How one kind of field is written and read."""
+    """Writer and reader of one kind of field."""
 
     write: Callable[[Writer, Any], object]
     read: Callable[[Reader], Any]
@@ -272,20 +272,20 @@ KINDS: Mapping[type[Any], Kind] = {made: kind for kind, (made, _) in LAYOUTS.ite
 
 
 def encode(message: Message) -> tuple[Kind, bytes]:
-    """Type and body of `message`; WireError when it cannot be sent."""
+    """Type and body of `message`. Raises WireError if it cannot be sent."""
     kind = KINDS[type(message)]
     _check(message)
     writer = Writer()
     for name, layout in LAYOUTS[kind][1]:
         layout.write(writer, getattr(message, name))
-    body = b"" if message == Safe() else writer.done()  # nobody's: as it was in version 1
+    body = b"" if message == Safe() else writer.done()  # without a session: as in version 1
     if len(body) > MAX_BODY:
         raise WireError(f"a {kind.name} of {len(body)} bytes; a frame carries {MAX_BODY}")
     return kind, body
 
 
 def decode(kind: int, body: bytes) -> Message:
-    """The message; WireError when the type is unknown or the body is not exactly one of its."""
+    """The message. Raises WireError if the type is unknown or the body does not match it."""
     if kind not in LAYOUTS:
         raise WireError(f"no message has the type 0x{kind:02x}")
     if kind == Kind.SAFE:
@@ -299,9 +299,9 @@ def decode(kind: int, body: bytes) -> Message:
 
 
 def _safe(body: bytes) -> Safe:
-    """A SAFE is obeyed whatever its body: nobody says it by mistake.
+    """Decode SAFE, which is obeyed with any body: it is never sent by mistake.
 
-    Four bytes are a session that does not say who it is; what is no session's is nobody's.
+    Four bytes are a session without an identity; an invalid body counts as without a session.
     """
     try:
         reader = Reader(body)
@@ -314,7 +314,7 @@ def _safe(body: bytes) -> Safe:
 
 
 def _check(message: Message) -> None:
-    """What no single field shows."""
+    """Check conditions between fields. Raises WireError."""
     if isinstance(message, Samples):
         if message.count < 1 or not message.data or len(message.data) % message.count:
             raise WireError(f"{len(message.data)} bytes cannot be {message.count} samples")
@@ -335,18 +335,18 @@ def _check(message: Message) -> None:
         raise WireError(f"{message.count} records from {message.first}")
 
 
-# What both ends do with lists that may need several messages
+# Lists that may need several messages, for both ends
 
 
 def parameter_messages(parameters: Mapping[str, Value]) -> list[Set]:
-    """`parameters` in as few SET as possible, in order; arrays cut into slices."""
+    """`parameters` in as few SET messages as possible, in order; arrays cut into slices."""
     return [Set(batch) for batch in packed(items(parameters))]
 
 
 def channels_messages(
     sequence: int, sample_rate: float, channels: Iterable[Channel]
 ) -> list[Channels]:
-    """The CHANNELS that answer ARM number `sequence`, each within a frame."""
+    """The CHANNELS messages that answer ARM number `sequence`, each within a frame."""
     listed = tuple(channels)
     messages: list[Channels] = []
     first = 0
@@ -365,7 +365,7 @@ def channels_messages(
 
 
 def sample_struct(channels: Iterable[Channel]) -> struct.Struct:
-    """One sample of all channels, as stored."""
+    """Layout of one sample of all channels."""
     return struct.Struct("<" + "".join(channel.format.letter for channel in channels))
 
 
@@ -375,10 +375,10 @@ def sample_dtype(channels: Iterable[Channel]) -> list[tuple[str, str]]:
 
 
 def sample_size(channels: Iterable[Channel]) -> int:
-    """Bytes of one sample of all channels."""
+    """Size of one sample of all channels (bytes)."""
     return sum(channel.format.size for channel in channels)
 
 
 def samples_per_record(channels: Iterable[Channel]) -> int:
-    """Most samples that fit into one SAMPLES."""
+    """Largest number of samples in one SAMPLES message."""
     return (MAX_BODY - 14) // sample_size(channels)

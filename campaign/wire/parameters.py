@@ -1,7 +1,7 @@
 """Parameters of SET: named values in several messages, checked.
 
-A configuration is the list of all SET bodies since the device was idle, in order. Its CRC-32 goes
-with ARM, so nothing moves on parameters other than those the host meant.
+A configuration is the list of all SET bodies since the device was idle, in order. ARM contains its
+CRC-32, so no motion uses parameters other than the sent ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LONGEST_NAME = 64
 LONGEST_TEXT = 512
 """Bytes of UTF-8."""
 SLICE = 64
-"""Most values in one piece of an array."""
+"""Largest number of values in one piece of an array."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class ArraySlice:
 
     Attributes:
         total: length of the whole array.
-        offset: place of this piece's first value in it.
+        offset: index of this piece's first value in it.
         values: the piece.
     """
 
@@ -65,7 +65,7 @@ def items(parameters: Mapping[str, Value]) -> list[Item]:
 
 
 def packed(listed: Iterable[Item]) -> list[tuple[Item, ...]]:
-    """`listed` in as few messages as fit, in order: one tuple of items for each SET."""
+    """`listed` in as few messages as possible, in order: one tuple of items for each SET."""
     messages: list[tuple[Item, ...]] = []
     batch: list[Item] = []
     size = 1
@@ -84,8 +84,7 @@ def packed(listed: Iterable[Item]) -> list[tuple[Item, ...]]:
 def assembled(listed: Iterable[Item]) -> dict[str, Value]:
     """Whole parameters from items, in order of first appearance; a later scalar replaces.
 
-    Raises WireError for an array whose pieces do not follow each other without gap from 0 to its
-    total.
+    Raises WireError if the pieces of an array are not contiguous from 0 to its total.
     """
     whole: dict[str, Value] = {}
     totals: dict[str, int] = {}
@@ -110,7 +109,7 @@ def assembled(listed: Iterable[Item]) -> dict[str, Value]:
 
 
 def configuration_crc(bodies: Iterable[bytes]) -> int:
-    """CRC-32 of the SET bodies, in order: what ARM carries; 0 for none."""
+    """CRC-32 of the SET bodies, in order, for ARM; 0 for none."""
     crc = 0
     for body in bodies:
         crc = zlib.crc32(body, crc)
@@ -118,7 +117,7 @@ def configuration_crc(bodies: Iterable[bytes]) -> int:
 
 
 def encoded(item: Item) -> bytes:
-    """The bytes of one item; WireError when name or value cannot be sent."""
+    """The bytes of one item. Raises WireError if name or value cannot be sent."""
     name, value = item.name, item.value
     if len(name) > LONGEST_NAME or not NAME.fullmatch(name):
         raise WireError(f"{name!r} is no parameter name")

@@ -1,1 +1,1 @@
-"""What an archive consists of: its files, texts and checksums, whoever writes or reads them."""
+"""Parts of an archive: its files, texts and checksums, for readers and writers."""

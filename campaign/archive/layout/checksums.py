@@ -1,9 +1,9 @@
 """The tree of checksums: samples, channels, trials, run.
 
-Its leaves are logical: the samples of a series as numbers, in blocks, however HDF5 lays them out.
-A trial's record names every series with its unit and its leaf; the run's seal names the digest of
-every record and of every text. So whoever has the digest of the seal has the whole run, and nothing
-in it can change places. `docs/developers/archive-format.md` defines each digest for other programs.
+Its leaves are logical: the samples of a series as numbers, in blocks, independent of the layout in
+HDF5. A trial's record names every series with its unit and its leaf; the run's seal names the
+digest of every record and of every text. So the digest of the seal determines the whole run and the
+order in it. `docs/developers/archive-format.md` defines each digest for other programs.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 BLOCK = 32_768
-"""Samples of a block."""
+"""Samples per block."""
 
 
 def text_digest(text: str) -> str:
-    """Of a text: SHA-256 of its UTF-8 bytes, hexadecimal."""
+    """Digest of a text: SHA-256 of its UTF-8 bytes, hexadecimal."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 class SeriesDigest:
-    """Of a series: SHA-256 over the SHA-256 of each of its blocks, in order.
+    """Digest of a series: SHA-256 over the SHA-256 of each of its blocks, in order.
 
-    Blocks hold `BLOCK` samples, but for the last one, as little-endian 64-bit floats.
+    Blocks hold `BLOCK` little-endian 64-bit floats; the last one may hold fewer.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class SeriesDigest:
                 self._end_block()
 
     def hexdigest(self) -> str:
-        """Of all samples so far. Nothing may be added afterwards."""
+        """Digest of all samples so far. Do not add samples afterwards."""
         if self._filled:
             self._end_block()
         return self._blocks.hexdigest()
@@ -58,7 +58,7 @@ class SeriesDigest:
 
 
 def series_digest(samples: Array) -> str:
-    """Of a whole series, shape (n,)."""
+    """Digest of a whole series, shape (n,)."""
     digest = SeriesDigest()
     digest.update(samples)
     return digest.hexdigest()

@@ -1,8 +1,7 @@
-"""What the groups and files of trials are called.
+"""Names of the groups and files of trials.
 
-NeXus allows no hyphen in a name, so the trial that is called `trial-00017` has the group
-`trial_00017`. Of several attempts the last one has that name in a sealed run; an attempt that a
-later one replaced is `trial_00017_attempt_1`.
+NeXus allows no hyphen in a name, so the group of trial `trial-00017` is `trial_00017`. In a sealed
+run, this is the group of the last attempt; a replaced attempt has `trial_00017_attempt_1`.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from collections.abc import Iterable
 from campaign.archive.layout.journal import TrialFinished
 
 TRIAL = ".trial"
-"""Ending of the file of one trial, while its run is in progress."""
+"""Suffix of the file of one trial, while its run is in progress."""
 
 ENTRY = re.compile(r"trial_([0-9]{5,10})(?:_attempt_([0-9]{1,6}))?")
 
@@ -24,7 +23,7 @@ def entry_name(trial_number: int) -> str:
 
 
 def earlier_entry_name(trial_number: int, attempt: int) -> str:
-    """Name, in a sealed run, of an attempt that a later one replaced."""
+    """Name of the group of a replaced attempt, in a sealed run."""
     return f"{entry_name(trial_number)}_attempt_{attempt}"
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 PART = ".part"
-"""Ending of a file that is still being written. No reader takes such a file for an archive."""
+"""Suffix of a file that is being written. Readers do not accept it as an archive."""
 
 _BLOCK = 1 << 20
 _UMASK = os.umask(0o022)
@@ -19,31 +19,31 @@ _REASON = re.compile(r"errno = \d+, error message = '([^']+)'")
 
 
 def why(error: Exception) -> str:
-    """What went wrong, in a line: HDF5 tells a page about a full disk."""
+    """Short reason of an error, in one line: HDF5 prints a page for a full disk."""
     if isinstance(error, OSError) and error.errno:
         return os.strerror(error.errno)
-    told = " ".join(str(error).split())
-    if reason := _REASON.search(told):
+    message = " ".join(str(error).split())
+    if reason := _REASON.search(message):
         return reason[1]
-    return told[:300] or type(error).__name__
+    return message[:300] or type(error).__name__
 
 
 def keep_umask() -> None:
-    """Give a file that is made next the mode that this process began with, whatever a plug-in did.
+    """Restore the umask from the start of this process, in case a plug-in changed it.
 
-    To be called right before: other code of the process can change it at any time.
+    Call it directly before creating a file: other code can change the umask at any time.
     """
     os.umask(_UMASK)
 
 
 def sync_file(path: Path) -> None:
-    """Put the content of `path` on the disk."""
-    with path.open("r+b") as file:  # Windows puts nothing there that is open for reading alone
+    """Flush the content of `path` to the disk."""
+    with path.open("r+b") as file:  # Windows cannot flush a file opened read-only
         os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the names in `folder` on the disk. Windows has no such thing, and needs none."""
+    """Flush the names in `folder` to the disk; Windows does not need this."""
     if os.name == "nt":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -54,12 +54,12 @@ def sync_folder(folder: Path) -> None:
 
 
 def publish(part: Path, final: Path) -> None:
-    """Give a finished, closed `part` its real name, so that it is there whole or not at all."""
+    """Rename a finished, closed `part` atomically: the file exists completely or not at all."""
     publish_all([(part, final)])
 
 
 def publish_all(files: Sequence[tuple[Path, Path]]) -> None:
-    """The same of several files of one folder, whose names are put on the disk together."""
+    """As `publish`, for several files of one folder, which is flushed once."""
     for part, _ in files:
         sync_file(part)
     for part, final in files:
@@ -69,12 +69,12 @@ def publish_all(files: Sequence[tuple[Path, Path]]) -> None:
 
 
 def write_atomically(path: Path, content: str) -> None:
-    """Write a small text file so that it is there whole or not at all."""
+    """Write a small text file completely or not at all."""
     write_lines_atomically(path, [content])
 
 
 def write_lines_atomically(path: Path, lines: Iterable[str]) -> None:
-    """Write lines, each with its end, so that all of them are there or no file at all."""
+    """Write a file of lines (with their line ends) completely or not at all."""
     part = path.with_name(path.name + PART)
     keep_umask()
     with part.open("w", encoding="utf-8", newline="\n") as file:
@@ -87,12 +87,12 @@ def sha256_of(
     blank: tuple[int, int] = (0, 0),
     progress: Callable[[int], object] = lambda count: None,
 ) -> str:
-    """SHA-256 of a file in flat memory.
+    """SHA-256 of a file, in constant memory.
 
     Args:
         path: the file.
-        blank: offset and length of bytes that count as `0` digits: where the hash itself stands.
-        progress: is told how many bytes were read, now and then.
+        blank: offset and length of the hash itself, whose bytes count as `0` digits.
+        progress: called with the number of bytes of each block read.
     """
     offset, length = blank
     digest = hashlib.sha256()
@@ -104,7 +104,7 @@ def sha256_of(
 
 
 def sha256_of_part(path: Path, offset: int, size: int) -> str:
-    """SHA-256 of so many bytes of a file, in flat memory."""
+    """SHA-256 of `size` bytes of a file, in constant memory."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         file.seek(offset)
@@ -118,7 +118,7 @@ def _digest(
     length: int | None,
     progress: Callable[[int], object],
 ) -> None:
-    """Feed the next `length` bytes, or all that are left."""
+    """Add the next `length` bytes, or all remaining bytes if None, to the digest."""
     left = length
     while block := file.read(_BLOCK if left is None else min(_BLOCK, left)):
         digest.update(block)

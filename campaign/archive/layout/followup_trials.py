@@ -1,8 +1,8 @@
-"""Trials of later stages: whole in the journal, beside the plan.
+"""Trials of later stages: in the journal, separate from the plan.
 
-The plan of a run stays as it was when the run began. A stage's trials are in the journal before the
-first of them is executed, each as `plan-trials.jsonl` has the planned ones, and with the trees that
-they name. Readers count them to the plan.
+The plan of a run never changes. The journal gets the trials of a stage before the first of them is
+executed, in the form of `plan-trials.jsonl`, with their trees (benches and options). Readers append
+them to the plan.
 """
 
 from __future__ import annotations
@@ -50,17 +50,17 @@ def trials_followed(
 
 
 def stages_in(entries: Iterable[Entry]) -> tuple[TrialsFollowed, ...]:
-    """The stages of which a journal tells, in order."""
+    """The stages in a journal, in order."""
     return tuple(entry for entry in entries if isinstance(entry, TrialsFollowed))
 
 
 def planned_in(stages: Iterable[TrialsFollowed]) -> tuple[PlannedTrial, ...]:
-    """Their trials as the plan has its own."""
+    """The trials of stages as lines of a plan."""
     return tuple(each for stage in stages for each in stage.trials)
 
 
 def trials_in(stages: Iterable[TrialsFollowed]) -> Iterator[Trial]:
-    """Their trials, ready to be executed. Raises ValueError where one is not as it was written."""
+    """The trials of stages, ready for execution. Raises ValueError if one is damaged."""
     for stage in stages:
         for digest, tree in stage.trees.items():
             if text_digest(canonical_json(tree)) != digest:

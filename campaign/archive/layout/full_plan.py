@@ -1,7 +1,7 @@
-"""Every planned trial, whole: enough to rebuild an execution exactly.
+"""Full description of every planned trial, sufficient to repeat an execution exactly.
 
-Benches and options come again and again in a plan, so they are kept once each (`plan-trees.jsonl`),
-under the SHA-256 of their canonical JSON, and the trials (`plan-trials.jsonl`) name them.
+Many trials of a plan share benches and options. Each is stored once (`plan-trees.jsonl`) under the
+SHA-256 of its canonical JSON; the trials (`plan-trials.jsonl`) refer to it.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def write_full_plan(folder: Path, trials: Sequence[Trial]) -> None:
 
 @dataclass(frozen=True)
 class FullPlan:
-    """The planned trials of a run; they are read when they are asked for.
+    """The planned trials of a run, read on access.
 
     Attributes:
-        path: of the run, for messages.
+        path: path of the run, for messages.
         texts: reads the two files. Raises ArchiveError.
-        stages: of the journal; their trials come after those of the two files.
+        stages: stages in the journal; their trials follow those of the two files.
     """
 
     path: Path
@@ -78,7 +78,7 @@ class FullPlan:
         return len(self._lines) + sum(len(stage.trials) for stage in self.stages)
 
     def trial(self, number: int) -> Trial:
-        """The planned trial `number`, from 1. Raises ArchiveError when it cannot be rebuilt."""
+        """The planned trial `number`, from 1. Raises ArchiveError if it is missing or damaged."""
         if self.stages and number > len(self._lines) and number in self._followed:
             return self._followed[number]
         if not 1 <= number <= len(self._lines):
@@ -92,7 +92,7 @@ class FullPlan:
         return trial
 
     def trials(self) -> Iterable[Trial]:
-        """All of them, in order, one at a time."""
+        """All trials in order, one at a time."""
         return (self.trial(number) for number in range(1, len(self) + 1))
 
     def _damaged(self, name: str, line: int, what: str) -> ArchiveError:

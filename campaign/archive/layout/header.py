@@ -1,4 +1,4 @@
-"""The header of a run: what is known before its first trial, and its final status."""
+"""The header of a run: facts known before its first trial, and its final status."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from campaign.trial import Role, Tree, Trial
 
 FORMAT = 3
-"""Version of the archive format (`docs/developers/archive-format.md`); readers read no other."""
+"""Version of the archive format (`docs/developers/archive-format.md`); the only readable one."""
 
 SEALED = ".nxs"
 PARTIAL = ".partial"
 
 
 class RunStatus(StrEnum):
-    """How a run stands. All but `INCOMPLETE` are written when it is sealed."""
+    """Status of a run. Sealing writes every status except `INCOMPLETE`."""
 
-    COMPLETE = "complete"  # every planned trial ran to its end
-    FAILED_TRIALS = "failed trials"  # the plan was worked through; some trials did not complete
-    INTERRUPTED = "interrupted"  # somebody stopped it
-    FAULT = "fault"  # the backend, the bench or the archive could not go on
-    INCOMPLETE = "incomplete"  # still running, or killed: there is no word of an end
+    COMPLETE = "complete"  # every planned trial completed
+    FAILED_TRIALS = "failed trials"  # the plan was executed; some trials did not complete
+    INTERRUPTED = "interrupted"  # an operator stopped it
+    FAULT = "fault"  # the backend, the bench or the archive failed
+    INCOMPLETE = "incomplete"  # in progress, or killed: no end is recorded
 
 
 def _run_name(name: str) -> str:

@@ -1,7 +1,7 @@
 """The journal of a run in progress: one line for each finished step.
 
-One JSON object per line, appended and synced before anybody is told. A kill can tear the last line
-only; a torn line was never reported, so a reader leaves it out.
+One JSON object per line, appended and synced before the step is reported. A kill can truncate only
+the last line; a truncated line was never reported, so a reader skips it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class _Line(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
     def model_post_init(self, context: object) -> None:
-        """Nobody asks which fields were given: a set of them would take half of the memory."""
+        """Clear the set of given fields: it is not used, and takes half of the memory."""
         self.__pydantic_fields_set__.clear()
 
 
@@ -126,7 +126,7 @@ class TrialsFollowed(_Line):
 
     @property
     def title(self) -> str:
-        """For people: `sweep at compensation = none, stage 2 (refinement)`."""
+        """Display text: `sweep at compensation = none, stage 2 (refinement)`."""
         point = ", ".join(f"{path} = {value}" for path, value in self.point.items())
         return f"{self.test}{f' at {point}' if point else ''}, stage {self.stage} ({self.name})"
 
@@ -169,7 +169,7 @@ class TrialMeasured(_Line):
 
     @field_serializer("estimates")
     def _as_in_a_record(self, estimates: tuple[Estimate, ...]) -> list[Tree]:
-        """What would say its default is left out."""
+        """Leave out fields that have their default."""
         return [_ESTIMATE.dump_python(e, mode="json", exclude_defaults=True) for e in estimates]
 
 
@@ -208,15 +208,15 @@ _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 
 
 def utc_now() -> str:
-    """The wall clock as a journal keeps it: ISO 8601, UTC, to the millisecond."""
+    """The wall clock in the form of the journal: ISO 8601, UTC, resolution 1 ms."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 class Journal:
-    """Appends lines; each is on the disk when `append` returns. Safe to share between threads."""
+    """Writer of a journal; each line is on the disk when `append` returns. Thread-safe."""
 
     def __init__(self, path: Path, *, whole: int | None = None) -> None:
-        """`whole`: bytes of whole lines there are; what follows was torn by a crash, and is cut."""
+        """`whole`: size of the complete lines (bytes); the rest, left by a crash, is removed."""
         self._path = path
         self._lock = threading.Lock()
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
@@ -225,9 +225,9 @@ class Journal:
             os.fsync(self._descriptor)
 
     def append(self, *entries: Entry) -> list[int]:
-        """Add a line for each; returns their places, for `entry`.
+        """Add a line for each entry; return their offsets, for `entry`.
 
-        Raises ArchiveError, leaving all as it was, when that fails.
+        Raises ArchiveError if the write fails; the journal then stays unchanged.
         """
         texts = [f"{canonical_json(each.model_dump(mode='json'))}\n".encode() for each in entries]
         lines = b"".join(texts)
@@ -244,7 +244,7 @@ class Journal:
         return list(accumulate(map(len, texts), initial=before))[:-1]
 
     def entry(self, place: int) -> Entry:
-        """The line at a place. Raises ArchiveError."""
+        """The line at an offset. Raises ArchiveError."""
         try:
             with self._path.open("rb") as file:
                 file.seek(place)
@@ -261,16 +261,16 @@ class Journal:
 
 @dataclass(frozen=True)
 class Story:
-    """What a journal tells.
+    """Content of a journal.
 
     Attributes:
         started: its first line.
-        finished: by trial number, in the order of their numbers; a trial's last attempt counts.
-        earlier: by trial number, the attempts before that, in the order they were made.
-        ended: None when the run is still in progress or was killed.
-        entries: all of it, in order, but for what was measured: that takes most of the memory.
-        measured: the places of what was measured, by the digest of the trial's record.
-        size: bytes of the whole lines.
+        finished: the last attempt of each trial, by trial number, in their order.
+        earlier: by trial number, the attempts before the last one, in their order.
+        ended: None if the run is in progress or was killed.
+        entries: all lines in order, without the metrics, which take most of the memory.
+        measured: offsets of the lines with metrics, by the digest of the trial's record.
+        size: size of the complete lines (bytes).
     """
 
     started: RunStarted
@@ -283,13 +283,13 @@ class Story:
 
     @property
     def files(self) -> list[TrialFinished]:
-        """Every attempt that is kept, in the order of the trials' numbers."""
+        """All attempts, in the order of trial numbers."""
         kept = self.finished.items()
         return [one for number, last in kept for one in (*self.earlier.get(number, ()), last)]
 
 
 def read_journal(path: Path) -> Story:
-    """Read a journal. Raises ArchiveError naming the line that cannot be understood."""
+    """Read a journal. Raises ArchiveError with the number of an invalid line."""
     try:
         with path.open("rb") as file:
             return _tell(path, file)
@@ -298,7 +298,7 @@ def read_journal(path: Path) -> Story:
 
 
 def parse_journal(path: Path, content: bytes) -> Story:
-    """What a journal tells; `path` is for messages."""
+    """Parse a journal; `path` is for messages."""
     return _tell(path, io.BytesIO(content))
 
 
@@ -332,7 +332,7 @@ def _tell(path: Path, lines: Iterable[bytes]) -> Story:
 
 
 def _end(entries: list[Entry]) -> RunEnded | None:
-    """How the run ended, unless it was resumed since."""
+    """The end of the run; None if there is none or the run was resumed later."""
     for entry in reversed(entries):
         if isinstance(entry, RunEnded):
             return entry
@@ -342,12 +342,12 @@ def _end(entries: list[Entry]) -> RunEnded | None:
 
 
 def _parse(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[Entry, int]]:
-    """Each line, and its bytes."""
+    """Each line, and its size in bytes."""
     wrong = 0
     for number, line in enumerate(lines, start=1):
         if not line.endswith(b"\n"):
-            return  # it was never reported
-        if wrong:  # a power cut may leave a last line of rubbish, but no other one
+            return  # a truncated line was never reported
+        if wrong:  # a power cut may leave an invalid last line, but no other one
             raise ArchiveError(f"{path}:{wrong}: is not a line of a journal")
         try:
             yield _ENTRY.validate_python(json.loads(line)), len(line)

@@ -26,7 +26,7 @@ from campaign.trial import Outcome
 _ENTRY: TypeAdapter[Entry] = TypeAdapter(Entry)
 _ENTRIES: TypeAdapter[list[Entry]] = TypeAdapter(list[Entry])
 _MEASURED = re.compile(rb'"event":"trial measured","record":"([0-9a-f]{64})"')
-"""In a line as it is written; within a text, quotes have a backslash."""
+"""Matches a written line only: within a text, quotes have a backslash."""
 _Kind = TypeVar("_Kind", bound=Entry)
 
 
@@ -35,12 +35,12 @@ class Lines:
     """A journal, read line by line.
 
     Attributes:
-        entries: the lines that can be understood, in order.
-        damaged: numbers, from 1, of those that cannot.
-        torn: whether a last line was begun and never reported, which is no damage.
-        content: the lines that were reported, damaged ones included.
-        measured: lines that tell what was measured, by the digest of the trial's record, as far as
-            they were asked to be kept so; `entries` is without them.
+        entries: the valid lines, in order.
+        damaged: numbers of the invalid lines, from 1.
+        torn: whether the last line is incomplete; it was never reported, so it is no damage.
+        content: the reported lines, damaged ones included.
+        measured: unparsed lines with metrics, by the digest of the trial's record; filled only in
+            lean reading, and then `entries` does not contain them.
     """
 
     entries: tuple[Entry, ...]
@@ -51,33 +51,33 @@ class Lines:
 
     @property
     def whole(self) -> bool:
-        """Whether it begins as a journal does, and every line can be understood."""
+        """Whether the first line is the start of a run, and all lines are complete and valid."""
         begins = bool(self.entries) and isinstance(self.entries[0], RunStarted)
         return begins and not self.damaged and not self.torn
 
     @property
     def text(self) -> str:
-        """Of `content`; what is no text in it is replaced."""
+        """`content` as text; invalid bytes are replaced."""
         return self.content.decode("utf-8", "replace")
 
     @cached_property
     def finished(self) -> dict[int, TrialFinished]:
-        """By trial, in the order of their numbers; of several attempts the last one counts."""
+        """The last attempt of each trial, by trial number, in their order."""
         return dict(sorted({e.trial: e for e in self.all(TrialFinished)}.items()))
 
     @property
     def interrupted(self) -> int:
-        """How many trials somebody stopped, which have not failed."""
+        """Number of interrupted trials, which do not count as failed."""
         return sum(each.outcome is Outcome.INTERRUPTED for each in self.finished.values())
 
     @cached_property
     def attempts(self) -> list[TrialFinished]:
-        """Every finished attempt, in the order they finished; a line that was repeated once."""
+        """All finished attempts, in the order of finishing; repeated lines count once."""
         return list({(e.trial, e.attempt): e for e in self.all(TrialFinished)}.values())
 
     @property
     def ended(self) -> RunEnded | None:
-        """How the run ended; None while it is in progress, or when it was resumed since."""
+        """The end of the run; None if it is in progress or was resumed later."""
         for entry in reversed(self.entries):
             if isinstance(entry, RunEnded):
                 return entry
@@ -86,7 +86,7 @@ class Lines:
         return None
 
     def measured_of(self, record: str) -> TrialMeasured | None:
-        """What a line of `measured` tells."""
+        """The parsed line of `measured` for the digest of a record, or None."""
         entry = _parse(self.measured.get(record, b""))
         return entry if isinstance(entry, TrialMeasured) else None
 
@@ -96,21 +96,21 @@ class Lines:
 
 
 def read_lines(content: bytes, *, lean: bool = False) -> Lines:
-    """Read a journal, whatever is left of it.
+    """Read a journal that may be damaged.
 
-    `lean`: keep what was measured as it is written, which takes a tenth of the memory.
+    `lean`: keep lines with metrics unparsed, which takes a tenth of the memory.
     """
     *lines, rest = content.split(b"\n")
-    found = [_MEASURED.search(line) if lean else None for line in lines]
-    left = {match[1].decode(): match.string for match in found if match}
-    numbers = [number for number, match in enumerate(found, start=1) if match is None]
-    told = [lines[number - 1] for number in numbers]
-    together = parse_at_once(_ENTRIES, told)
-    parsed: list[Entry | None] = list(together or map(_parse, told))
+    matches = [_MEASURED.search(line) if lean else None for line in lines]
+    left = {match[1].decode(): match.string for match in matches if match}
+    numbers = [number for number, match in enumerate(matches, start=1) if match is None]
+    to_parse = [lines[number - 1] for number in numbers]
+    together = parse_at_once(_ENTRIES, to_parse)
+    parsed: list[Entry | None] = list(together or map(_parse, to_parse))
     entries = [entry for entry in parsed if entry is not None]
     damaged = [number for number, entry in zip(numbers, parsed, strict=True) if entry is None]
     torn = bool(rest)
-    if damaged and damaged[-1] == len(lines):  # a power cut may leave a last line of rubbish
+    if damaged and damaged[-1] == len(lines):  # a power cut may leave an invalid last line
         lines, damaged, torn = lines[:-1], damaged[:-1], True
     return Lines(
         entries=tuple(entries),
@@ -123,7 +123,7 @@ def read_lines(content: bytes, *, lean: bool = False) -> Lines:
 
 def _parse(line: bytes) -> Entry | None:
     with suppress(ValidationError):
-        return _ENTRY.validate_json(line)  # takes half the time, and refuses lone surrogates
+        return _ENTRY.validate_json(line)  # takes half the time, but rejects lone surrogates
     try:
         return _ENTRY.validate_python(json.loads(line))
     except (ValidationError, ValueError, RecursionError):

@@ -1,7 +1,7 @@
 """The file of one trial of a run in progress: packed samples and a record.
 
-A trial file is `MAGIC`, chunks of samples as HDF5's filters would leave them, a `PackedTrial` as
-JSON, and where that begins (8 bytes, little endian). Sealing puts the chunks into HDF5 unchanged.
+A trial file contains `MAGIC`, chunks of samples in the output format of HDF5's filters, a
+`PackedTrial` as JSON, and its offset (8 bytes, little endian). Sealing copies chunks unchanged.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from campaign.archive.layout.storage import LARGEST_CHUNK
 
 MAGIC = b"campaign trial 1\n"
 POINTER = 8
-"""Bytes at the end of the file, which say where its `PackedTrial` begins."""
+"""Size of the last field of the file (bytes): the offset of its `PackedTrial`."""
 
 Place = tuple[NonNegativeInt, NonNegativeInt]
-"""Where a chunk lies in a file: offset and bytes."""
+"""Place of a chunk in a file: offset and size in bytes."""
 
 
 class PackedSeries(BaseModel):

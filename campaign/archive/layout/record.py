@@ -1,9 +1,9 @@
 """The record of a trial: everything but its samples, as one text.
 
-The record names every series that was recorded, with its unit and the digest of its samples, so the
-digest of the record vouches for all of the trial, wherever its samples lie and whether they were
-kept at all. Benches and options come again and again, so a record names them by their SHA-256 and
-they stand in `trees`, once each.
+The record names every recorded series, with its unit and the digest of its samples. So the digest
+of the record covers the whole trial, wherever its samples are stored and even if they were not
+kept. Many trials share benches and options, so a record refers to them by SHA-256; `trees` contains
+each once.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from campaign.recording import ChannelInfo, Ending, Event, Fault, Outcome, SafeS
 from campaign.trial import Tree, Trial, canonical_json, tree_text
 
 SHARED = ("bench", "options")
-"""Fields of a trial that stand in `trees`."""
+"""Fields of a trial that are stored in `trees`."""
 
 Trees = Mapping[str, Tree]
 """Benches and options by the SHA-256 of their canonical JSON."""
@@ -34,7 +34,7 @@ _ESTIMATE = TypeAdapter(Estimate)
 _TREE = re.compile(r'\{"sha256":"([0-9a-f]{64})","tree":(\{.*\})\}')
 _DETERMINING = ("bench", "task", "seed")
 _DETERMINING_WHERE_THERE = ("truth", "recording")
-"""Fields of a trial that its fingerprint is made of; the latter count where they are not empty."""
+"""Fields of a trial that form its fingerprint; the latter only if they are not empty."""
 
 
 class _Part(BaseModel):
@@ -123,7 +123,7 @@ class TrialRecord(_Part):
 
     @property
     def tree_names(self) -> frozenset[str]:
-        """The digests of the trees that it needs."""
+        """The digests of its trees."""
         return frozenset(str(self.trial[name]) for name in SHARED)
 
     @property
@@ -132,18 +132,18 @@ class TrialRecord(_Part):
 
     @property
     def series(self) -> tuple[ChannelInfo, ...]:
-        """The channels as they were announced."""
+        """The announced channels."""
         return tuple(channel.info for channel in self.channels)
 
     def restored(self, trees: Trees) -> Trial:
-        """The trial itself. Raises LookupError when a tree is missing, ValueError."""
+        """The trial. Raises LookupError if a tree is missing, ValueError if it is invalid."""
         return restored_trial(self.trial, trees)
 
     def fingerprint_of(self, trees: Trees) -> str:
-        """The fingerprint of the trial as it was stored.
+        """The fingerprint of the trial as stored.
 
-        `Trial.fingerprint` would be another one as soon as a later program gives a trial a further
-        field, with a default that old archives do not have.
+        `Trial.fingerprint` would change when a later program adds a field with a default, which
+        old archives do not have.
         """
         tree = {**self.trial, **{name: trees[str(self.trial[name])] for name in SHARED}}
         names = (*_DETERMINING, *(name for name in _DETERMINING_WHERE_THERE if tree.get(name)))
@@ -151,7 +151,7 @@ class TrialRecord(_Part):
 
     @cached_property
     def text(self) -> str:
-        """As it is archived: canonical JSON. Optional fields that say nothing are left out."""
+        """The archived text: canonical JSON, without fields that have their default."""
         tree = self.model_dump(mode="json", exclude_defaults=True)
         return canonical_json(tree)
 
@@ -161,15 +161,15 @@ class TrialRecord(_Part):
 
 
 def restored_trial(described: Tree, trees: Trees) -> Trial:
-    """A trial from what `shared_trees` made of it. Raises LookupError, ValueError."""
+    """Inverse of `shared_trees`. Raises LookupError, ValueError."""
     own: dict[str, JsonValue] = {**described, **{name: {} for name in SHARED}}
     shared = {name: trees[str(described[name])] for name in SHARED}
-    # The trees were checked against their digests, and validating them again costs most.
+    # The trees were checked against their digests; validating them again takes the most time.
     return Trial.model_validate(own).model_copy(update=shared)
 
 
 def shared_trees(trial: Trial) -> tuple[Tree, dict[str, Tree]]:
-    """A trial with digests in place of its trees, and those trees by their digests."""
+    """A trial with digests in place of its trees, and the trees by digest."""
     described = trial.model_dump(mode="json", exclude=set(SHARED))
     trees = {}
     for name in SHARED:
@@ -188,11 +188,11 @@ def trees_text(trees: Trees) -> str:
 
 
 def parse_trees(text: str) -> dict[str, Tree]:
-    """Trees from JSON lines, each held against its digest. Raises ValueError naming a bad line."""
+    """Trees from JSON lines, checked against their digests. Raises ValueError for a bad line."""
     trees = {}
     for number, line in enumerate(text.splitlines(), start=1):
         match = _TREE.fullmatch(line)
-        # The text of a tree is hashed as it stands: what was written is canonical.
+        # The text of a tree is hashed unparsed: written trees are canonical.
         if match is None or text_digest(match[2]) != match[1]:
             raise ValueError(f"line {number} does not match its digest")
         try:
@@ -219,11 +219,11 @@ def make_record(
     """The record of a trial that has ended.
 
     Args:
-        trial: with digests in place of its trees: `shared_trees`.
+        trial: the trial with digests in place of its trees: `shared_trees`.
         label, fingerprint, attempt: see `TrialRecord`.
         ending: how it ended.
         times: when it started and ended, ISO 8601.
-        events: what happened meanwhile.
+        events: events during the trial.
         series: length of the recording, digest of its time base, and its channels.
         preview, windows, estimates: see `TrialRecord`.
     """
@@ -251,7 +251,7 @@ def make_record(
 
 
 def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
-    """Every series that an entry holds: its group, its name, its length, its digest."""
+    """Group, name, length and digest of every series of an entry."""
     if record.samples is not None:
         yield "data", "time", record.samples, record.time
         for channel in record.channels:
@@ -262,7 +262,7 @@ def series_of(record: TrialRecord) -> Iterator[tuple[str, str, int, str]]:
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON has it: what a backend measured of itself must not cost the trial."""
+    """`value` as JSON types; converts anything, because telemetry must not lose a trial."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -1,7 +1,7 @@
 """The results file of a run, `RUN-results.nxs`: names of its groups and fields.
 
-Nothing of it goes into the sealed run, which says what happened; this says what a program of one
-version made of it, and another version may make something else.
+It is not part of the sealed run. The run holds the recordings; this file holds the analysis by one
+program version, and another version may give other results.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ FORMAT = 2
 ENTRY = "results"
 """The one group of the file, in place of a run's `run`."""
 RECORD = "record"
-"""What a program reads back: the same as all else in the file says, as one text."""
+"""Note that a program reads back: the content of the whole file as one text."""
 HASH = "run/file_sha256"
 
 
 @dataclass(frozen=True)
 class ResultsOfTest:
-    """What the analysis of one test found.
+    """Result of the analysis of one test.
 
     Attributes:
-        problem: why there is no result, in one line; empty when there is one.
-        program, version: what analysed it: of an installed experiment its distribution.
+        problem: reason for a missing result, in one line; empty if there is one.
+        program, version: the analysis program; for an installed experiment its distribution.
     """
 
     name: str
@@ -42,18 +42,18 @@ class ResultsOfTest:
 
 @dataclass(frozen=True)
 class RunResults:
-    """What analysis found in a run, and in which run.
+    """Results of all tests of a run, with the identity of the run.
 
     Attributes:
         run: the run's name.
-        file: the name of its file or folder, beside which this is kept.
-        root: the digest that stands for all of the run: `RunReader.identity`.
-        date: when the run ended, or began where it has not ended, ISO 8601; never the clock's time.
-        version: of this program.
-        sources: hash of all the code that analysed: `source_hash`.
-        measured_anew: whether the recordings were measured by that code, whatever was archived.
-        damaged: in words, what of the run could not be used.
-        published: the published values beside what was found; None where none take part.
+        file: name of its file or folder, beside which the results are stored.
+        root: the digest that identifies the run: `RunReader.identity`.
+        date: end of the run, or its start if it has not ended, ISO 8601; never the current time.
+        version: version of this program.
+        sources: hash of all analysis code: `source_hash`.
+        measured_anew: whether that code measured the recordings again, despite archived metrics.
+        damaged: damage that excluded parts of the run, as text.
+        published: comparison with published values; None if there are none.
         telling: test and key of the figure that viewers open first; None without any.
     """
 
@@ -72,6 +72,6 @@ class RunResults:
 
 
 def results_path(run: Path) -> Path:
-    """Where the results of the run at `run`, a file or a folder, are kept."""
+    """Path of the results of the run at `run`, a file or a folder."""
     name = run.name.removesuffix(SEALED).removesuffix(PARTIAL)
     return run.with_name(f"{name}{ENDING}")

@@ -1,8 +1,8 @@
 """Results as JSON text with a type for each object, and back.
 
-Arrays are left out of the text: it names the datasets that hold them. A field that says its default
-is left out as well, and so is the law of a fitted curve, which is code. Numbers that JSON has not
-are spelled: `{"$number": "nan"}`.
+In place of an array, the text has the path of its dataset. It leaves out fields that have their
+default, and the law of a fitted curve, which is code. Numbers that JSON lacks are texts:
+`{"$number": "nan"}`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ IS, ARRAY, NUMBER = "$is", "$array", "$number"
 
 @cache
 def _kinds() -> dict[str, type]:
-    """The only classes that a text can make: the nouns of results."""
+    """The only classes that a text can create: the dataclasses of results."""
     return {
         name: kind
         for module in (estimate, result, results)
@@ -42,15 +42,15 @@ def _adapter(kind: type) -> TypeAdapter[Any]:
 
 
 def to_text(found: results.RunResults, place: Callable[[Array], str]) -> str:
-    """The text; `place` is asked where each array is."""
-    told = _plain(found, place)
-    return json.dumps(told, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    """The text; `place` returns the path of an array."""
+    tree = _plain(found, place)
+    return json.dumps(tree, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def from_text(text: str, array: Callable[[str], Array]) -> results.RunResults:
-    """Results from their text; `array` is asked for each array by its place.
+    """Results from their text; `array` returns the array at a path.
 
-    Raises ValueError, TypeError or LookupError when it is none.
+    Raises ValueError, TypeError or LookupError if it is not such a text.
     """
     made = json.loads(text, object_hook=lambda tree: _made(tree, array))
     if not isinstance(made, results.RunResults):
@@ -64,10 +64,10 @@ def _plain(value: Any, place: Callable[[Array], str]) -> Any:
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, Curve):
-        value = _with_arrays(replace(value, law=None))  # a function is no result
+        value = _with_arrays(replace(value, law=None))  # a function cannot be archived
     if is_dataclass(value):
-        told = ((f.name, getattr(value, f.name)) for f in fields(value) if _says(value, f))
-        return {IS: type(value).__name__} | {name: _plain(item, place) for name, item in told}
+        items = ((f.name, getattr(value, f.name)) for f in fields(value) if _says(value, f))
+        return {IS: type(value).__name__} | {name: _plain(item, place) for name, item in items}
     if isinstance(value, Mapping):
         return {str(key): _plain(item, place) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -80,18 +80,18 @@ def _plain(value: Any, place: Callable[[Array], str]) -> Any:
 
 
 def _with_arrays(curve: Curve) -> Curve:
-    """A plug-in may have lists where arrays are meant."""
+    """Convert lists to arrays: a plug-in may use lists."""
     listed = {name: v for name, v in vars(curve).items() if isinstance(v, list | tuple)}
     arrays: dict[str, Any] = {name: np.asarray(v, dtype=np.float64) for name, v in listed.items()}
     return replace(curve, **arrays) if arrays else curve
 
 
 def _says(value: Any, field: Field[Any]) -> bool:
-    """Whether a field says something else than its default."""
-    said = getattr(value, field.name)
+    """Whether the value of a field differs from its default."""
+    actual = getattr(value, field.name)
     if field.default is not MISSING:
-        return isinstance(said, np.ndarray) or bool(said != field.default)
-    return field.default_factory is MISSING or bool(said)
+        return isinstance(actual, np.ndarray) or bool(actual != field.default)
+    return field.default_factory is MISSING or bool(actual)
 
 
 def _made(tree: dict[str, Any], array: Callable[[str], Array]) -> Any:

@@ -16,13 +16,13 @@ from campaign.trial import canonical_json
 HEADER = "run.json"
 PLAN = "plan.jsonl"
 SEALING = "sealed.nxs.part"
-"""The sealed file while it grows."""
+"""The sealed file while it is written."""
 
 _PLANNED = TypeAdapter(list[PlannedTrial])
 
 
 def read_header(folder: Path) -> RunHeader:
-    """The header of a run in progress. Raises ArchiveError when there is none."""
+    """The header of a run in progress. Raises ArchiveError if it is missing or invalid."""
     path = folder / HEADER
     try:
         document = json.loads(read_text(path))
@@ -38,7 +38,7 @@ def header_document(header: RunHeader) -> str:
 
 
 def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
-    """The planned trials, in order. Raises ArchiveError naming the line that is wrong."""
+    """The planned trials, in order. Raises ArchiveError with the number of an invalid line."""
     if (planned := parse_at_once(_PLANNED, text.encode().splitlines())) is not None:
         return tuple(planned)
     trials = []
@@ -51,7 +51,7 @@ def parse_plan(path: Path, text: str) -> tuple[PlannedTrial, ...]:
 
 
 def check_format(path: Path, version: int) -> None:
-    """ArchiveError when the archive is of another format than this program's."""
+    """Raise ArchiveError if the archive format is not that of this program."""
     if version != FORMAT:
         raise ArchiveError(
             f"{path}: has format {version}, and this program reads format {FORMAT} alone; read it "
@@ -60,7 +60,7 @@ def check_format(path: Path, version: int) -> None:
 
 
 def first_line(error: Exception) -> str:
-    """What went wrong in a line; for pydantic the first field and its problem."""
+    """Reason of an error in one line; for pydantic the first field and its problem."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False)[0]
         return f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
@@ -68,7 +68,7 @@ def first_line(error: Exception) -> str:
 
 
 def read_text(path: Path) -> str:
-    """One of the files, whole. Raises ArchiveError when there is none, or it is no text."""
+    """Read one of the files. Raises ArchiveError if it is unreadable or not UTF-8."""
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:

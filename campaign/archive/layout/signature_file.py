@@ -1,4 +1,4 @@
-"""The file beside a sealed run that has its signature: `RUN.nxs.sig`."""
+"""The file with the signature of a sealed run, beside it: `RUN.nxs.sig`."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from campaign.archive.layout.files import PART, sync_folder, why, write_atomical
 from campaign.errors import ArchiveError, UsageError
 
 LARGEST = 1 << 14
-"""bytes that are read of a signature; one by an RSA key of 16384 bits has a third of it."""
+"""Largest size of a signature (bytes); one by an RSA key of 16384 bits has a third of it."""
 
 
 def signature_path(sealed: Path) -> Path:
-    """Where the signature of a sealed run lies."""
+    """Path of the signature of a sealed run."""
     return sealed.with_name(f"{sealed.name}.sig")
 
 
 def has_signature(sealed: Path) -> bool:
-    """Whether there is something of that name, be it a link to nowhere."""
+    """Whether the signature path exists, even as a broken link."""
     return os.path.lexists(signature_path(sealed))
 
 
 def read_signature(sealed: Path) -> str:
-    """The signature's text. Raises ArchiveError when there is none, or no file of its size."""
+    """The signature's text. Raises ArchiveError if it is missing, not a file, or too large."""
     path = signature_path(sealed)
     try:
-        # Not blocking: a pipe of that name would be waited for.
+        # Non-blocking: opening a pipe of that name would wait.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         with os.fdopen(descriptor, "rb") as file:
             regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
@@ -45,10 +45,10 @@ def read_signature(sealed: Path) -> str:
 
 
 def write_signature(sealed: Path, text: str) -> Path:
-    """Put the signature beside its run, whole or not at all; returns its path.
+    """Write the signature beside its run, completely or not at all; return its path.
 
-    The caller holds the run's lock. Raises UsageError when there is one, and ArchiveError when it
-    cannot be written.
+    The caller holds the run's lock. Raises UsageError if a signature exists, ArchiveError if the
+    write fails.
     """
     path = signature_path(sealed)
     if has_signature(sealed):
@@ -63,11 +63,11 @@ def write_signature(sealed: Path, text: str) -> Path:
 
 
 def set_aside_signature(sealed: Path, label: str = "before-resume") -> Path | None:
-    """Give the signature of what `sealed` was a free name such as `RUN.nxs.sig.before-resume-1`.
+    """Rename the old signature of `sealed` to a free name such as `RUN.nxs.sig.before-resume-1`.
 
-    Nothing is removed, and where there is none nothing happens. The caller holds the run's lock. A
-    resume calls this once the sealed file is gone: until then its signature belongs beside it. A
-    crash in between leaves a signature of no run, which the next resume sets aside. Raises OSError.
+    Does nothing without a signature. The caller holds the run's lock. A resume calls this after the
+    sealed file is gone: until then the signature belongs beside it. A crash in between leaves a
+    signature without a run, which the next resume renames. Raises OSError.
     """
     if not has_signature(sealed):
         return None

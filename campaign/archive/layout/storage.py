@@ -1,4 +1,4 @@
-"""How values are stored: sample types, chunks, compression, texts, digests."""
+"""Storage of values: sample types, chunks, compression, texts, digests."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from campaign.archive.layout.checksums import BLOCK
 Array = NDArray[np.float64]
 
 CHUNK = BLOCK
-"""Samples per chunk, as many as a block of `checksums` has. A power of two (see `preview`); deflate
-looks back 32 768 bytes, which is a byte of each of so many samples: shorter chunks compress worse,
+"""Samples per chunk, equal to a block of `checksums`. A power of two (see `preview`). The window of
+deflate is 32 768 bytes: one byte of each of 32 768 shuffled samples. Shorter chunks compress worse,
 longer ones hardly better."""
 
 CHECKSUM = "sha256"
 """Attribute of every text and number: SHA-256 of its raw bytes, little endian (text: UTF-8).
-Samples have theirs in their trial's record."""
+The digests of samples are in the record of their trial."""
 
 SAMPLE = np.dtype("<f8")
 
 LARGEST_CHUNK = 1 << 22
-"""Samples of a chunk that a reader accepts."""
+"""Largest chunk that a reader accepts (samples)."""
 
 LEVEL = 3  # ISA-L's highest: twice the time of level 1, and up to half the size
 
 
-_TRIED = 4096  # samples on which both ways of storing a series are tried ...
-_DIFFER = 1024  # ... unless so many of them all differ, as those of no converter do
+_TRIED = 4096  # samples for a trial of both storage forms ...
+_DIFFER = 1024  # ... unless this number of samples are all distinct, so not from a converter
 
 
 def storable(text: str) -> str:
-    """A text as it can be stored: zeros pad one there, so none can be part of it."""
+    """A text with NUL characters replaced, because NUL pads a stored text."""
     return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 
 def pack(samples: Array, shuffled: bool) -> bytes:
-    """A chunk as HDF5's deflate filter would leave it, behind its shuffle filter or without."""
+    """Compress a chunk to the output format of HDF5's deflate filter, with or without shuffle."""
     raw = samples.view(np.uint8)
     raw = raw.reshape(-1, samples.itemsize).T if shuffled else raw
     packed: bytes = isal_zlib.compress(raw.tobytes(), LEVEL)
@@ -45,22 +45,22 @@ def pack(samples: Array, shuffled: bool) -> bytes:
 
 
 def shuffling_helps(samples: Array) -> bool:
-    """Whether samples are better stored with all first bytes first, then all second ones ...
+    """Whether samples compress better shuffled: all first bytes, then all second bytes ...
 
-    They are, but for those of a converter: few values, each of which comes again and again whole.
-    Looks at the beginning of `samples`, shape (n,).
+    True except for samples of a converter, which repeat few values. Examines the beginning of
+    `samples`, shape (n,).
     """
-    told = samples[:_DIFFER]
-    if len(np.unique(told)) == len(told):
+    first = samples[:_DIFFER]
+    if len(np.unique(first)) == len(first):
         return True
     tried = samples[:_TRIED]
     return len(pack(tried, shuffled=True)) <= len(pack(tried, shuffled=False))
 
 
 def unpack(packed: bytes, count: int, shuffled: bool) -> Array | None:
-    """The `count` samples of a chunk that `pack` made; None when it holds something else.
+    """The `count` samples of a chunk from `pack`; None if it holds anything else.
 
-    No more memory is taken than so many samples need, whatever the chunk would expand to.
+    Memory is limited to the size of these samples, even if the chunk would expand to more.
     """
     size = count * SAMPLE.itemsize
     inflating = isal_zlib.decompressobj()

@@ -1,1 +1,1 @@
-"""Reading archives that nobody vouches for: what is damaged is named, the rest is there."""
+"""Reading untrusted archives: damaged items are reported, the others are available."""

@@ -1,7 +1,7 @@
 """Metrics of single recordings, measured after the trial and kept in the journal.
 
-A trial is archived first, so nothing that goes wrong while it is measured costs its recording, not
-even a program that crashes. The line of the journal names the record of the trial by its digest.
+A trial is archived before it is measured: no error or crash of the measurement loses a recording.
+The line of the journal refers to the record of the trial by its digest.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from campaign.estimate import Estimate
 
 @dataclass(frozen=True)
 class ArchivedMetrics:
-    """What was found.
+    """Metrics of one recording.
 
     Attributes:
-        estimates: each finite, and of another name than the others.
-        by: which code measured them, with its version.
-        problem: why there are none, in one line; empty when there are, or when nobody looked.
+        estimates: finite, with distinct names.
+        by: the code that measured them, with its version.
+        problem: reason why there are none, in one line; empty if measured, or not attempted.
     """
 
     estimates: tuple[Estimate, ...] = ()
@@ -31,11 +31,11 @@ class ArchivedMetrics:
 
 
 Measure = Callable[[ArchivedTrial], ArchivedMetrics]
-"""Measures a trial that is archived. Raises nothing."""
+"""Measures an archived trial. Raises nothing."""
 
 
 def trial_measured(at: str, finished: TrialFinished, found: ArchivedMetrics) -> TrialMeasured:
-    """The line of the journal for what was found of a trial."""
+    """The line of the journal for the metrics of a trial."""
     return TrialMeasured.model_validate(
         {
             "at": at,
@@ -49,12 +49,12 @@ def trial_measured(at: str, finished: TrialFinished, found: ArchivedMetrics) -> 
 
 
 def measured_in(entries: Iterable[Entry]) -> dict[str, TrialMeasured]:
-    """What the lines of a journal say was measured, by the digest of the trial's record."""
+    """The metrics in lines of a journal, by the digest of the trial's record."""
     return {entry.record: entry for entry in entries if isinstance(entry, TrialMeasured)}
 
 
 def with_metrics(archived: ArchivedTrial, told: TrialMeasured | None) -> ArchivedTrial:
-    """A trial with what was measured of it, if anything was."""
+    """The trial with its metrics, if any."""
     if told is None:
         return archived
     estimates = (*archived.estimates, *told.estimates)

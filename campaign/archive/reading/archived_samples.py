@@ -28,15 +28,15 @@ PLOTTED = ("data", "preview")
 
 
 _Open = Callable[[str, str, int, str], Series]
-"""Finds a series of an open trial: group, name, length and unit, which must be what is there."""
+"""Opens a series of a trial by group, name, length and unit; length and unit must match."""
 
 
 @dataclass(frozen=True)
 class RecordedSamples:
-    """What a trial recorded: a group of a sealed run, and the record that vouches for it.
+    """Samples of a trial: a group of a sealed run, and the record with its digests.
 
     Attributes:
-        not_kept: why the samples are not there, and were not lost; empty when they are.
+        not_kept: reason why the samples were left out on purpose; empty if they are present.
     """
 
     path: Path
@@ -45,7 +45,7 @@ class RecordedSamples:
     not_kept: str = ""
 
     def recording(self, ending: Ending) -> Recording:
-        """Events and times, and each channel when it is asked for."""
+        """Recording with events and times; channels are read on access. Raises ArchiveError."""
         events = tuple(Event(event.time, event.text) for event in self.record.events)
         if self.record.samples is None:
             return Recording(np.empty(0), {}, events, ending)
@@ -61,16 +61,16 @@ class RecordedSamples:
         return self.record.series
 
     def digests(self) -> Mapping[str, str]:
-        told = {channel.name: channel.sha256 for channel in self.record.channels}
-        return {TIME.name: self.record.time, **told}
+        channels = {channel.name: channel.sha256 for channel in self.record.channels}
+        return {TIME.name: self.record.time, **channels}
 
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
-        """Channels, read now, one after another. Raises ArchiveError."""
+        """Read the channels, one after another. Raises ArchiveError."""
         length = self.record.samples or 0
         with self.opened() as series:
-            for told in channels:
-                samples = series("data", told.name, length, told.unit).read(told.sha256)
-                yield told.info.with_samples(samples)
+            for entry in channels:
+                samples = series("data", entry.name, length, entry.unit).read(entry.sha256)
+                yield entry.info.with_samples(samples)
 
     def problems(self) -> Iterator[str]:
         if self.record.samples is None or self.not_kept:
@@ -93,26 +93,26 @@ class RecordedSamples:
 
     @contextmanager
     def opened(self) -> Iterator[_Open]:
-        """The trial's series, while its file is open."""
+        """Open the file of the trial; yields the function that opens its series."""
         with safe_hdf5.open_file(self.path) as file, safe_hdf5.guarded(self.path, f"/{self.entry}"):
             entry = safe_hdf5.inner_group(file, self.entry)
             inner = cache(partial(safe_hdf5.inner_group, entry))
 
             def series(group: str, name: str, length: int, unit: str) -> Series:
                 with safe_hdf5.guarded(self.path, f"/{self.entry}/{group}/{name}"):
-                    dataset, found = series_at(inner(group), name, length)
+                    dataset, samples = series_at(inner(group), name, length)
                     safe_hdf5.check_attribute(dataset, "units", unit)
-                    return found
+                    return samples
 
             yield series
 
 
 @dataclass(frozen=True)
 class PackedSamples(RecordedSamples):
-    """The same of a trial's own file, in the folder of a run in progress.
+    """Samples in a trial's own file, in the folder of a run in progress.
 
     Attributes:
-        sealed_as: the group that the trial becomes when its run is sealed.
+        sealed_as: group of the trial after its run is sealed.
     """
 
     sealed_as: str = ""
@@ -122,17 +122,17 @@ class PackedSamples(RecordedSamples):
         """See `RecordedSamples`."""
         sealed = self.path.parent.with_suffix(SEALED)
         if self.sealed_as and not self.path.exists() and sealed.is_file():  # since it was opened
-            with RecordedSamples(sealed, self.sealed_as, self.record).opened() as there:
-                yield there
+            with RecordedSamples(sealed, self.sealed_as, self.record).opened() as sealed_series:
+                yield sealed_series
             return
         packed = read_packed(self.path, self.entry)
         with safe_hdf5.guarded(self.path), self.path.open("rb") as file:
 
             def series(group: str, name: str, length: int, _: str) -> Series:
                 place = f"{self.path}: /{self.entry}/{group}/{name}"
-                for told in packed.groups.get(group, ()):
-                    if told.name == name:
-                        return file_series(file, place, length, told)
+                for entry in packed.groups.get(group, ()):
+                    if entry.name == name:
+                        return file_series(file, place, length, entry)
                 raise ArchiveError(f"{place}: is missing")
 
             yield series
@@ -140,10 +140,10 @@ class PackedSamples(RecordedSamples):
 
 @dataclass(frozen=True)
 class MemorySamples(PackedSamples):
-    """The same of a trial that has just ended, which need not be read from its file.
+    """Samples in memory of a trial that has just ended.
 
     Attributes:
-        rows: time and every channel as they were written, shape (1 + channels, n).
+        rows: time and every channel as written, shape (1 + channels, n).
     """
 
     rows: Array = field(kw_only=True, repr=False)
@@ -152,14 +152,14 @@ class MemorySamples(PackedSamples):
         return np.array(self.rows[0])
 
     def read(self, channels: Iterable[SeriesRecord]) -> Iterator[Channel]:
-        """From memory."""
-        places = {told.name: place for place, told in enumerate(self.record.channels, 1)}
-        for told in channels:
-            yield told.info.with_samples(self.rows[places[told.name]].copy())
+        """Copy the channels from memory."""
+        places = {entry.name: place for place, entry in enumerate(self.record.channels, 1)}
+        for entry in channels:
+            yield entry.info.with_samples(self.rows[places[entry.name]].copy())
 
 
 class _Named(Protocol):
-    """What an archive says of a channel besides its samples."""
+    """Metadata of an archived channel."""
 
     @property
     def name(self) -> str: ...
@@ -169,9 +169,9 @@ _Told = TypeVar("_Told", bound=_Named)
 
 
 class LazyChannels(Mapping[str, Channel], Generic[_Told]):
-    """Channels by name; the samples of each are read once, when it is first asked for.
+    """Channels by name; the samples of each are read once, on first access.
 
-    `read` reads those that it is handed, one after another; it raises ArchiveError.
+    `read` reads the given channels, one after another; it raises ArchiveError.
     """
 
     def __init__(
@@ -195,8 +195,8 @@ class LazyChannels(Mapping[str, Channel], Generic[_Told]):
         return super().items()
 
     def _read_all(self) -> None:
-        """Whatever is left, the file being opened once."""
-        left = [told for name, told in self._told.items() if name not in self._read]
+        """Read the remaining channels; opens the file once."""
+        left = [entry for name, entry in self._told.items() if name not in self._read]
         if left:
             self._read |= {channel.name: channel for channel in self._read_from(left)}
 
@@ -211,7 +211,7 @@ class LazyChannels(Mapping[str, Channel], Generic[_Told]):
 
 
 def archived_trial(samples: RecordedSamples, trees: Trees) -> ArchivedTrial:
-    """The trial of a record. Raises ArchiveError when it is not whole."""
+    """The trial of a record. Raises ArchiveError if a part of it is missing or invalid."""
     place = f"{samples.path}: /{samples.entry}"
     try:
         trial = samples.record.restored(trees)
@@ -223,7 +223,7 @@ def archived_trial(samples: RecordedSamples, trees: Trees) -> ArchivedTrial:
 
 
 def trial_of_record(trial: Trial, samples: RecordedSamples) -> ArchivedTrial:
-    """A trial that is at hand, with what its record says and vouches for."""
+    """An archived trial from a parsed trial and its record."""
     record = samples.record
     return ArchivedTrial(
         trial=trial,

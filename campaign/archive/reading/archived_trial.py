@@ -13,38 +13,38 @@ from campaign.trial import Trial
 
 
 class Samples(Protocol):
-    """What a trial recorded, as one format of archives keeps it."""
+    """Samples of a trial in one archive format."""
 
     @property
     def not_kept(self) -> str:
-        """Why the samples are not there, and were not lost; empty when they are."""
+        """Reason why the samples were left out on purpose; empty if they are present."""
 
     def recording(self, ending: Ending) -> Recording:
-        """The samples, SI. Raises ArchiveError when one fails its checksum."""
+        """The samples, SI. Raises ArchiveError if a series fails its checksum."""
 
     def channels(self) -> tuple[ChannelInfo, ...]:
-        """What was announced. Raises ArchiveError."""
+        """The announced channels. Raises ArchiveError."""
 
     def digests(self) -> Mapping[str, str]:
-        """SHA-256 of every series as it was recorded, by name, also where it was not kept."""
+        """SHA-256 of every recorded series, by name, even if its samples were not kept."""
 
     def problems(self) -> Iterator[str]:
-        """What is damaged, by trial and channel; reads every sample in flat memory."""
+        """Damage by trial and channel; reads every sample, in constant memory."""
 
 
 @dataclass(frozen=True)
 class ArchivedTrial:
-    """A trial in an archive; what an analysis calls `TrialData`.
+    """A trial in an archive; analyses use it as `TrialData`.
 
     Attributes:
-        trial: as it was executed.
+        trial: the trial as executed.
         ending: how it ended and why.
         started, ended: ISO 8601.
-        path: the file it lies in: the sealed run, or its own while the run is in progress.
-        entry: its group there.
-        windows: parts that its analysis uses, where they are not the one in `trial`.
-        estimates: what was found while it was executed.
-        measured_by: which code found that, with its version.
+        path: its file: the sealed run, or its own file while the run is in progress.
+        entry: its group in the file.
+        windows: parts that its analysis uses, if not the window in `trial`.
+        estimates: metrics measured during the run.
+        measured_by: the code that measured them, with its version.
     """
 
     trial: Trial
@@ -60,18 +60,18 @@ class ArchivedTrial:
 
     @property
     def not_kept(self) -> str:
-        """Why it has no samples though it recorded some; empty when it has."""
+        """Reason why its samples were left out on purpose; empty if they are present."""
         return self.samples.not_kept
 
     def recording(self) -> Recording:
-        """The samples, SI. Raises ArchiveError when something of them is not what was archived.
+        """The samples, SI. Raises ArchiveError if they differ from the archived ones.
 
-        A channel may be read only when it is asked for, and raise that error then.
+        A channel may be read only on access, and raises this error then.
         """
         return self.samples.recording(self.ending)
 
     def channels(self) -> tuple[ChannelInfo, ...]:
-        """What was announced, without its samples; nothing when the trial did not come to that."""
+        """The announced channels, without samples; empty if the trial ended before that."""
         return self.samples.channels()
 
     def channel_names(self) -> frozenset[str]:
@@ -79,16 +79,16 @@ class ArchivedTrial:
         return frozenset(channel.name for channel in self.channels())
 
     def digests(self) -> Mapping[str, str]:
-        """SHA-256 of times and channels as they were recorded, also where they were not kept."""
+        """SHA-256 of recorded times and channels, even if their samples were not kept."""
         return self.samples.digests()
 
     def unmeasured(self) -> ArchivedTrial:
-        """The same trial as if nothing had been measured while it was executed.
+        """The trial without its metrics.
 
-        One without samples cannot be measured again, and stays as it is.
+        A trial without samples stays unchanged: it cannot be measured again.
         """
         return self if self.not_kept else replace(self, estimates=(), measured_by="")
 
     def problems(self) -> Iterator[str]:
-        """Reads every sample in flat memory; what is damaged, by trial and channel."""
+        """Damage by trial and channel; reads every sample, in constant memory."""
         return self.samples.problems()

@@ -19,15 +19,15 @@ _FILE = re.compile(r"trial-(\d{5,10})(?:-(\d{1,6}))?\.(?:trial|nxs)")
 
 @dataclass(frozen=True)
 class Damage:
-    """Something of a run that cannot be read, or is not what it ought to be.
+    """An item of a run that is unreadable or wrong.
 
     Attributes:
         place: in the archive, e.g. `/trial_00002/data/gyro_rate`, `journal.jsonl:3` or
             `trial-00002.trial`; empty for the file as a whole.
-        reason: what is wrong there, in a line.
-        trial: the trial's name, e.g. `trial-00002`; an earlier attempt at it is
-            `trial-00002 (attempt 1)`. Empty when it is not one trial's.
-        channel: the channel's name, when it is its samples.
+        reason: the problem, in one line.
+        trial: the trial's name, e.g. `trial-00002`, or `trial-00002 (attempt 1)` for an earlier
+            attempt. Empty if the damage is not of one trial.
+        channel: the channel's name, if its samples are damaged.
     """
 
     place: str
@@ -40,7 +40,7 @@ class Damage:
 
     @classmethod
     def at(cls, place: str, reason: str) -> Self:
-        """Damage at a place in the archive, which says what trial and channel it belongs to."""
+        """Damage at a place in the archive; trial and channel follow from the place."""
         match = _ENTRY.search(place) or _FILE.search(place)
         if match is None:
             return cls(place, reason)
@@ -50,16 +50,16 @@ class Damage:
 
     @classmethod
     def of(cls, path: Path, error: ArchiveError) -> Self:
-        """Damage as an error tells of it: `file: /place/in/it: what is wrong`.
+        """Damage from an error with a message like `file: /place/in/it: what is wrong`.
 
         Args:
             path: the sealed file, or the folder of a run in progress.
-            error: met while reading there.
+            error: raised while reading it.
         """
-        told = str(error)
-        if not told.startswith(str(path)):
-            return cls("", told)
-        file, _, what = told.removeprefix(str(path)).lstrip("/").partition(": ")
+        text = str(error)
+        if not text.startswith(str(path)):
+            return cls("", text)
+        file, _, what = text.removeprefix(str(path)).lstrip("/").partition(": ")
         inner = ""
         if what.startswith("/") and ": " in what:
             inner, _, what = what.partition(": ")
@@ -67,7 +67,7 @@ class Damage:
 
 
 class DamageList:
-    """Collects damage while a run at `path` is read."""
+    """List of the damage found while reading the run at `path`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -77,11 +77,11 @@ class DamageList:
         self.found.append(Damage.at(place, reason))
 
     def note(self, error: ArchiveError) -> None:
-        """What an error tells of."""
+        """Add the damage that an error reports."""
         self.found.append(Damage.of(self.path, error))
 
     def read(self, what: Callable[[], _Read], instead: _Read) -> _Read:
-        """What `what` reads, or `instead` when that is damaged, which is noted."""
+        """Result of `what`; if it raises ArchiveError, note the damage and return `instead`."""
         try:
             return what()
         except ArchiveError as error:
@@ -90,7 +90,7 @@ class DamageList:
 
     @contextlib.contextmanager
     def noting(self) -> Iterator[None]:
-        """What cannot be read inside is noted, and reading goes on behind the block."""
+        """Note an ArchiveError raised in the block; execution continues after the block."""
         try:
             yield
         except ArchiveError as error:

@@ -1,4 +1,4 @@
-"""Reading the folder of a run in progress, or of one that was killed."""
+"""Reading the folder of a run in progress, or of a killed run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from campaign.recording import SafeState
 
 
 def open_folder(folder: Path) -> RunReader:
-    """The run of a folder, as far as its journal tells. Raises ArchiveError when it is none."""
+    """The run of a folder, from its journal. Raises ArchiveError if it is not a run's folder."""
     if folder.suffix != PARTIAL:
         raise ArchiveError(f"{folder}: is a folder, but not that of a run in progress")
     header = read_header(folder)
@@ -61,15 +61,15 @@ def open_folder(folder: Path) -> RunReader:
         story=story,
         full_plan=FullPlan(folder, partial(_plan_texts, folder), stages),
         damaged=tuple(damaged.found),
-        earlier_attempts={number: tuple(found) for number, found in earlier.items()},
+        earlier_attempts={number: tuple(tries) for number, tries in earlier.items()},
         stages=stages,
     )
 
 
 def read_trial_file(path: Path, finished: TrialFinished, sealed_as: str = "") -> ArchivedTrial:
-    """The trial in a file of its own, which must be the one that the journal tells of.
+    """The trial in its own file; its record must match the journal. Raises ArchiveError.
 
-    `sealed_as` is the group that it becomes when the run is sealed.
+    `sealed_as` is its group after the run is sealed.
     """
     from campaign.archive.reading.archived_samples import PackedSamples, archived_trial
     from campaign.archive.reading.packed_trial_reader import packed_record, read_packed

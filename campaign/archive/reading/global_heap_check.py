@@ -1,7 +1,7 @@
 """Check of HDF5's global heaps, which have no checksum, before HDF5 reads them.
 
-Texts of attributes lie in global heap collections (`GCOL`). HDF5 walks through the objects of one
-by their sizes; where damage made the size of the free space zero, it walks on the spot for ever.
+Texts of attributes are stored in global heap collections (`GCOL`). HDF5 steps through the objects
+of a collection by their sizes. If damage sets the size of the free space to zero, it never ends.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import BinaryIO
 
 _HEAD = b"GCOL\x01\x00\x00\x00"
-_HEADER = 16  # bytes, of a collection as well as of an object in it
+_HEADER = 16  # bytes, of a collection and of an object in it
 _BLOCK = 1 << 20
 
 
 Looked = tuple[Path, int, int]
-"""A file as it was looked at: its path, size (bytes) and time of change (ns)."""
+"""State of a checked file: path, size (bytes), time of change (ns)."""
 _known: dict[Looked, bool] = {}
 
 
 def heaps_are_sound(path: Path) -> bool:
-    """Whether HDF5 gets through every heap of the file; read once while the file is the same."""
+    """Whether HDF5 can read every heap of the file; checked once while the file is unchanged."""
     stat = path.stat()
     looked = path, stat.st_size, stat.st_mtime_ns
     if looked not in _known:
@@ -30,12 +30,12 @@ def heaps_are_sound(path: Path) -> bool:
 
 
 def known_heaps() -> dict[Looked, bool]:
-    """What this process knows of files, to be told another, which then reads none of them anew."""
+    """Results of this process, for another process, which then does not repeat the checks."""
     return dict(_known)
 
 
 def add_known_heaps(known: Mapping[Looked, bool]) -> None:
-    """What another process knows of files that are still the same."""
+    """Add the results of another process."""
     _known.update(known)
 
 
@@ -45,7 +45,7 @@ def _sound(path: Path, size: int) -> bool:
 
 
 def _collections(file: BinaryIO) -> Iterator[int]:
-    """Where in the file a collection begins, found block by block so that memory stays flat."""
+    """Offsets of the collections in the file; reads by blocks, in constant memory."""
     before, tail = 0, b""
     while block := file.read(_BLOCK):
         content = tail + block
@@ -74,7 +74,7 @@ def _collection_ends(file: BinaryIO, start: int, size: int) -> bool:
 
 
 def _numbers(file: BinaryIO, place: int) -> tuple[int, int]:
-    """The two 64-bit numbers of a header; of an object the first begins with its index."""
+    """The two 64-bit numbers of a header; the low 16 bits of an object's first are its index."""
     file.seek(place)
     head = file.read(_HEADER).ljust(_HEADER, b"\0")
     return int.from_bytes(head[:8], "little"), int.from_bytes(head[8:], "little")

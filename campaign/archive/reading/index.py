@@ -1,7 +1,7 @@
 """Cache of run summaries of a folder, so that listing opens no archive.
 
-A hidden file in the results folder that may be deleted at any time: whatever it does not have, or
-has of a file of another size or time, is read from the run itself. Nothing but listings uses it.
+A hidden file in the results folder that may be deleted at any time. A run that it lacks, or whose
+size or time of change differs, is read itself. Only listings use it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from campaign.archive.reading.summary import RunSummary, summarise
 
 INDEX = ".campaign-index.json"
 _VERSION = 3
-_LARGEST = 1 << 26  # bytes; an index of ten thousand runs has a tenth of it
+_LARGEST = 1 << 26  # bytes; an index of ten thousand runs has a tenth of this size
 
 _TEXTS = ("name", "created", "ended", "title", "protocol", "backend", "operator", "problem")
 _COUNTS = ("bytes", "planned", "trials", "failed", "interrupted", "untold")
@@ -28,7 +28,7 @@ _LISTS = ("tests", "benches", "tags")
 
 
 class Index:
-    """Summaries by file name, each with what its file was like when it was read."""
+    """Summaries by file name, each with sizes and times of its files when read."""
 
     def __init__(self, results: Path, known: dict[str, Any]) -> None:
         self._results = results
@@ -37,7 +37,7 @@ class Index:
 
     @classmethod
     def load(cls, results: Path) -> Self:
-        """The index of `results`; an empty one when there is none or it cannot be used."""
+        """The index of `results`; empty if there is none or it is unusable."""
         path = results / INDEX
         try:
             if path.stat().st_size > _LARGEST:
@@ -49,24 +49,24 @@ class Index:
         return cls(results, known if isinstance(known, dict) else {})
 
     def summary(self, path: Path) -> RunSummary:
-        """The run at `path` at a glance, from the index where that has it as it is now."""
+        """Summary of the run at `path`, from the index if the run is unchanged."""
         try:
             stamp = _stamp(path)
         except OSError:
             return summarise(path)
-        found = _restored(path, stamp, self._known.get(path.name))
-        if found is None:
-            found = summarise(path)
-        if not found.problem:  # what could not be read may be readable by now
-            self._used[path.name] = {"stamp": stamp, "summary": _described(found)}
+        summary = _restored(path, stamp, self._known.get(path.name))
+        if summary is None:
+            summary = summarise(path)
+        if not summary.problem:  # what could not be read may be readable by now
+            self._used[path.name] = {"stamp": stamp, "summary": _described(summary)}
         if path.is_dir():  # the files of trials that are being written grow
             with contextlib.suppress(OSError):
                 size = sum(file.stat().st_size for file in path.iterdir())
-                found = replace(found, bytes=size)
-        return found
+                summary = replace(summary, bytes=size)
+        return summary
 
     def save(self) -> None:
-        """Write it, if anything changed and that is possible; else the next listing is slower."""
+        """Write the index if it changed; errors are ignored and make the next listing slower."""
         if self._used == self._known:
             return
         path = self._results / INDEX
@@ -81,14 +81,14 @@ class Index:
 
 
 def _version() -> list[Any]:
-    """A newer program may read what this one cannot, so it makes its own index."""
+    """Version of the index and of the program: each program version has its own index."""
     from campaign import __version__
 
     return [_VERSION, __version__]
 
 
 def _stamp(path: Path) -> list[int]:
-    """What changes whenever the run does; of a folder, also of the files that tell about it."""
+    """Sizes and times that change with the run; for a folder, also of journal and header."""
     files = [path, path / JOURNAL, path / HEADER] if path.is_dir() else [path]
     stats = [file.stat() for file in files if file.exists()]
     return [number for stat in stats for number in (stat.st_size, stat.st_mtime_ns)]
@@ -101,7 +101,7 @@ def _described(summary: RunSummary) -> dict[str, Any]:
 
 
 def _restored(path: Path, stamp: list[int], entry: object) -> RunSummary | None:
-    """A summary from the index; None when it is of something else, or damaged."""
+    """A summary from the index; None if it is outdated or damaged."""
     if not isinstance(entry, dict) or entry.get("stamp") != stamp:
         return None
     tree = entry.get("summary")

@@ -1,4 +1,4 @@
-"""The executed trials of a run, each parsed when it is asked for."""
+"""The executed trials of a run, each parsed on access."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from campaign.recording import Outcome
 
 
 class Outline(NamedTuple):
-    """What stays of a trial that was parsed and let go of."""
+    """Short description of a trial, kept in place of the parsed trial."""
 
     number: int
     test: str
@@ -23,14 +23,14 @@ class Outline(NamedTuple):
 
     @classmethod
     def of(cls, archived: ArchivedTrial) -> Self:
-        """Of a trial; equal texts are kept once."""
+        """Outline of a trial; equal texts share memory."""
         trial, ending = archived.trial, archived.ending
         test, kind, label = intern(trial.test), intern(trial.kind), intern(trial.label)
         return cls(trial.number, test, kind, label, ending.outcome, intern(ending.reason))
 
 
 class LazyTrials(Sequence[ArchivedTrial]):
-    """Trials that are parsed when they are asked for, and kept as long as somebody holds them."""
+    """Trials that are parsed on access, and cached while referenced elsewhere."""
 
     def __init__(
         self,
@@ -38,13 +38,13 @@ class LazyTrials(Sequence[ArchivedTrial]):
         read: Callable[[int], ArchivedTrial],
         parsed: WeakValueDictionary[int, ArchivedTrial] | None = None,
     ) -> None:
-        """`read` parses the trial of a number; `parsed` are those that somebody holds."""
+        """`read` parses the trial of a number; `parsed` is the cache of referenced trials."""
         self.outlines = outlines
         self._read = read
         self._parsed = WeakValueDictionary() if parsed is None else parsed
 
     def of(self, test: str) -> LazyTrials:
-        """Those of one test."""
+        """The trials of one test."""
         wanted = [outline for outline in self.outlines if outline.test == test]
         return LazyTrials(wanted, self._read, self._parsed)
 
@@ -52,7 +52,7 @@ class LazyTrials(Sequence[ArchivedTrial]):
         return LazyTrials, (self.outlines, self._read)
 
     def __eq__(self, other: object) -> bool:
-        """As a tuple of them."""
+        """Compare as tuples of trials."""
         return isinstance(other, Sequence) and tuple(self) == tuple(other)
 
     __hash__ = None  # type: ignore[assignment]
@@ -68,6 +68,6 @@ class LazyTrials(Sequence[ArchivedTrial]):
         if isinstance(place, slice):
             return LazyTrials(self.outlines[place], self._read, self._parsed)
         number = self.outlines[place].number
-        if (found := self._parsed.get(number)) is None:
-            found = self._parsed[number] = self._read(number)
-        return found
+        if (trial := self._parsed.get(number)) is None:
+            trial = self._parsed[number] = self._read(number)
+        return trial

@@ -1,4 +1,4 @@
-"""Opening a run: a sealed file, or the folder of a run in progress or killed."""
+"""Opening a run: a sealed file, or the folder of a run in progress or of a killed run."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ IMPORT = "; `campaign import` makes one of what other programs recorded"
 def open_run(path: Path) -> RunReader:
     """Open a sealed run, or the folder of a run in progress.
 
-    What is damaged is left out and listed in `damaged`. Raises ArchiveError, naming file and place,
-    when it is no run, or when what it was or how it ended cannot be read.
+    Damaged items are left out and listed in `damaged`. Raises ArchiveError with file and place if
+    it is not a run, or if its identity or its ending is unreadable.
     """
     if path.is_dir():
         return _open_folder(path)
@@ -29,7 +29,7 @@ def open_run(path: Path) -> RunReader:
 
 
 def _open_folder(folder: Path) -> RunReader:
-    """A folder, or what became of it: it may be sealed while it is read."""
+    """Read a folder, or its sealed file if the run is sealed during the reading."""
     sealed = folder.with_suffix(SEALED)
     try:
         run = open_folder(folder)
@@ -43,7 +43,7 @@ def _open_folder(folder: Path) -> RunReader:
 
 
 def read_sealed(path: Path) -> RunReader:
-    """Read a sealed file, whatever its name."""
+    """Read a sealed file of any name."""
     from campaign.archive.reading import sealed_run
 
     check_sealed(path)
@@ -51,7 +51,7 @@ def read_sealed(path: Path) -> RunReader:
 
 
 def read_glance(path: Path) -> Glance:
-    """A sealed file at a glance, without its trials. Raises ArchiveError."""
+    """Summary of a sealed file, without its trials. Raises ArchiveError."""
     from campaign.archive.reading import sealed_run
 
     check_sealed(path)
@@ -59,14 +59,14 @@ def read_glance(path: Path) -> Glance:
 
 
 def check_sealed(path: Path) -> None:
-    """ArchiveError when a file is no sealed run of the format that this program reads."""
+    """Raise ArchiveError if a file is not a sealed run in a format that this program reads."""
     from campaign.archive.reading import safe_hdf5
 
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run/provenance/format"):
         if ENTRY in file and "run" not in file:
             run_path = path.with_name(path.name.removesuffix(ENDING) + SEALED)
-            told = f"; name the run, {run_path}" if run_path.is_file() else ""
-            raise ArchiveError(f"{path}: holds no run but what was found in one{told}")
+            hint = f"; name the run, {run_path}" if run_path.is_file() else ""
+            raise ArchiveError(f"{path}: holds no run but what was found in one{hint}")
         run = safe_hdf5.member(file, "run")
         provenance = safe_hdf5.member(run, "provenance") if run is not None else None
         if provenance is None:

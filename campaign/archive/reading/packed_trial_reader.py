@@ -18,7 +18,7 @@ from campaign.errors import ArchiveError
 
 
 def read_packed(path: Path, entry: str) -> PackedTrial:
-    """A trial's own file. Programs before this one made it an HDF5 file, which holds `entry`.
+    """Read a trial's own file; older programs wrote an HDF5 file with the group `entry`.
 
     Raises ArchiveError.
     """
@@ -44,7 +44,7 @@ def _read(path: Path) -> PackedTrial:
 
 
 def _check_places(path: Path, trial: PackedTrial, end: int) -> None:
-    """ArchiveError unless every chunk has bytes of its own before `end`."""
+    """Raise ArchiveError if chunks overlap, or are not between the file's beginning and `end`."""
     places = sorted(
         place for series in trial.groups.values() for each in series for place in each.chunks
     )
@@ -54,10 +54,10 @@ def _check_places(path: Path, trial: PackedTrial, end: int) -> None:
 
 
 def packed_entry(path: Path, entry: str) -> PackedTrial:
-    """The same of a trial in an HDF5 file: a sealed run, or a file of its own. ArchiveError."""
+    """Read a trial of an HDF5 file: of a sealed run, or a trial's own. Raises ArchiveError."""
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, f"/{entry}"):
-        there = safe_hdf5.inner_group(file, entry)
-        kept = safe_hdf5.inner_group(there, "record")
+        group_of_entry = safe_hdf5.inner_group(file, entry)
+        kept = safe_hdf5.inner_group(group_of_entry, "record")
         trees = safe_hdf5.unchecked_text_at(kept, "trees")
         text = safe_hdf5.unchecked_text_at(kept, "json")
         if "not_kept" in kept:
@@ -65,22 +65,22 @@ def packed_entry(path: Path, entry: str) -> PackedTrial:
             return PackedTrial(record=text, trees=trees, not_kept=not_kept)
         groups: dict[str, tuple[PackedSeries, ...]] = {}
         for group, name, length, _ in series_of(parse_record(path, f"/{entry}/record", text)):
-            data = safe_hdf5.inner_group(there, group)
+            data = safe_hdf5.inner_group(group_of_entry, group)
             dataset, series = series_at(data, name, length)
-            told = PackedSeries(
+            packed_series = PackedSeries(
                 name=name,
                 chunk=series.chunk,
                 shuffled=series.shuffled,
                 chunks=layout_of(dataset),
             )
-            groups[group] = (*groups.get(group, ()), told)
+            groups[group] = (*groups.get(group, ()), packed_series)
         return PackedTrial(record=text, trees=trees, groups=groups)
 
 
 def packed_record(
     path: Path, entry: str, packed: PackedTrial, digest: str
 ) -> tuple[TrialRecord, Trees]:
-    """Record and trees of a trial whose record has the digest. Raises ArchiveError."""
+    """Parse record and trees of a trial. Raises ArchiveError if the record lacks the digest."""
     if text_digest(packed.record) != digest:
         raise ArchiveError(f"{path}: /{entry}/record/json: {MISMATCH}")
     record = parse_record(path, f"/{entry}/record", packed.record)
@@ -95,7 +95,7 @@ def packed_record(
 
 @lru_cache(maxsize=8)
 def _trees(text: str) -> Trees:
-    """Trials one after another mostly have the same bench and options."""
+    """Parse trees; cached, because successive trials usually share bench and options."""
     return parse_trees(text)
 
 

@@ -20,15 +20,15 @@ PROVENANCE = "/run/provenance"
 def read_provenance(
     names: Container[str], text: Callable[[str], str], sources: dict[str, str], damaged: DamageList
 ) -> RunHeader:
-    """What was known before the first trial; a field that cannot be read is noted and left out.
+    """Read the header of a run; an unreadable field is noted and left out.
 
     Args:
-        names: fields that there are.
-        text: reads one. Raises ArchiveError.
+        names: fields in the file.
+        text: reads a field. Raises ArchiveError.
         sources: see `RunHeader.sources`.
-        damaged: what cannot be read.
+        damaged: list to which unreadable fields are added.
 
-    Raises ArchiveError when the name or the start cannot be read: without them it is no run.
+    Raises ArchiveError if a required field (name, start) is unreadable.
     """
     tree: dict[str, Any] = {"sources": sources}
     for name, info in RunHeader.model_fields.items():
@@ -36,8 +36,8 @@ def read_provenance(
             tree[name] = text(name)
         elif name != "sources" and name in names:
             with damaged.noting(), safe_hdf5.guarded(damaged.path, f"{PROVENANCE}/{name}"):
-                told = text(name)
-                tree[name] = told if info.annotation is str else _json(damaged, name, told)
+                content = text(name)
+                tree[name] = content if info.annotation is str else _json(damaged, name, content)
     return _validated(tree, damaged)
 
 

@@ -1,7 +1,7 @@
 """Reading `RUN-results.nxs`: complete and of the run beside it, or not at all.
 
-The file may have been cut, changed or exchanged, so nothing of it is used before the hash of the
-whole file was found right. What made it and what it is of is then for the reader to judge.
+The file may be truncated, changed or exchanged. Nothing of it is used before the hash of the whole
+file is verified. The caller then judges its program version and its run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from campaign.result import Array
 
 
 def is_results_file(path: Path) -> bool:
-    """Whether a file holds results of this program, of whatever run, sound or not."""
+    """Whether a file holds results of this program, of any run, damaged or not."""
     try:
         with safe_hdf5.open_file(path) as file:
             run = safe_hdf5.inner_group(safe_hdf5.inner_group(file, ENTRY), "run")
@@ -32,13 +32,13 @@ def is_results_file(path: Path) -> bool:
 
 
 class OtherLayoutError(ArchiveError):
-    """Sound results of another version of this program."""
+    """Undamaged results in the layout of another version of this program."""
 
 
 def holds_results(path: Path) -> bool | None:
-    """Whether a file holds results in place of a run, of any version; None when it tells neither.
+    """Whether a file holds results (True) or a run (False), of any version; None if unclear.
 
-    Looks at no more than the names at the top of it.
+    Reads only the names of its top level.
     """
     try:
         with safe_hdf5.open_file(path) as file:
@@ -51,25 +51,25 @@ def holds_results(path: Path) -> bool | None:
 
 
 def read_results(path: Path, root: str) -> RunResults:
-    """The results in a file, of the run that `root` stands for.
+    """The results in a file, of the run with the seal digest `root`.
 
-    Raises ArchiveError, which says in one line why they are not used: the file is none, is not
-    whole, was changed, has another layout, or is of another run.
+    Raises ArchiveError with the reason in one line: the file holds no results, is incomplete, was
+    changed, has another layout, or is of another run.
     """
-    found = read_any_results(path)
-    if found.root != root:
+    results = read_any_results(path)
+    if results.root != root:
         raise ArchiveError(
             f"{path}: holds the results of another run, or of this one before it was gone on with: "
-            f"of {found.run}, {found.root[:12]}…, and this is {root[:12]}…"
+            f"of {results.run}, {results.root[:12]}…, and this is {root[:12]}…"
         )
-    return found
+    return results
 
 
 def read_any_results(path: Path) -> RunResults:
-    """The results in a file, of whatever run.
+    """The results in a file, of any run.
 
-    Raises ArchiveError in one line: the file is none, is not whole, was changed, or has another
-    layout (OtherLayoutError).
+    Raises ArchiveError in one line: the file holds no results, is incomplete, was changed, or has
+    another layout (OtherLayoutError).
     """
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, f"/{ENTRY}"):
         if ENTRY not in safe_hdf5.names(file):

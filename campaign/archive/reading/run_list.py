@@ -21,7 +21,7 @@ _DATED = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}-\d{2}-\d{2}-")
 def list_runs(results: Path) -> list[RunSummary]:
     """Every run in `results`, oldest first; a bad file is listed with its problem.
 
-    Runs that are as they were when they were listed last are not opened: see `index`.
+    Runs that are unchanged since the last listing are not opened: see `index`.
     """
     index = Index.load(results)
     runs = [index.summary(path) for path in run_paths(results)]
@@ -32,28 +32,28 @@ def list_runs(results: Path) -> list[RunSummary]:
 def run_paths(results: Path) -> list[Path]:
     """Paths of the runs in `results`, oldest first by name; a sealed run hides its folder.
 
-    Results of a run are none, whether or not that run is beside them. Raises UsageError when there
-    is no such folder.
+    Results files are excluded, with or without their run beside them. Raises UsageError if the
+    folder does not exist or is unreadable.
     """
     try:
-        found = sorted(results.iterdir())
+        entries = sorted(results.iterdir())
     except FileNotFoundError:
-        told = "there is no such folder; name the one that holds the runs; `campaign run` makes one"
-        raise UsageError(f"{results}: {told}") from None
+        hint = "there is no such folder; name the one that holds the runs; `campaign run` makes one"
+        raise UsageError(f"{results}: {hint}") from None
     except OSError as error:
         raise UsageError(f"{results}: cannot be read: {error.strerror}") from None
-    sealed = {path.stem: path for path in found if path.suffix == SEALED and path.is_file()}
-    partial = {path.stem: path for path in found if path.suffix == PARTIAL and path.is_dir()}
+    sealed = {path.stem: path for path in entries if path.suffix == SEALED and path.is_file()}
+    partial = {path.stem: path for path in entries if path.suffix == PARTIAL and path.is_dir()}
     runs = partial | sealed
     order = sorted(runs, key=lambda name: (bool(_DATED.match(name)), name))
     return _without_results([runs[name] for name in order])
 
 
 def _without_results(paths: list[Path]) -> list[Path]:
-    """Those of `paths` that are no results; only what is called as results are is opened.
+    """Those of `paths` that are not results files; opens only files with the name of results.
 
-    A run may be called so, too. What tells nothing of itself counts by its name: as results where
-    a run of that name is beside it.
+    A run may have such a name, too. A file with unclear content counts as results if the run that
+    belongs to its name is beside it.
     """
     if not any(path.name.endswith(ENDING) for path in paths):
         return paths
@@ -73,8 +73,8 @@ def _without_results(paths: list[Path]) -> list[Path]:
 def find_run(results: Path, name: str | None = None) -> Path:
     """The run that a user means: a path, a name, a unique beginning of one, or None for the newest.
 
-    Raises UsageError listing what there is when it is none or several, and for a file that another
-    program recorded.
+    Raises UsageError, with a list of runs, if none or several match, and for a file of another
+    program.
     """
     if name and (path := _as_path(name)):
         _refuse_foreign(path)
@@ -98,17 +98,17 @@ def find_run(results: Path, name: str | None = None) -> Path:
 def find_runs(results: Path, name: str) -> list[Path]:
     """The runs that a user means by a name, a path, or a pattern of either such as `2026-11-*`.
 
-    Raises UsageError when there is none.
+    Raises UsageError if none matches.
     """
     if not any(mark in name for mark in "*?[") or _as_path(name):
         return [find_run(results, name)]
     wanted = Path(name)
     folder = wanted.parent if wanted.parent != Path() else results
     pattern = wanted.name.removesuffix(SEALED).removesuffix(PARTIAL)
-    found = [path for path in run_paths(folder) if fnmatchcase(path.stem, pattern)]
-    if not found:
+    matches = [path for path in run_paths(folder) if fnmatchcase(path.stem, pattern)]
+    if not matches:
         raise UsageError(f"{folder}: there is no run that {name!r} matches")
-    return found
+    return matches
 
 
 def _as_path(name: str) -> Path | None:
@@ -119,14 +119,14 @@ def _as_path(name: str) -> Path | None:
 
 
 def _refuse_foreign(path: Path) -> None:
-    """A file that is not called like a run and does not begin like one."""
+    """Raise UsageError for a file without the suffix of a run that is not HDF5."""
     if path.is_dir() or path.suffix in (SEALED, PART):
         return
     try:
         with path.open("rb") as file:
             begins = file.read(len(_HDF5))
     except OSError:
-        return  # opening the run says so
+        return  # opening the run reports the error
     if begins != _HDF5:
         raise UsageError(
             f"{path}: is not a run. If another program recorded it, `campaign import --guess "

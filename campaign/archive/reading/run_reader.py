@@ -23,8 +23,8 @@ from campaign.trial import Tree, Trial
 
 @dataclass(frozen=True)
 class Glance:
-    """What `campaign list` tells of a sealed run; `planned`, `finished` and `failed` count trials,
-    those that followed included; `failed` without the `interrupted` ones, which somebody stopped.
+    """Facts of a sealed run for `campaign list`. `planned`, `finished` and `failed` count trials,
+    follow-up trials included; `failed` excludes `interrupted` trials, which an operator stopped.
     """
 
     header: RunHeader
@@ -37,37 +37,35 @@ class Glance:
 
 
 def interrupted_trials(status: RunStatus, journal: Callable[[], bytes]) -> int:
-    """How many trials of a sealed run somebody stopped; only where there may be some its journal
-    is read.
-    """
+    """Number of stopped trials of a sealed run; reads the journal only if `status` allows any."""
     if status not in (RunStatus.INTERRUPTED, RunStatus.FAULT):
-        return 0  # the plan was worked through
+        return 0  # the plan was completed
     return read_lines(journal()).interrupted
 
 
 @dataclass(frozen=True)
 class RunReader:
-    """An archived run. Samples are read only when a trial's `recording()` is asked for.
+    """An archived run. Samples are read only through the `recording()` of a trial.
 
     Attributes:
         path: the sealed file, or the folder of a run in progress.
-        header: what was known before the first trial.
-        status, reason, safe_state: how the run ended. An `incomplete` run has no word of its end,
-            and its bench is not known to be safe.
-        ended: ISO 8601; empty when incomplete.
-        plan: every planned trial, executed or not; those that followed come last.
-        trials: the executed ones, in plan order, failed ones included. Of a sealed run each is
-            parsed when it is asked for; `outlines` tells of all of them without that.
-        story: what the journal says, line by line; of a sealed run what was measured is not parsed.
-        full_plan: every planned trial, whole.
-        damaged: what cannot be read, or is not as it was sealed. It is missing from the rest: a
-            trial from `trials`, a line from `plan`, a field of the header is as if it had not been
-            given. Samples are looked at only when they are read, and by `problems`.
-        earlier_attempts: by trial number, the attempts that a later one replaced; no analysis sees
+        header: facts known before the first trial.
+        status, reason, safe_state: how the run ended. The archive of an `incomplete` run does not
+            contain its end; the safe state of its bench is not confirmed.
+        ended: ISO 8601; empty if incomplete.
+        plan: every planned trial, executed or not; follow-up trials come last.
+        trials: the executed trials, in plan order, failed ones included. Trials of a sealed run are
+            parsed on access; `outlines` lists all of them without parsing.
+        story: lines of the journal; for a sealed run without parsed metrics.
+        full_plan: full description of every planned trial.
+        damaged: items that are unreadable or not as sealed. They are missing elsewhere: a trial
+            from `trials`, a line from `plan`; a field of the header has its default. Samples are
+            checked only when read, and by `problems`.
+        earlier_attempts: by trial number, the attempts that a later one replaced; no analysis uses
             them.
-        stages: trials that followed from what others found, as the journal tells; empty before
-            there were stages. The header counts the trials of the plan without them.
-        root: digest of the seal, which binds all of the run: see `checksums`. Empty while the run
+        stages: follow-up trials that depend on earlier results, from the journal; empty in archives
+            older than stages. The header counts the trials of the plan without them.
+        root: digest of the seal, which covers the whole run: see `checksums`. Empty while the run
             is in progress.
     """
 
@@ -108,13 +106,13 @@ class RunReader:
 
     @property
     def outlines(self) -> Iterable[Outline]:
-        """What each of `trials` is and how it ended; no record is parsed for it."""
+        """Identity and ending of each of `trials`, without parsing records."""
         if isinstance(self.trials, LazyTrials):
             return self.trials.outlines
         return map(Outline.of, self.trials)
 
     def executed(self, number: int) -> ArchivedTrial | None:
-        """The executed trial of that number; None where there is none."""
+        """The executed trial of that number, or None."""
         places = (place for place, each in enumerate(self.outlines) if each.number == number)
         return next((self.trials[place] for place in places), None)
 
@@ -124,7 +122,7 @@ class RunReader:
 
     @property
     def journal(self) -> str:
-        """Verbatim."""
+        """The journal, verbatim."""
         return self.story.text
 
     @cached_property
@@ -141,12 +139,12 @@ class RunReader:
 
     @property
     def identity(self) -> str:
-        """The digest that stands for all of the run: `root`, and `sha256` where there is none."""
+        """The digest that identifies the content of the run: `root`, or `sha256` without a seal."""
         return self.root or self.sha256
 
     @contextmanager
     def held_open(self) -> Iterator[None]:
-        """Within the block, this thread reads samples from a file that is opened once."""
+        """Keep the sealed file open in the block, for this thread's reading of samples."""
         if not self.sealed:
             yield
             return
@@ -156,14 +154,14 @@ class RunReader:
             yield
 
     def planned(self, number: int) -> Trial:
-        """The trial `number` of the plan, executed or not, ready to be executed.
+        """The trial `number` of the plan, executed or not, ready for execution.
 
-        Raises ArchiveError when there is none.
+        Raises ArchiveError if there is none.
         """
         return self.full_plan.trial(number)
 
     def unchanged(self) -> bool:
-        """Whether every byte of the sealed file is as it was written (reads it all)."""
+        """Whether every byte of the sealed file is as written (reads the whole file)."""
         from campaign.archive.reading import safe_hdf5
 
         if not self.sealed:
@@ -173,6 +171,6 @@ class RunReader:
         return digest == sha256_of(self.path, place)
 
     def problems(self) -> list[str]:
-        """What is damaged, samples included (reads them all, in flat memory)."""
+        """Damage of the run, samples included (reads all of them, in constant memory)."""
         known = [f"{self.path}: {damage}" for damage in self.damaged]
         return known + [problem for trial in self.trials for problem in trial.problems()]

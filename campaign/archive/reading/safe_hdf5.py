@@ -1,10 +1,10 @@
 """Reading untrusted HDF5 files: checked structure, bounded sizes.
 
-A file may be truncated, damaged or made to do harm. Nothing is followed out of the file (external
-and soft links, external storage, virtual datasets), no filter is loaded from anywhere (only shuffle
-and deflate), only fixed-length text, 64-bit integers and float64 are read (so no object type ever
-is), every size is checked against what is really stored before memory is asked for, and every
-dataset must match its checksum.
+A file may be truncated, damaged or malicious. Nothing outside the file is followed (external and
+soft links, external storage, virtual datasets). No filter is loaded (only shuffle and deflate are
+allowed). Only fixed-length text, 64-bit integers and float64 are read, never an object type. Every
+size is compared with the stored bytes before memory is allocated. Every dataset must match its
+checksum.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _LARGEST_ATTRIBUTE = 1 << 16  # bytes
 _TEXT = h5py.string_dtype()
 
 _SOUND: dict[bytes, bool] = {}
-"""Whether the heaps of the files that are open are sound, by name; as far as that was looked at."""
+"""Whether the heaps of an open file are undamaged, by file name; only files checked so far."""
 
-# What h5py raises on damage is not documented, and is of every kind.
+# Exceptions of h5py on damage: not documented, so all kinds.
 _DAMAGE = (
     OSError,
     RuntimeError,
@@ -52,7 +52,7 @@ _DAMAGE = (
 
 @contextlib.contextmanager
 def guarded(path: Path, place: str = "") -> Iterator[None]:
-    """Any failure inside becomes an ArchiveError that names the file and the place in it."""
+    """Convert any failure in the block to an ArchiveError with the file and the place in it."""
     try:
         yield
     except ArchiveError:
@@ -63,15 +63,15 @@ def guarded(path: Path, place: str = "") -> Iterator[None]:
 
 
 _HELD: ContextVar[Mapping[Path, h5py.File]] = ContextVar("held files", default={})  # noqa: B039
-"""Of this thread, the files that stay open until the block that holds them ends."""
+"""Files of this thread that stay open until the end of their `held_open` block."""
 
 
 @contextlib.contextmanager
 def held_open(path: Path) -> Iterator[None]:
-    """Within the block, this thread opens the file once: every trial of it comes from there.
+    """Keep the file open in the block, so that this thread reads all its trials from one handle.
 
-    Opening costs more than reading a channel of a short trial. A file that cannot be opened is not
-    held, and whoever reads it is told.
+    Opening takes more time than reading a channel of a short trial. A file that cannot be opened
+    is not held; the reader gets the error.
     """
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(ArchiveError):
@@ -83,7 +83,7 @@ def held_open(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def open_file(path: Path) -> Iterator[h5py.File]:
-    """An HDF5 file for reading; ArchiveError when it is none."""
+    """Open an HDF5 file for reading; raises ArchiveError if it is missing, cut off or not HDF5."""
     if (held := _HELD.get().get(path)) is not None:
         yield held
         return
@@ -92,10 +92,10 @@ def open_file(path: Path) -> Iterator[h5py.File]:
             raise ArchiveError(f"{path}: there is no such file")
         if not h5py.is_hdf5(path):
             raise ArchiveError(f"{path}: is not an archive (not HDF5, or its beginning is damaged)")
-        there, stated = path.stat().st_size, _stated_size(path)
-        if there < stated:
+        size, stated = path.stat().st_size, _stated_size(path)
+        if size < stated:
             raise ArchiveError(
-                f"{path}: is cut off: {there} of {stated} bytes are there; copy it again"
+                f"{path}: is cut off: {size} of {stated} bytes are there; copy it again"
             )
         with h5py.File(path, "r", locking=False) as file:
             _SOUND.pop(h5f.get_name(file.id), None)
@@ -103,14 +103,14 @@ def open_file(path: Path) -> Iterator[h5py.File]:
 
 
 def _stated_size(path: Path) -> int:
-    """End of an HDF5 file by its superblock of version 2 or 3 (format specification, II.A)."""
+    """End of an HDF5 file from its superblock of version 2 or 3 (format specification, II.A)."""
     with path.open("rb") as file:
         begin = file.read(36)
     return int.from_bytes(begin[28:36], "little") if begin[8:10] in (b"\2\x08", b"\3\x08") else 0
 
 
 def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
-    """The group `name`, stored in this very file, of the NeXus class."""
+    """The group `name`, stored in this file, of the NeXus class."""
     group = own(parent, name)
     if not isinstance(group, h5py.Group):
         raise ArchiveError(f"{_place(parent, name)}: is not a group")
@@ -120,7 +120,7 @@ def group_at(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
 
 
 def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
-    """The group `name`, stored in this very file, of whatever class."""
+    """The group `name`, stored in this file, of any class."""
     group = member(parent, name)
     if group is None:
         raise ArchiveError(f"{_place(parent, name)}: is not a group")
@@ -128,17 +128,17 @@ def inner_group(parent: h5py.Group, name: str) -> h5py.Group:
 
 
 def member(parent: h5py.Group, name: str) -> h5py.Group | None:
-    """The group `name`, of whatever class; None when it is a dataset. No link is followed."""
-    found = own(parent, name)
-    if isinstance(found, h5py.Dataset):
+    """The group `name`, of any class; None if it is a dataset. No link is followed."""
+    item = own(parent, name)
+    if isinstance(item, h5py.Dataset):
         return None
-    if not isinstance(found, h5py.Group):
+    if not isinstance(item, h5py.Group):
         raise ArchiveError(f"{_place(parent, name)}: is neither a group nor a dataset")
-    return found
+    return item
 
 
 def check_dataset(parent: h5py.Group, name: str) -> int:
-    """Read a text or number against its checksum; returns the bytes it has in the file."""
+    """Compare a text or number with its checksum; return its size in the file (bytes)."""
     dataset = _dataset_at(parent, name)
     if dataset.shape == () and dataset.dtype.kind == "S":
         text_at(parent, name)
@@ -150,12 +150,12 @@ def check_dataset(parent: h5py.Group, name: str) -> int:
 
 
 def names(group: h5py.Group) -> list[str]:
-    """Names of what `group` holds, sorted."""
+    """Names of the members of `group`, sorted."""
     return sorted(name.decode("utf-8", "surrogateescape") for name in group.id)
 
 
 def text_at(parent: h5py.Group, name: str, digest: str | None = None) -> str:
-    """A text, held against `digest`; where there is none, against its own attribute."""
+    """A text, checked against `digest`, or against its own attribute if None."""
     return raw_text_at(parent, name, digest).decode("utf-8")
 
 
@@ -167,10 +167,10 @@ def raw_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> byt
 
 
 def check_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> None:
-    """As `text_at`, in flat memory."""
+    """As `text_at`, in constant memory."""
     dataset = _text_id(parent, name)
     offset, size = dataset.get_offset(), dataset.get_storage_size()
-    if offset is None:  # it lies in its header
+    if offset is None:  # stored in the object header
         text_at(parent, name, digest)
     else:
         path = Path(os.fsdecode(h5f.get_name(dataset)))
@@ -178,7 +178,7 @@ def check_text_at(parent: h5py.Group, name: str, digest: str | None = None) -> N
 
 
 def unchecked_text_at(parent: h5py.Group, name: str) -> str:
-    """A text as it stands there, damaged or not."""
+    """A text without a check; it may be damaged."""
     return _raw_text(parent, name)[1].decode("utf-8", "replace")
 
 
@@ -200,7 +200,7 @@ def _text_id(parent: h5py.Group, name: str) -> h5d.DatasetID:
 
 
 def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
-    """The file's own hash, and the offset and length of the place where it stands."""
+    """The file's own hash, and its offset and length in the file."""
     *groups, name = path.split("/")
     for group in groups:
         parent = own(parent, group)
@@ -212,7 +212,7 @@ def digest_at(parent: h5py.Group, path: str) -> tuple[str, tuple[int, int]]:
 
 
 def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
-    """A whole number, held against the digest of its decimal digits, or its own attribute."""
+    """An integer, checked against the digest of its decimal digits, or its own attribute."""
     dataset = _dataset_at(parent, name)
     if dataset.shape != () or dataset.dtype != np.dtype("<i8"):
         raise ArchiveError(f"{_place(parent, name)}: is not a 64-bit whole number")
@@ -225,14 +225,14 @@ def integer_at(parent: h5py.Group, name: str, digest: str | None = None) -> int:
 
 
 def attribute(item: h5py.HLObject, name: str) -> str:
-    """A text attribute; ArchiveError when there is none."""
+    """A text attribute; raises ArchiveError if it is missing."""
     return _text_attribute(item.id, name)
 
 
 def check_attribute(item: h5d.DatasetID, name: str, recorded: str) -> None:
-    """ArchiveError unless a text attribute says what was recorded."""
-    if (found := _text_attribute(item, name)) != recorded:
-        raise ArchiveError(f"{_named(item)}@{name}: is {found!r}, and {recorded!r} was recorded")
+    """Raise ArchiveError if a text attribute differs from the recorded text."""
+    if (actual := _text_attribute(item, name)) != recorded:
+        raise ArchiveError(f"{_named(item)}@{name}: is {actual!r}, and {recorded!r} was recorded")
 
 
 def _text_attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> str:
@@ -246,7 +246,7 @@ def _text_attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> str:
 
 
 def text_list(item: h5py.HLObject, name: str) -> list[str]:
-    """An attribute that is a list of texts; empty when there is none."""
+    """An attribute that is a list of texts; empty if it is missing."""
     if name not in item.attrs:
         return []
     identifier = _attribute(item.id, name)
@@ -258,7 +258,7 @@ def text_list(item: h5py.HLObject, name: str) -> list[str]:
 def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
     raw = name.encode()
     file = h5f.get_name(item)
-    if file not in _SOUND:  # looked at here, as nothing else that is read lies in the heaps
+    if file not in _SOUND:  # only attributes are stored in the heaps
         _SOUND[file] = heaps_are_sound(Path(os.fsdecode(file)))
     if not _SOUND[file]:
         raise ArchiveError(f"{os.fsdecode(file)}: cannot be read: its attributes are damaged")
@@ -272,17 +272,17 @@ def _attribute(item: h5g.GroupID | h5d.DatasetID, name: str) -> h5a.AttrID:
 
 
 def own(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
-    """What `parent` itself holds under a name; no link is followed."""
-    found = own_id(parent, name)
-    if isinstance(found, h5g.GroupID):
-        return h5py.Group(found)
-    return h5py.Dataset(found) if isinstance(found, h5d.DatasetID) else None
+    """The direct member `name` of `parent`; no link is followed."""
+    item = own_id(parent, name)
+    if isinstance(item, h5g.GroupID):
+        return h5py.Group(item)
+    return h5py.Dataset(item) if isinstance(item, h5d.DatasetID) else None
 
 
 def own_id(parent: h5py.Group, name: str) -> Any:
-    """As `own`, of HDF5's low-level interface: a campaign has tens of thousands of objects."""
+    """As `own`, by HDF5's low-level interface: faster for tens of thousands of objects."""
     raw = name.encode()
-    if "/" in name or name == ".":  # on a path, only the last link would be looked at
+    if "/" in name or name == ".":  # of a path, only the last link would be checked
         raise ArchiveError(f"{_place(parent, name)}: is a path, not a name")
     group = parent.id
     try:
@@ -303,11 +303,11 @@ def _dataset_at(parent: h5py.Group, name: str) -> h5py.Dataset:
 
 
 def _dataset_id(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, h5py.h5p.PropDCID]:
-    """A dataset whose samples lie in this very file, and how they are laid out there."""
-    found = own_id(parent, name)
-    if not isinstance(found, h5d.DatasetID):
+    """A dataset stored in this file, and its creation properties (layout, filters)."""
+    dataset = own_id(parent, name)
+    if not isinstance(dataset, h5d.DatasetID):
         raise ArchiveError(f"{_place(parent, name)}: is not a dataset")
-    plan = found.get_create_plist()
+    plan = dataset.get_create_plist()
     layout = plan.get_layout()
     if layout == h5d.VIRTUAL or (layout == h5d.CONTIGUOUS and plan.get_external_count()):
         raise ArchiveError(f"{_place(parent, name)}: lies in another file, which is not opened")
@@ -316,7 +316,7 @@ def _dataset_id(parent: h5py.Group, name: str) -> tuple[h5d.DatasetID, h5py.h5p.
         raise ArchiveError(
             f"{_place(parent, name)}: is stored with a filter other than shuffle and deflate"
         )
-    return found, plan
+    return dataset, plan
 
 
 def _check(dataset: h5d.DatasetID, raw: Any, digest: str | None = None) -> None:
@@ -324,7 +324,7 @@ def _check(dataset: h5d.DatasetID, raw: Any, digest: str | None = None) -> None:
 
 
 def _compare(dataset: h5d.DatasetID, found: str, digest: str | None = None) -> None:
-    """ArchiveError unless a digest is what it ought to be: `digest`, or the dataset's attribute."""
+    """Raise ArchiveError if `found` differs from `digest`, or from the dataset's attribute."""
     if (_text_attribute(dataset, CHECKSUM) if digest is None else digest) != found:
         raise ArchiveError(
             f"{_named(dataset)}: does not match its checksum; it was damaged or changed"

@@ -1,7 +1,7 @@
 """The seal of a run: the digest of every text, and reading texts by it.
 
-The index is one of the texts and holds the record of every trial, so the seal's own digest vouches
-for the whole run. It is what a signature signs.
+The index is one of the texts and holds the record of every trial, so the digest of the seal covers
+the whole run. A signature signs this digest.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ SEAL = "outcome/seal"
 OUTSIDE = frozenset({SEAL, "outcome/file_sha256", "not_kept/type", "not_kept/file_name"}) | {
     "not_kept/data"
 }
-"""What of `/run` the seal does not bind: itself, the hash of the file, and which samples are not
-kept, so that samples may be dropped from a run that was signed."""
+"""Members of `/run` that the seal does not cover: itself, the hash of the file, and the list of
+samples not kept, so that samples may be removed from a signed run."""
 
 
 NUMBERS = ("outcome/trials_finished", "outcome/trials_failed", "provenance/format")
-"""What of `/run` is a whole number; all else is a text."""
+"""Members of `/run` that are integers; all others are texts."""
 
 
 class Seal(BaseModel):
@@ -44,17 +44,17 @@ class Seal(BaseModel):
 
 
 def seal_text(run: str, digests: Mapping[str, str]) -> str:
-    """The seal of texts, whose digests are by their place in `/run`."""
+    """The seal, from the digests of texts by their place in `/run`."""
     return canonical_json({"format": FORMAT, "run": run, "texts": dict(digests)})
 
 
 class SealedTexts:
-    """The texts of `/run`, each held against the seal; where that is damaged, against its own
-    checksum, which finds damage and no exchange.
+    """The texts of `/run`, each checked against the seal. If the seal is damaged, each is checked
+    against its own checksum, which detects damage but no exchange.
 
     Attributes:
-        root: digest of the seal; empty when it cannot be read.
-        seal: None when it cannot be read.
+        root: digest of the seal; empty if it is unreadable.
+        seal: None if it is unreadable.
     """
 
     def __init__(self, path: Path, file: h5py.File, damaged: DamageList) -> None:
@@ -70,43 +70,43 @@ class SealedTexts:
             self.root = text_digest(text)
 
     def names(self, group: str) -> list[str]:
-        """What the group at `group` in `/run` holds, or held when it was sealed."""
+        """Members of the group `group` in `/run`, now or when it was sealed."""
         sealed = self.seal.texts if self.seal else {}
-        there = safe_hdf5.names(safe_hdf5.inner_group(self._run, group))
+        present = safe_hdf5.names(safe_hdf5.inner_group(self._run, group))
         inside = f"{group}/"
-        was = (place.removeprefix(inside) for place in sealed if place.startswith(inside))
-        return sorted({*there, *was})
+        sealed_names = (place.removeprefix(inside) for place in sealed if place.startswith(inside))
+        return sorted({*present, *sealed_names})
 
     def notes(self, prefix: str) -> list[str]:
-        """The groups of `/run` whose names begin with `prefix`; also those that were sealed."""
+        """Names in `/run` that begin with `prefix`, now or when it was sealed."""
         sealed = self.seal.texts if self.seal else {}
         names = {*safe_hdf5.names(self._run), *(place.partition("/")[0] for place in sealed)}
         return sorted(name for name in names if name.startswith(prefix))
 
     def text(self, place: str) -> str:
-        """A text of `/run`, e.g. `title`. Raises ArchiveError when it is damaged."""
+        """A text of `/run`, e.g. `title`. Raises ArchiveError if it is damaged."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             return self.raw(place).decode("utf-8")
 
     def raw(self, place: str) -> bytes:
-        """A text of `/run` in UTF-8, e.g. `journal/data`. Raises ArchiveError when damaged."""
+        """A text of `/run` in UTF-8, e.g. `journal/data`. Raises ArchiveError if damaged."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
             return safe_hdf5.raw_text_at(parent, name, self._digest(place))
 
     def unchecked(self, place: str) -> str:
-        """A text of `/run` as it stands there; it may be damaged. Raises ArchiveError."""
+        """A text of `/run` without a check; it may be damaged. Raises ArchiveError."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             return safe_hdf5.unchecked_text_at(*self._parent(place))
 
     def integer(self, place: str) -> int:
-        """A whole number of `/run`. Raises ArchiveError when it is damaged."""
+        """An integer of `/run`. Raises ArchiveError if it is damaged."""
         with safe_hdf5.guarded(self._path, f"/run/{place}"):
             parent, name = self._parent(place)
             return safe_hdf5.integer_at(parent, name, self._digest(place))
 
     def check(self, place: str) -> None:
-        """A text or a number of `/run`. Raises ArchiveError when it is damaged."""
+        """Check a text or a number of `/run`. Raises ArchiveError if it is damaged."""
         if place in NUMBERS:
             self.integer(place)
         else:

@@ -36,11 +36,11 @@ from campaign.recording import Outcome, SafeState
 from campaign.trial import Tree
 
 NOTES = ("plan", "plan_trials", "trees", "journal", "index", "not_kept")
-"""The texts of `/run` that are notes, but for the sources."""
+"""The texts of `/run` that are notes, without the sources."""
 
 
 def read_sealed(path: Path) -> RunReader:
-    """A sealed file, whatever its name; samples are held against it when read."""
+    """Read a sealed file of any name; samples are checked only when read."""
     damaged = DamageList(path)
     with (
         safe_hdf5.held_open(path),
@@ -58,8 +58,8 @@ def read_sealed(path: Path) -> RunReader:
         )
         stages = stages_in(story.entries)
         plan = planned + planned_in(stages)
-        found = _Trials.read(path, texts, story, file, damaged)
-        trials, earlier = found.archived(plan, damaged)
+        trial_index = _Trials.read(path, texts, story, file, damaged)
+        trials, earlier = trial_index.archived(plan, damaged)
         _note_contradictions(texts, header, story, len(planned), damaged)
         return RunReader(
             path=path,
@@ -80,7 +80,7 @@ def read_sealed(path: Path) -> RunReader:
 
 
 def read_glance(path: Path) -> Glance:
-    """What a listing tells of it."""
+    """Read the summary of a sealed run for a listing."""
     damaged = DamageList(path)
     with safe_hdf5.open_file(path) as file, safe_hdf5.guarded(path, "/run"):
         texts = SealedTexts(path, file, damaged)
@@ -99,7 +99,7 @@ def read_glance(path: Path) -> Glance:
 
 
 def _followed(texts: SealedTexts, header: RunHeader) -> int:
-    """How many trials followed; the journal is looked into only where some may have."""
+    """Number of follow-up trials; the journal is read only if a test has stages."""
     if not any(test.get("stages") for test in header.tests):
         return 0
     story = read_lines(texts.raw("journal/data"))
@@ -122,13 +122,13 @@ def _plan_texts(path: Path) -> tuple[str, str]:
 def _note_contradictions(
     texts: SealedTexts, header: RunHeader, story: Lines, planned: int, damaged: DamageList
 ) -> None:
-    """Texts that say the same thing twice and do not agree: somebody changed one of them."""
+    """Note redundant texts that disagree: one of them was changed."""
     if damaged.found:
-        return  # what cannot be read agrees with nothing
+        return  # an unreadable text cannot be compared
     finished, ended = story.finished.values(), story.ended
     failed = sum(each.outcome is not Outcome.COMPLETED for each in finished)
     title = header.title or header.protocol_name or header.name
-    says: dict[str, str | int] = {
+    expected: dict[str, str | int] = {
         "title": title,
         "entry_identifier": header.name,
         "start_time": header.created,
@@ -136,7 +136,7 @@ def _note_contradictions(
         "outcome/trials_failed": failed,
     }
     if ended is not None:
-        says |= {
+        expected |= {
             "end_time": ended.at,
             "outcome/status": ended.status,
             "outcome/reason": ended.reason,
@@ -144,7 +144,7 @@ def _note_contradictions(
         }
     else:
         damaged.add("/run/journal", "has no line of the end of the run")
-    for place, wanted in says.items():
+    for place, wanted in expected.items():
         with damaged.noting():
             read = texts.integer if isinstance(wanted, int) else texts.text
             if read(place) != (wanted if isinstance(wanted, int) else storable(str(wanted))):
@@ -154,7 +154,7 @@ def _note_contradictions(
 
 
 def note_journal(story: Lines, damaged: DamageList) -> None:
-    """What of a sealed journal cannot be understood."""
+    """Note damaged lines and missing parts of a sealed journal."""
     for number in story.damaged:
         damaged.add(f"/run/journal:{number}", "is not a line of a journal")
     if story.torn or not story.all(RunStarted):
@@ -169,18 +169,18 @@ def _sources(texts: SealedTexts, damaged: DamageList) -> Iterator[tuple[str, str
 
 @dataclass(frozen=True)
 class _Trials:
-    """Where the records of a sealed run are looked for.
+    """Sources of the records of a sealed run.
 
-    The journal has the digest of every record, so one that matches is good wherever it stands: in
-    the index, or again in the trial's own group should the index be damaged.
+    The journal has the digest of every record. A record that matches is valid in either place: in
+    the index, or, if the index is damaged, in the group of the trial.
 
     Attributes:
         story: the journal.
-        groups: names of what the file holds.
-        lines: of the index, by their digests.
-        whole: whether the index is as it was sealed: then it tells of a trial as the journal does.
-        trees: benches and options that could be read.
-        not_kept: why samples are not there, by entry.
+        groups: names of the top-level members of the file.
+        lines: lines of the index, by digest.
+        whole: whether the index is unchanged since sealing; it can then replace journal lines.
+        trees: benches and options that are readable.
+        not_kept: reason why samples are absent, by entry.
     """
 
     path: Path
@@ -207,11 +207,11 @@ class _Trials:
     def archived(
         self, plan: Sequence[PlannedTrial], damaged: DamageList
     ) -> tuple[LazyTrials, dict[int, tuple[ArchivedTrial, ...]]]:
-        """The trials that count, and the attempts before them by number; the rest is noted.
+        """The last attempts, and the earlier attempts by trial number; damage is noted.
 
-        Where all texts are as they were sealed, and the index has the records of the journal in the
-        order of trials, plan and journal say what a trial is. Elsewhere its record is parsed once,
-        which shows what is wrong with it, and let go of.
+        If all texts are as sealed, and the index has the records of the journal in the order of
+        trials, outlines come from plan and journal. Otherwise each record is parsed once, which
+        detects its damage, and is not kept.
         """
         outlines: list[Outline] = []
         kept: dict[int, TrialFinished] = {}
@@ -224,22 +224,22 @@ class _Trials:
         sound = self.whole and self.story.whole and not damaged.found
         sound = sound and [each.record for each in names.values()] == list(self.lines)
         planned = {each.number: each for each in plan} if sound else {}
-        for entry, told in names.items():
-            last = entry == entry_name(told.trial)
-            there = entry in self.groups or entry in self.not_kept
-            if last and there and (of := planned.get(told.trial)):
-                ending = told.outcome, told.reason
+        for entry, finished in names.items():
+            last = entry == entry_name(finished.trial)
+            present = entry in self.groups or entry in self.not_kept
+            if last and present and (of := planned.get(finished.trial)):
+                ending = finished.outcome, finished.reason
                 outlines.append(Outline(of.number, of.test, of.kind, of.label, *ending))
-                kept[told.trial] = told
+                kept[finished.trial] = finished
                 continue
             with damaged.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
-                archived = self._archived(entry, told)
+                archived = self._archived(entry, finished)
                 if last:
                     outlines.append(Outline.of(archived))
-                    kept[told.trial] = told
+                    kept[finished.trial] = finished
                 else:
-                    earlier.setdefault(told.trial, []).append(archived)
-        before = {number: tuple(found) for number, found in earlier.items()}
+                    earlier.setdefault(finished.trial, []).append(archived)
+        before = {number: tuple(tries) for number, tries in earlier.items()}
         return LazyTrials(outlines, partial(self._again, kept)), before
 
     def _again(self, kept: Mapping[int, TrialFinished], number: int) -> ArchivedTrial:
@@ -248,17 +248,17 @@ class _Trials:
             return self._archived(entry, kept[number])
 
     def _told(self) -> list[TrialFinished]:
-        """Every finished attempt that the journal tells of; the index makes up for lost lines."""
-        told = {(each.trial, each.attempt): each for each in self.story.attempts}
+        """Finished attempts of the journal; the index replaces lost lines."""
+        attempts = {(each.trial, each.attempt): each for each in self.story.attempts}
         if self.whole and not self.story.whole:
-            known = {each.record for each in told.values()}
+            known = {each.record for each in attempts.values()}
             for digest in self.lines.keys() - known:
                 finished = _as_finished(parse_record(self.path, "/run/index", self.lines[digest]))
-                told.setdefault((finished.trial, finished.attempt), finished)
-        return list(told.values())
+                attempts.setdefault((finished.trial, finished.attempt), finished)
+        return list(attempts.values())
 
     def _archived(self, entry: str, told: TrialFinished) -> ArchivedTrial:
-        """A trial; what of it the index does not have is read from its own group."""
+        """A trial; record and trees come from its own group if the index lacks them."""
         trees: Trees = self.trees
         if (line := self.lines.get(told.record)) is not None:
             record = parse_record(self.path, f"/{entry}", line)
@@ -266,7 +266,7 @@ class _Trials:
         if line is None or not record.tree_names <= trees.keys():
             with safe_hdf5.open_file(self.path) as file:
                 record, trees = read_entry(self.path, file, entry, told)
-        # Where its samples are there, whatever is said of them, they are held against the record.
+        # Samples that are present are checked against the record, even if listed as not kept.
         not_kept = "" if entry in self.groups else self.not_kept.get(entry, "")
         if entry not in self.groups and not not_kept:
             raise ArchiveError(
@@ -277,7 +277,7 @@ class _Trials:
 
 
 def _as_finished(record: TrialRecord) -> TrialFinished:
-    """A line of the journal that was lost, as far as the index has it."""
+    """A lost line of the journal, rebuilt from the index; file hash and size are unknown."""
     return TrialFinished(
         at=record.ended,
         trial=record.number,
@@ -293,7 +293,7 @@ def _as_finished(record: TrialRecord) -> TrialFinished:
 
 
 def check_identity(path: Path, entry: str, record: TrialRecord, told: TrialFinished) -> None:
-    """ArchiveError unless a record is of the trial and attempt that the journal names."""
+    """Raise ArchiveError if a record is not of the trial and attempt that the journal names."""
     if (record.number, record.attempt) != (told.trial, told.attempt):
         raise ArchiveError(f"{path}: /{entry}: is not the trial that the journal names")
 
@@ -301,18 +301,18 @@ def check_identity(path: Path, entry: str, record: TrialRecord, told: TrialFinis
 def read_entry(
     path: Path, file: h5py.File, name: str, told: TrialFinished
 ) -> tuple[TrialRecord, Trees]:
-    """Record and trees as they stand in a trial's own group. Raises ArchiveError."""
+    """Record and trees from the group of a trial. Raises ArchiveError."""
     with safe_hdf5.guarded(path, f"/{name}"):
         entry = safe_hdf5.inner_group(file, name)
         kept = safe_hdf5.inner_group(entry, "record")
         record, trees = (safe_hdf5.unchecked_text_at(kept, text) for text in ("json", "trees"))
-        found = packed_record(path, name, PackedTrial(record=record, trees=trees), told.record)
-        check_identity(path, name, found[0], told)
-        return found
+        parsed = packed_record(path, name, PackedTrial(record=record, trees=trees), told.record)
+        check_identity(path, name, parsed[0], told)
+        return parsed
 
 
 def read_not_kept(texts: SealedTexts) -> dict[str, str]:
-    """Why samples are not there, by entry; nothing where all are."""
+    """Reason why samples are absent, by entry; empty if all are present."""
     if "not_kept" not in texts.notes("not_kept"):
         return {}
     tree = json.loads(texts.text("not_kept/data"))
@@ -320,7 +320,7 @@ def read_not_kept(texts: SealedTexts) -> dict[str, str]:
 
 
 def _good_trees(raw: bytes) -> Trees:
-    """The trees whose lines are good; a damaged one is missed by the trials that need it."""
+    """The trees of undamaged lines; damaged lines are skipped, so trials may lack a tree."""
     trees: dict[str, Tree] = {}
     for line in raw.decode("utf-8", "replace").splitlines():
         try:
@@ -331,7 +331,7 @@ def _good_trees(raw: bytes) -> Trees:
 
 
 def _text_or_rest(texts: SealedTexts, place: str, damaged: DamageList) -> tuple[bytes, bool]:
-    """A text and whether it is as it was sealed; where it is not, that is noted."""
+    """A text, and whether it is as sealed; damage is noted."""
     try:
         return texts.raw(place), True
     except ArchiveError as error:

@@ -1,7 +1,7 @@
-"""Trials with intact samples, and the names of the others.
+"""Trials with intact samples, and the damage of the others.
 
-Samples are held against their checksums when they are read, which may be as late as an analysis
-asks a recording for a channel. An error there costs the one trial.
+Samples are compared with their checksums when read, which may be as late as the access to a
+channel in an analysis. An error then excludes only that trial.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ Trials = tuple[ArchivedTrial, ...]
 
 
 def whole_recording(trial: ArchivedTrial) -> Recording:
-    """The recording, every channel of it read now. Raises ArchiveError when one is damaged."""
+    """The recording with all channels read. Raises ArchiveError if one is damaged."""
     recording = trial.recording()
     return replace(recording, channels=dict(recording.channels.items()))
 
 
 def sound_part(path: Path, trial: ArchivedTrial) -> tuple[Recording | None, tuple[Damage, ...]]:
-    """The recording without the channels that are damaged, and what is damaged.
+    """The recording without its damaged channels, and the damage.
 
     Args:
-        path: the run's.
+        path: path of the run.
 
-    None when no channel can be told from another, or when the samples were not kept.
+    The recording is None if it cannot be opened, or if the samples were not kept.
     """
     if trial.not_kept:
         return None, ()
@@ -52,27 +52,27 @@ def sound_part(path: Path, trial: ArchivedTrial) -> tuple[Recording | None, tupl
 
 
 def readable(path: Path, trials: Sequence[ArchivedTrial]) -> tuple[Trials, tuple[Damage, ...]]:
-    """The trials whose every sample can be read, and what is damaged of the others."""
+    """The trials with all samples readable, and the damage of the others."""
     good: list[ArchivedTrial] = []
     damaged: list[Damage] = []
     for trial in trials:
-        _, found = sound_part(path, trial)
-        if found:
-            damaged += found
+        _, damage = sound_part(path, trial)
+        if damage:
+            damaged += damage
         else:
             good.append(trial)
     return tuple(good), tuple(damaged)
 
 
 def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
-    """Damage of the records that stand with the samples of a sealed run; no sample is read.
+    """Damage of the records in the groups of trials of a sealed run; no sample is read.
 
-    The index has every record again, and opening a run looks there alone. In the folder of a run in
-    progress there is no index: whatever opens that has looked at them.
+    Opening a sealed run reads the copies in the index only. A run in progress has no index:
+    opening it reads these records.
     """
     from campaign.archive.reading import safe_hdf5
 
-    # Of a damaged journal some are missing, and that is told already.
+    # A damaged journal lacks some digests; its damage is reported elsewhere.
     digests = {each.trial: each.record for each in run.story.finished.values()}
     wanted = [t for t in trials if t.trial.number in digests and not t.not_kept]
     if not run.sealed or not wanted:
@@ -89,12 +89,12 @@ def damaged_records(run: RunReader, trials: Trials) -> tuple[Damage, ...]:
 def without_damaged(
     path: Path, trials: Trials, make: Callable[[Trials], _Made]
 ) -> tuple[_Made, Trials, tuple[Damage, ...]]:
-    """What `make` makes of `trials`; of those that are whole when it meets one that is not.
+    """Result of `make` on `trials`; if it fails by damage, on the undamaged trials only.
 
-    Returns what was made, the trials of which it was made, and what is damaged of the others. On
-    undamaged trials nothing is read but by `make`.
+    Returns the result, the trials it used, and the damage of the others. If no trial is damaged,
+    only `make` reads samples.
 
-    Raises ArchiveError when it meets damage even so.
+    Raises ArchiveError if `make` fails on undamaged trials too.
     """
     try:
         return make(trials), trials, ()
@@ -106,6 +106,6 @@ def without_damaged(
 
 
 def _of_trial(path: Path, trial: ArchivedTrial, error: ArchiveError) -> Damage:
-    """Damage found in reading a trial is that trial's, also where the error only names the file."""
+    """Damage of this trial, even if the error names only the file."""
     damage = Damage.of(path, error)
     return damage if damage.trial else replace(damage, trial=trial.trial.name)

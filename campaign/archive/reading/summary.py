@@ -19,16 +19,14 @@ class RunSummary:
 
     Attributes:
         created, ended: ISO 8601; `ended` is empty while the run is in progress.
-        title, operator: as the header has them.
+        title, operator: from the header.
         tests: names, in the protocol's order.
         benches: names, each once, in the order of the tests.
-        trials: finished ones, those that did not complete included; `planned` counts the whole
-            plan.
-        failed, interrupted: those that did not complete by themselves, and those that somebody
-            stopped, which have not failed.
-        untold: how many planned trials the journal, damaged, does not tell of: they may have been
-            executed.
-        problem: why the run cannot be read; everything but name, path and bytes is empty then.
+        trials: number of finished trials, incomplete ones included.
+        planned: number of trials of the plan.
+        failed, interrupted: number of trials that failed, and number that an operator stopped.
+        untold: number of planned trials missing in a damaged journal; they may have been executed.
+        problem: reason why the run is unreadable; all but name, path and bytes are then empty.
     """
 
     name: str
@@ -53,7 +51,7 @@ class RunSummary:
 
 
 def summarise(path: Path) -> RunSummary:
-    """A run at a glance, without its trials."""
+    """Summarize a run without its trials; errors become its `problem`."""
     size = 0
     try:
         if path.is_dir():
@@ -64,7 +62,7 @@ def summarise(path: Path) -> RunSummary:
     except (ArchiveError, OSError) as error:
         sealed = path.with_suffix(SEALED)
         if path.suffix == PARTIAL and sealed.is_file():
-            return summarise(sealed)  # sealed while it was looked at
+            return summarise(sealed)  # sealed during the reading
         if isinstance(error, ArchiveError):
             return RunSummary(path.stem, path, size, problem=str(error))
         return RunSummary(

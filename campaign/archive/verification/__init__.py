@@ -1,1 +1,1 @@
-"""Whether a run is, to the last byte, what was written, and what a signature of it covers."""
+"""Verification that a run is unchanged to the last byte, and the statement that is signed."""

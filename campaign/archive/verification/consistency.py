@@ -19,16 +19,16 @@ from campaign.errors import ArchiveError
 from campaign.trial import Trial, canonical_json
 
 _BESIDE = {"published", "policy"}
-"""Of the normalised protocol, what determines no trial and is not part of its fingerprint."""
+"""Keys of the normalised protocol that determine no trial; its fingerprint excludes them."""
 
 
 @dataclass(frozen=True)
 class TrialFacts:
-    """What is compared of a trial that is there; its bench and samples are let go of.
+    """Facts of an archived trial that are compared, without bench and samples.
 
     Attributes:
         entry: its name in a sealed run, e.g. `trial_00017_attempt_1`.
-        place: where it lies, for messages.
+        place: its path, for messages.
     """
 
     entry: str
@@ -60,7 +60,7 @@ class TrialFacts:
 
 
 def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
-    """Whole lines, and the beginning that the header tells of."""
+    """Check that all lines are undamaged and that the first line agrees with the header."""
     for number in story.damaged:
         found.add(f"{place}:{number}", "is not a line of a journal")
     started = story.all(RunStarted)
@@ -73,7 +73,7 @@ def check_journal(story: Lines, header: RunHeader, place: str, found: DamageList
 
 
 def check_measured(story: Lines, place: str, found: DamageList) -> None:
-    """What was measured was measured of trials that had finished, and of each once."""
+    """Check that metrics belong to finished trials, and to each at most once."""
     finished: set[str] = set()
     measured: set[str] = set()
     for entry in story.entries:
@@ -88,13 +88,13 @@ def check_measured(story: Lines, place: str, found: DamageList) -> None:
 
 
 def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList) -> None:
-    """The trials that followed are numbered on after the plan's, and no stage was asked twice."""
+    """Check that follow-up trials continue the plan's numbers and each stage is decided once."""
     stages = stages_in(story.entries)
     numbers = [trial.number for trial in planned_in(stages)]
     if numbers != list(range(header.trials + 1, header.trials + 1 + len(numbers))):
         found.add(place, "numbers trials of later stages otherwise than after the plan's")
-    asked = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
-    for text, count in asked.items():
+    counts = Counter(canonical_json([s.test, s.stage, s.point]) for s in stages)
+    for text, count in counts.items():
         if count > 1:
             found.add(place, f"names the trials of a stage {count} times at {text}")
 
@@ -102,19 +102,19 @@ def check_stages(story: Lines, header: RunHeader, place: str, found: DamageList)
 def check_trials(
     story: Lines, there: Mapping[str, TrialFacts], unreadable: Iterable[str], found: DamageList
 ) -> None:
-    """Each finished trial of the journal is there, ended as it says; `unreadable` are told of."""
-    told = entry_names(story.attempts)
-    for entry in told.keys() - there.keys() - set(unreadable):
+    """Check that finished trials exist with the journal's ending; `unreadable` are reported."""
+    attempts = entry_names(story.attempts)
+    for entry in attempts.keys() - there.keys() - set(unreadable):
         found.add(f"/{entry}", "is missing, and the journal says that it finished")
     for entry, trial in there.items():
-        finished = told.get(entry)
+        finished = attempts.get(entry)
         if finished is None:
             found.add(trial.place, "is there, and no line of the journal says that it finished")
             continue
         for what in ("outcome", "reason", "safe_state"):
-            mine, theirs = str(getattr(trial, what)), str(getattr(finished, what))
-            if mine != theirs:
-                found.add(trial.place, f"has {what} {mine!r}, and the journal says {theirs!r}")
+            actual, expected = str(getattr(trial, what)), str(getattr(finished, what))
+            if actual != expected:
+                found.add(trial.place, f"has {what} {actual!r}, and the journal says {expected!r}")
 
 
 def check_plan(
@@ -125,7 +125,7 @@ def check_plan(
     found: DamageList,
     followed: int = 0,
 ) -> None:
-    """Each executed trial is the one that was planned; `followed` of them are not in the header."""
+    """Check each executed trial against the plan, which has `followed` more than the header."""
     if len(plan) - followed != header.trials:
         what = f"has {len(plan) - followed} trials, and the header says {header.trials}"
         found.add(place, what)
@@ -136,9 +136,9 @@ def check_plan(
             found.add(trial.place, "is not in the plan")
             continue
         for what in ("test", "kind", "role", "fingerprint"):
-            mine, theirs = getattr(trial, what), str(getattr(wanted, what))
-            if mine != theirs:
-                found.add(trial.place, f"has {what} {mine!r}, and the plan says {theirs!r}")
+            actual, expected = getattr(trial, what), str(getattr(wanted, what))
+            if actual != expected:
+                found.add(trial.place, f"has {what} {actual!r}, and the plan says {expected!r}")
 
 
 def check_full_plan(
@@ -147,7 +147,7 @@ def check_full_plan(
     place: str,
     found: DamageList,
 ) -> None:
-    """The whole description of each planned trial is that of which the plan has the fingerprint."""
+    """Check the full description of each planned trial against its fingerprint in the plan."""
     if len(full) != len(plan):
         found.add(place, f"has {len(full)} trials, and the plan has {len(plan)}")
         return
@@ -161,7 +161,7 @@ def check_full_plan(
 
 
 def check_protocol(header: RunHeader, place: str, found: DamageList) -> None:
-    """The normalised protocol is that of which the header has the fingerprint."""
+    """Check the normalised protocol against its fingerprint in the header."""
     if not header.fingerprint and not header.normalised:
         return
     what = {name: tree for name, tree in header.normalised.items() if name not in _BESIDE}

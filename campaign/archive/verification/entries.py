@@ -1,6 +1,6 @@
 """Verifying the trials of a run, in several processes for large runs.
 
-A part of them knows nothing of the others. What is found comes back in the order of the trials.
+Parts are checked independently. Problems are returned in the order of the trials.
 """
 
 from __future__ import annotations
@@ -40,27 +40,27 @@ from campaign.recording import ChannelInfo
 
 _MEMBERS = frozenset(("title", "start_time", "end_time", "record"))
 _PLOT = frozenset(("axes", "time_indices"))
-"""Attributes by which viewers plot a group, besides its signal."""
+"""Attributes that viewers need to plot a group, besides its signal."""
 
 
 PRELOADED = (__name__,)
 WORTHWHILE = 400
-"""Trials from which on several processes take less time than they cost to begin."""
+"""Number of trials from which several processes save more time than their start takes."""
 TOGETHER = 50
-"""Trials that one process checks before it takes the next."""
+"""Number of trials of one part, checked by one process."""
 
 Entries = Sequence[tuple[str, TrialFinished]]
-"""Names of groups in a sealed run, and what the journal says of each."""
+"""Names of groups in a sealed run, each with its line of the journal."""
 
 
 class EntryCheck:
-    """What some trials of a run show; it grows as they are looked at.
+    """Accumulated result of checking trials of a run.
 
     Attributes:
         executed, unreadable: by the name of the trial's group.
-        datasets: how many were read against their checksums.
-        size: bytes that were read.
-        instruments: where each lies in the file, the bench that it describes, and what it shows.
+        datasets: number of datasets compared with their checksums.
+        size: bytes read.
+        instruments: of each, its address in the file, the bench it describes, and its check.
             Trials of one bench share it.
     """
 
@@ -75,22 +75,22 @@ class EntryCheck:
         self.instruments: list[tuple[int, nexus.InstrumentDescription, EntryCheck]] = []
 
     def absorb(self, other: EntryCheck) -> None:
-        """Add what others show; an instrument that was added before counts once."""
+        """Add another result; an instrument counts once."""
         self.problems.found += other.problems.found
         self.remarks.found += other.remarks.found
         self.executed |= other.executed
         self.unreadable |= other.unreadable
         self.datasets += other.datasets
-        for address, described, found in other.instruments:
+        for address, described, check in other.instruments:
             if not self._has(address, described):
-                self.instruments.append((address, described, found))
-                self.absorb(found)
+                self.instruments.append((address, described, check))
+                self.absorb(check)
 
     def _has(self, address: int, described: nexus.InstrumentDescription) -> bool:
         return any(each[0] == address and each[1] == described for each in self.instruments)
 
     def trial_file(self, entry: str, finished: TrialFinished) -> None:
-        """A trial's own file: its record, its samples, and its bytes."""
+        """Check a trial's own file: record, samples, and hash of the file."""
         path, name = self.path / finished.file, entry_name(finished.trial)
         known = len(self.problems.found)
         self.unreadable.add(entry)
@@ -107,7 +107,7 @@ class EntryCheck:
             self.problems.add(finished.file, UNFINISHED)
 
     def trial(self, file: h5py.File, entry: str, finished: TrialFinished) -> None:
-        """What a trial says of itself, and that its samples are those that were recorded."""
+        """Check the group of a trial: record, texts, members, samples."""
         self.unreadable.add(entry)
         with self.problems.noting(), safe_hdf5.guarded(self.path, f"/{entry}"):
             group = safe_hdf5.group_at(file, entry, "NXentry")
@@ -136,15 +136,15 @@ class EntryCheck:
         self.unreadable.discard(entry)
 
     def _says(self, group: h5py.Group, record: TrialRecord) -> None:
-        """What viewers show beside the record is what the record says."""
-        says = {"title": record.label, "start_time": record.started, "end_time": record.ended}
-        for name, wanted in says.items():
+        """Check the texts for viewers against the record."""
+        texts = {"title": record.label, "start_time": record.started, "end_time": record.ended}
+        for name, wanted in texts.items():
             with self.problems.noting():
                 safe_hdf5.text_at(group, name, text_digest(storage.storable(wanted)))
                 self.datasets += 1
 
     def _members(self, group: h5py.Group, place: str, record: TrialRecord, trees: Trees) -> None:
-        """What else an entry holds; what is missing or unknown is told."""
+        """Check the members of an entry; report missing and unknown ones."""
         kept = safe_hdf5.names(safe_hdf5.inner_group(group, "record"))
         wanted = set(_MEMBERS)
         if record.samples is not None:
@@ -153,39 +153,39 @@ class EntryCheck:
                 wanted |= set(nexus.MEMBERS)
         if record.preview is not None:
             wanted.add("preview")
-        there = set(safe_hdf5.names(group))
-        for name in sorted(wanted - there):
+        present = set(safe_hdf5.names(group))
+        for name in sorted(wanted - present):
             self.problems.add(f"{place}/{name}", "is missing")
         others = set(kept) - {"json", "trees"}
-        unknown = sorted(there - wanted) + sorted(f"record/{name}" for name in others)
+        unknown = sorted(present - wanted) + sorted(f"record/{name}" for name in others)
         for name in unknown:
             self.remarks.add(f"{place}/{name}", "is nothing that the format knows")
         self._by_themselves(group, place, "record", ("trees",))
-        if set(nexus.MEMBERS) <= there & wanted:
+        if set(nexus.MEMBERS) <= present & wanted:
             described = nexus.InstrumentDescription.of(trees[str(record.trial["bench"])])
             self._instrument(group, place, described)
 
     def _instrument(
         self, group: h5py.Group, place: str, described: nexus.InstrumentDescription
     ) -> None:
-        """The definition and the instrument, which trials of one bench share: each once."""
+        """Check definition and instrument once for all trials of a bench, which share them."""
         address = h5o.get_info(safe_hdf5.inner_group(group, "instrument").id).addr
         if self._has(address, described):
             return
-        found = EntryCheck(self.path)
-        self.instruments.append((address, described, found))
-        with found.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/instrument"):
+        check = EntryCheck(self.path)
+        self.instruments.append((address, described, check))
+        with check.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/instrument"):
             for name, what in nexus.differences(group, described):
-                found.problems.add(f"{place}/{name}", what)
-        found._by_themselves(group, place, "", ("definition",))
+                check.problems.add(f"{place}/{name}", what)
+        check._by_themselves(group, place, "", ("definition",))
         for inner in places(group, "instrument", "instrument/"):
             parent, _, name = inner.rpartition("/")
-            found._by_themselves(group, place, parent, (name,))
+            check._by_themselves(group, place, parent, (name,))
 
     def _by_themselves(
         self, group: h5py.Group, place: str, inner: str, names: Iterable[str]
     ) -> None:
-        """Datasets that have checksums of their own, in the groups `inner` of an entry."""
+        """Check datasets with their own checksum attributes, in the group path `inner`."""
         with self.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/{inner}"):
             for step in filter(None, inner.split("/")):
                 group = safe_hdf5.inner_group(group, step)
@@ -195,23 +195,23 @@ class EntryCheck:
                     self.datasets += 1
 
     def _series(self, group: h5py.Group, place: str, record: TrialRecord) -> None:
-        """The samples, each series against its digest, and that there are no others."""
+        """Check each series of samples against its digest, and that no others exist."""
         aim = Aim.of_tree(record.trial)
         infos = {info.name: info for info in (TIME, *record.series)}
         for inner, series in groupby(series_of(record), key=itemgetter(0)):
             with self.problems.noting(), safe_hdf5.guarded(self.path, f"{place}/{inner}"):
                 data = safe_hdf5.group_at(group, inner, "NXdata")
-                told = {name: (length, digest) for _, name, length, digest in series}
-                for name, (length, digest) in told.items():
+                recorded = {name: (length, digest) for _, name, length, digest in series}
+                for name, (length, digest) in recorded.items():
                     with self.problems.noting():
                         self._one_series(data, f"{place}/{inner}", infos[name], length, digest)
-                for name in sorted(set(safe_hdf5.names(data)) - told.keys() - {"title"}):
+                for name in sorted(set(safe_hdf5.names(data)) - recorded.keys() - {"title"}):
                     self.problems.add(f"{place}/{inner}/{name}", "is there, and was not announced")
                 with self.problems.noting():
                     safe_hdf5.text_at(data, "title", text_digest(storage.storable(record.label)))
                 for name in sorted(_PLOT - set(data.attrs)):
                     self.problems.add(f"{place}/{inner}@{name}", "is missing")
-                shown = [name for name in told if name != "time"]
+                shown = [name for name in recorded if name != "time"]
                 if safe_hdf5.attribute(data, "signal") not in aim.accepted(shown):
                     self.problems.add(f"{place}/{inner}@signal", "is not the channel to plot first")
                 if safe_hdf5.text_list(data, "axes") != ["time"]:
@@ -229,29 +229,29 @@ class EntryCheck:
 
 
 def check_entries(check: EntryCheck, entries: Entries, progress: Progress) -> None:
-    """Check trials of a sealed run, or the trial files of a folder, and add what they show."""
+    """Check trials of a sealed run, or the trial files of a folder; add the result to `check`."""
     parts = [entries[start : start + TOGETHER] for start in range(0, len(entries), TOGETHER)]
-    for found in _checked(check.path, parts, len(entries) >= WORTHWHILE):
-        check.absorb(found)
-        progress(found.size)
+    for part_check in _checked(check.path, parts, len(entries) >= WORTHWHILE):
+        check.absorb(part_check)
+        progress(part_check.size)
 
 
 def _checked(path: Path, parts: Sequence[Entries], many: bool) -> Iterator[EntryCheck]:
-    """A process that dies costs time: what is missing is then checked here."""
+    """Checks of the parts, in order; a part whose process died is checked in this process."""
     count = (os.cpu_count() or 1) if many else 1
     if count == 1:
         yield from (_check(path, part) for part in parts)
         return
     with processes.process_pool(count, PRELOADED, add_known_heaps, known_heaps()) as pool:
         begun: list[Future[EntryCheck]] = []
-        with suppress(BrokenProcessPool):  # keeps those before
+        with suppress(BrokenProcessPool):  # earlier futures stay
             begun.extend(pool.submit(_check, path, part) for part in parts)
         for part, future in zip_longest(parts, begun):
-            found = None
+            check = None
             if future is not None:
                 with suppress(BrokenProcessPool):
-                    found = future.result()
-            yield found or _check(path, part)
+                    check = future.result()
+            yield check or _check(path, part)
 
 
 def _check(path: Path, part: Entries) -> EntryCheck:
@@ -267,7 +267,7 @@ def _check(path: Path, part: Entries) -> EntryCheck:
 
 
 def places(parent: h5py.Group, name: str, prefix: str = "") -> Iterator[str]:
-    """Every dataset in a group and the groups in it, by its path in the group."""
+    """Paths of all datasets in a group, recursively, relative to the group."""
     group = safe_hdf5.member(parent, name)
     if group is None:
         return

@@ -9,7 +9,7 @@ from pathlib import Path
 from campaign.archive.reading.damage import Damage
 
 Progress = Callable[[int], object]
-"""Is told how many bytes were read since the last time; about twice a run's bytes in all."""
+"""Callback with the bytes read since its last call; in total about twice the size of a run."""
 
 STRUCTURE = "structure: not as it was sealed, though everything in it reads as it should"
 UNREADABLE_HASH = "structure: has no hash of its own that could be read"
@@ -18,15 +18,15 @@ UNFINISHED = "structure: is not the file that the journal says was written"
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found.
+    """Result of a verification.
 
     Attributes:
         path: of the run.
-        problems: what is wrong, in the order it was found.
-        remarks: what the format does not know, or what is not part of the run; harmless.
-        trials: executed ones that were looked at, earlier attempts included.
-        datasets: how many were read against their checksums.
-        root: digest of the seal, which stands for the whole run; empty where there is none.
+        problems: errors, in the order of detection.
+        remarks: items unknown to the format or not part of the run; harmless.
+        trials: number of executed trials checked, earlier attempts included.
+        datasets: number of datasets compared with their checksums.
+        root: digest of the seal, which represents the whole run; empty if there is no seal.
     """
 
     path: Path

@@ -14,9 +14,9 @@ from campaign.errors import ArchiveError
 def run_statement(path: Path) -> str:
     """The text that is signed for the sealed run at `path`: its name, and the digest of its seal.
 
-    The seal stands for every text and every sample, whether those are still kept or not. The name
-    is the archived one, so that a signature goes with a file that was renamed. Raises ArchiveError
-    when it is no sealed run or cannot be read.
+    The seal covers every text and every sample, whether samples are still kept or not. The name is
+    the archived one, so a signature stays valid after the file is renamed. Raises ArchiveError if
+    it is not a sealed run or is unreadable.
     """
     if not path.is_file():
         raise ArchiveError(f"{path}: is not a sealed run, and only such a one is signed")
@@ -27,6 +27,6 @@ def run_statement(path: Path) -> str:
         if not texts.root:
             raise ArchiveError(f"{path}: {damaged.found[0]}")
         name = texts.text("entry_identifier")
-    if name.split() != [name]:  # it must not write lines of its own
+    if name.split() != [name]:  # a name with a line break could forge lines of the statement
         raise ArchiveError(f"{path}: /run/entry_identifier: is not a run's name")
     return f"campaign-run\nrun {name}\nseal sha256 {texts.root}\n"

@@ -1,7 +1,7 @@
 """Verifying a run: every text against the seal, every trial against its record.
 
-A damaged sample is named by trial and channel. Damage in what HDF5 keeps for itself may change
-nothing that can be read; the hash of the file finds it, and it is reported as structure.
+A damaged sample is reported by trial and channel. Damage in HDF5's internal structures may change
+nothing readable; the hash of the file detects it, and it is reported as structure.
 """
 
 from __future__ import annotations
@@ -50,9 +50,7 @@ _OWN_FILES = {HEADER, PLAN, JOURNAL, PLAN_TRIALS, PLAN_TREES, SEALING}
 
 
 def verify_run(path: Path, progress: Progress = lambda count: None) -> Verification:
-    """Verify a sealed run or the folder of a run in progress, in flat memory; never raises
-    for what is in it.
-    """
+    """Verify a sealed run or a run in progress (folder), in constant memory; never raises."""
     check = _Check(path, progress)
     with check.problems.noting(), safe_hdf5.guarded(path):
         if path.is_dir():
@@ -70,7 +68,7 @@ def verify_run(path: Path, progress: Progress = lambda count: None) -> Verificat
 
 
 class _Check(EntryCheck):
-    """One verification, with what its trials show."""
+    """One verification of a run, with the checks of its trials."""
 
     def __init__(self, path: Path, progress: Progress) -> None:
         super().__init__(path)
@@ -78,13 +76,13 @@ class _Check(EntryCheck):
         self.root = ""
 
     def sealed(self) -> None:
-        """A sealed file: its content first, so that the hash speaks of what that does not show."""
+        """Check a sealed file: first its content; then the hash reports remaining differences."""
         with self.problems.noting():
             self._content()
         self._hash()
 
     def folder(self) -> None:
-        """The folder of a run in progress, as far as its journal tells."""
+        """Check the folder of a run in progress against its journal."""
         run = open_folder(self.path)
         content = self.path / JOURNAL
         story = read_lines(content.read_bytes() if content.is_file() else b"")
@@ -110,12 +108,12 @@ class _Check(EntryCheck):
             with self.problems.noting():
                 not_kept = read_not_kept(texts)
             self._index(texts, story)
-            told = entry_names(story.attempts)
-            gone = {entry for entry in told if entry in not_kept and entry not in file}
+            attempts = entry_names(story.attempts)
+            gone = {entry for entry in attempts if entry in not_kept and entry not in file}
             reasons: dict[str, list[str]] = {}
             for entry in sorted(gone):
                 reasons.setdefault(not_kept[entry], []).append(entry)
-            # Of a trial without a group, the index has the record, parsed as it is asked for.
+            # The index has the record of a trial without a group; access parses it.
             for number, outline in enumerate(run.outlines):
                 if entry_name(outline.number) in gone:
                     with self.problems.noting():
@@ -127,16 +125,16 @@ class _Check(EntryCheck):
                 more = f" and {len(entries) - 1} more trials" if len(entries) > 1 else ""
                 what = f"no samples of it{more} are kept: {why}; their digests are"
                 self.remarks.add(f"/{entries[0]}", what)
-            there = [(entry, finished) for entry, finished in told.items() if entry not in gone]
-            check_entries(self, there, self.progress)
-            for entry in sorted(not_kept.keys() - told.keys()):
+            rest = [(entry, finished) for entry, finished in attempts.items() if entry not in gone]
+            check_entries(self, rest, self.progress)
+            for entry in sorted(not_kept.keys() - attempts.keys()):
                 self.problems.add("/run/not_kept", f"names {entry!r}, and no such trial finished")
-            for entry in sorted(not_kept.keys() & told.keys()):
+            for entry in sorted(not_kept.keys() & attempts.keys()):
                 if entry in file:
                     what = "is there, and its samples are said not to be kept"
                     self.problems.add(f"/{entry}", what)
             for name in safe_hdf5.names(file):
-                if name not in told and name != "run":
+                if name not in attempts and name != "run":
                     known = ENTRY.fullmatch(name) is not None
                     note = self.problems if known else self.remarks
                     what = "is there, and no line of the journal says that it finished"
@@ -149,9 +147,9 @@ class _Check(EntryCheck):
         self.executed[entry] = TrialFacts.of(entry, f"/{entry}", archived, fingerprint)
 
     def _texts(self, file: h5py.File, texts: SealedTexts) -> None:
-        """Every text of the run against the seal."""
+        """Check every text of the run against the seal."""
         if texts.seal is None:
-            return  # which was found when the run was opened
+            return  # reported when the run was opened
         bound = texts.seal.texts.keys()
         self.datasets += 1
         for place in sorted(_REQUIRED - bound):
@@ -164,12 +162,12 @@ class _Check(EntryCheck):
             self.remarks.add(f"/run/{place}", "is nothing that the format knows")
 
     def _index(self, texts: SealedTexts, story: Lines) -> None:
-        """The index has the records that the journal names, and no others."""
+        """Check that the index has exactly the records that the journal names."""
         with self.problems.noting():
             lines = {text_digest(line) for line in texts.text("index/data").splitlines()}
-            told = {finished.record for finished in story.attempts}
-            if lines != told:
-                count = len(lines ^ told)
+            records = {finished.record for finished in story.attempts}
+            if lines != records:
+                count = len(lines ^ records)
                 self.problems.add("/run/index", f"differs from the journal in {count} records")
 
     def _hash(self) -> None:
@@ -187,7 +185,7 @@ class _Check(EntryCheck):
     def _agreement(
         self, run: RunReader, story: Lines, header_place: str, journal: str, plan: str
     ) -> None:
-        """Whether the parts of the run agree; what cannot be read is told of once."""
+        """Check that the parts of the run agree; unreadable parts are reported once."""
         known = {damage.place for damage in self.problems.found}
         for damage in run.damaged:
             if damage.place not in known:
@@ -210,14 +208,14 @@ class _Check(EntryCheck):
             consistency.check_protocol(run.header, header_place, self.problems)
 
     def _outcome(self, run: RunReader, story: Lines) -> None:
-        """The end of a sealed run is the one of its journal."""
+        """Check the outcome of a sealed run against its journal."""
         ended = story.ended
         if ended is None:
             if story.entries:
                 self.problems.add("/run/journal", "has no line of the end of the run")
             return
         for what in ("status", "reason", "safe_state"):
-            mine, theirs = str(getattr(run, what)), str(getattr(ended, what))
-            if mine != theirs:
-                told = f"is {mine!r}, and the journal says {theirs!r}"
-                self.problems.add(f"/run/outcome/{what}", told)
+            actual, expected = str(getattr(run, what)), str(getattr(ended, what))
+            if actual != expected:
+                problem = f"is {actual!r}, and the journal says {expected!r}"
+                self.problems.add(f"/run/outcome/{what}", problem)

@@ -1,1 +1,1 @@
-"""Writing runs: trial by trial into a folder that no crash can spoil, then into one file."""
+"""Writing runs: trial by trial into a crash-safe folder, then into one file."""

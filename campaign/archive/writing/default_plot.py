@@ -1,6 +1,6 @@
 """The default plot of a run and of a trial in HDF5 viewers.
 
-One channel, and beside it only those that fit on its axis: eleven units on one axis tell nothing.
+One channel, and others only if they have its unit: a plot of many units on one axis is useless.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ BY_MODE = {
     "prescribed": FRICTION_TORQUE,
     "spring": RELATIVE_RATE,
 }
-"""By a task's mode, the channel that tells most where nothing else says which."""
+"""Default channel by the mode of a task."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """What of a trial decides which of its channels tells most.
+    """Properties of a trial that select its default channel.
 
     Attributes:
-        mode: of its task.
+        mode: mode of its task.
         hull_moves: whether the task has a base motion.
-        requires: the channels without which its analysis finds nothing.
+        requires: the channels that its analysis requires.
     """
 
     mode: str
@@ -49,7 +49,7 @@ class Aim:
 
     @classmethod
     def of_tree(cls, trial: Tree) -> Self:
-        """The same of an archived trial; one that does not say so moves no hull."""
+        """Aim of an archived trial; without a base motion in it, the hull is at rest."""
         task, requires = trial.get("task"), trial.get("requires")
         task = task if isinstance(task, Mapping) else {}
         motion = task.get("base_acceleration")
@@ -58,11 +58,11 @@ class Aim:
         return cls(str(task.get("mode", "")), shape != "zero", tuple(map(str, names)))
 
     def channel(self, names: Sequence[str]) -> str:
-        """Of the channels that were recorded, at least one, the one to plot first.
+        """The channel to plot first; `names` are the recorded channels, at least one.
 
-        Where the hull moves it is the pointing error, which stabilizing is about; at a commanded
-        rate the drive torque, if that is what the analysis needs: it is the friction. Else it is
-        that of the mode, or the first there is.
+        If the hull moves, it is the pointing error, the measure of stabilization. At a commanded
+        rate it is the drive torque (the friction), if the analysis requires it. Otherwise it is the
+        channel of the mode, or the first one.
         """
         wanted = [POINTING_ERROR] if self.hull_moves else []
         if self.mode == "rate" and DRIVE_TORQUE in self.requires:
@@ -71,12 +71,12 @@ class Aim:
         return next((name for name in wanted if name in names), names[0])
 
     def accepted(self, names: Sequence[str]) -> frozenset[str]:
-        """The channels that may be plotted first: before, the mode alone decided."""
+        """The valid default channels; older programs selected by the mode only."""
         return frozenset((self.channel(names), Aim(self.mode).channel(names)))
 
 
 def beside(shown: ChannelInfo, channels: Iterable[ChannelInfo]) -> list[str]:
-    """The other channels that fit on its axis: of its unit, as files and as readers have it."""
+    """The other channels with the same unit and display unit, for the same axis."""
     units = shown.unit, shown.display_unit
     same = (each.name for each in channels if (each.unit, each.display_unit) == units)
     return [name for name in same if name != shown.name]
@@ -85,15 +85,15 @@ def beside(shown: ChannelInfo, channels: Iterable[ChannelInfo]) -> list[str]:
 def telling_trial(
     plan: Iterable[PlannedTrial], completed: Collection[int], with_samples: Sequence[int]
 ) -> int | None:
-    """Number of the trial that a run opens on.
+    """Number of the trial that viewers open first.
 
-    It is the middle one of the completed measurements of the first test that has any: the first of
-    a map is its slowest point, the last its fastest. Without any it is the first trial with
-    samples, whatever became of it.
+    It is the middle one of the completed measurements of the first test that has any: the first
+    and last trials of a map are its slowest and fastest points. Without any it is the first trial
+    with samples, of any outcome.
 
     Args:
-        plan: every trial, those that followed included, in order.
-        completed: numbers of the trials that ran to their end.
+        plan: every trial in order, follow-up trials included.
+        completed: numbers of the completed trials.
         with_samples: numbers of the trials that have samples in the file.
     """
     good = set(completed) & set(with_samples)

@@ -1,11 +1,10 @@
 """Writing HDF5 for NeXus readers in bounded memory.
 
-Sample datasets are one-dimensional, chunked, and pass HDF5's two standard filters, shuffle and
-deflate, or deflate alone where that is smaller. The chunks are compressed beforehand, by ISA-L
-outside HDF5's global lock, and handed over ready: a file like the one HDF5's own filters would
-write, several times faster. Objects are made through h5py's low-level interface, which costs a
-fifth of the other: a campaign has tens of thousands of them. No object notes when it was made, so
-equal content makes equal bytes.
+Sample datasets are one-dimensional, chunked, and use HDF5's two standard filters, shuffle and
+deflate, or only deflate if that is smaller. ISA-L compresses the chunks outside HDF5's global lock:
+the file is equivalent to one from HDF5's filters, and written several times faster. Objects are
+created through h5py's low-level interface, which takes a fifth of the time: a campaign has tens of
+thousands of them. No object stores its creation time, so equal content gives equal bytes.
 """
 
 from __future__ import annotations
@@ -46,10 +45,10 @@ _SCALAR = h5s.create(h5s.SCALAR)
 
 
 def create_file(path: Path) -> h5py.File:
-    """A new file that HDF5 1.10 and everything since reads; nothing in it notes its time."""
+    """Create a file for HDF5 1.10 and later, without a creation time."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fclose_degree(h5f.CLOSE_STRONG)
-    # Since 1.10 headers are a third as large, with checksums, and one chunk needs no index.
+    # In 1.10, headers have a third of the size, and checksums; a single chunk needs no index.
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
     access.set_file_locking(False, False)
     plan = h5p.create(h5p.FILE_CREATE)
@@ -59,17 +58,17 @@ def create_file(path: Path) -> h5py.File:
 
 
 def memory_file(label: str) -> h5py.File:
-    """A file in memory, for groups that are made once and copied: that costs a tenth of making."""
+    """Create a file in memory, for groups to copy: a copy takes a tenth of the time of creation."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(1 << 14, False)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    name = f"{label}-{next(_MEMORY_FILES)}"  # HDF5 knows files in memory by their names
+    name = f"{label}-{next(_MEMORY_FILES)}"  # HDF5 identifies files in memory by name
     return h5py.File(h5f.create(name.encode(), h5f.ACC_TRUNC, fapl=access))
 
 
 @contextlib.contextmanager
 def closing(file: h5py.File) -> Iterator[h5py.File]:
-    """Closes `file`; after an error its handle is let go of without a second error on top."""
+    """Close `file` after the block; after an error, suppress a second error of the closing."""
     try:
         yield file
     except BaseException:
@@ -80,7 +79,7 @@ def closing(file: h5py.File) -> Iterator[h5py.File]:
 
 
 def make_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
-    """A group of a NeXus class."""
+    """Create a group of a NeXus class."""
     plan = h5p.create(h5p.GROUP_CREATE)
     plan.set_obj_track_times(False)
     group = h5py.Group(h5g.create(parent.id, name.encode(), gcpl=plan))
@@ -89,18 +88,18 @@ def make_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
 
 
 def link(source: h5py.Group, name: str, target: h5py.Group, new_name: str) -> None:
-    """Let what `source` has as `name` be found in `target`, too: a second name, not a copy."""
+    """Create a hard link in `target` to the member `name` of `source`."""
     target.id.links.create_hard(new_name.encode(), source.id, name.encode())
 
 
 def put_attribute(item: h5py.HLObject, name: str, value: str) -> None:
-    """A text attribute of variable length."""
+    """Write a text attribute of variable length."""
     attribute = h5a.create(item.id, name.encode(), _TEXT, _SCALAR)
     attribute.write(np.array(value, dtype=_STRING))
 
 
 def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None:
-    """A text as a scalar of fixed length, so that a reader knows its size before reading it."""
+    """Write a text as a scalar of fixed length, so a reader knows its size before reading it."""
     raw = storable(text).encode("utf-8")
     size = max(1, len(raw))
     dataset = _put_scalar(group, name, _text_kind(size), np.array(raw, dtype=f"S{size}"), raw)
@@ -109,13 +108,13 @@ def put_text(group: h5py.Group, name: str, text: str, **attributes: str) -> None
 
 
 def put_integer(group: h5py.Group, name: str, value: int) -> None:
-    """A whole number as a 64-bit scalar."""
+    """Write an integer as a 64-bit scalar."""
     number = np.array(value, dtype="<i8")
     _put_scalar(group, name, h5t.STD_I64LE, number, number.tobytes())
 
 
 def put_number(group: h5py.Group, name: str, value: float, **attributes: str) -> None:
-    """A number as a 64-bit float scalar."""
+    """Write a number as a 64-bit float scalar."""
     number = np.array(value, dtype=SAMPLE)
     dataset = _put_scalar(group, name, _SAMPLE, number, number.tobytes())
     for key, text in attributes.items():
@@ -123,7 +122,7 @@ def put_number(group: h5py.Group, name: str, value: float, **attributes: str) ->
 
 
 def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -> None:
-    """Numbers, shape (n,), as samples are stored."""
+    """Write numbers, shape (n,), in the storage form of samples."""
     samples = np.ascontiguousarray(values, dtype=SAMPLE)
     chunk, shuffled = max(1, min(len(samples), CHUNK)), shuffling_helps(samples)
     dataset = create_series(group, name, len(samples), chunk, shuffled)
@@ -136,9 +135,9 @@ def put_series(group: h5py.Group, name: str, values: Array, **attributes: str) -
 
 
 def put_texts(group: h5py.Group, name: str, texts: Sequence[str], **attributes: str) -> None:
-    """A list of texts of variable length, for other programs: no reader here opens such a one."""
-    told = np.array([storable(text) for text in texts], dtype=_STRING)
-    dataset = group.create_dataset(name, data=told, dtype=_STRING, track_times=False)
+    """Write a list of texts of variable length, for other programs: no reader here accepts it."""
+    values = np.array([storable(text) for text in texts], dtype=_STRING)
+    dataset = group.create_dataset(name, data=values, dtype=_STRING, track_times=False)
     for key, value in attributes.items():
         put_attribute(dataset, key, value)
 
@@ -164,7 +163,7 @@ def _scalar_plan(compact: bool) -> h5p.PropDCID:
 
 
 def put_long_text(group: h5py.Group, name: str, text: LongText) -> int:
-    """Room for a text, as `put_text` stores it; returns where it goes in the file, once closed."""
+    """Allocate a text in the form of `put_text`; return its offset, for writing after closing."""
     plan = h5p.create(h5p.DATASET_CREATE)
     plan.set_obj_track_times(False)
     plan.set_alloc_time(h5d.ALLOC_TIME_EARLY)
@@ -183,10 +182,9 @@ def _text_kind(size: int) -> h5t.TypeID:
 
 
 def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
-    """Room for the hash of the file that `group` is in; returns where it stands in the file.
+    """Allocate the hash of the file of `group`; return its offset and length in the file.
 
-    64 digits `0` until `sealing` puts the hash over them. The only dataset without a checksum
-    of its own.
+    Contains 64 digits `0` until sealing overwrites them. The only dataset without its own checksum.
     """
     digits = np.array(b"0" * 64, dtype="S64")
     dataset = group.create_dataset(name, data=digits, track_times=False)
@@ -195,7 +193,7 @@ def blank_digest(group: h5py.Group, name: str) -> tuple[int, int]:
 
 
 def attach_time(group: h5py.Group, time: str = "time") -> None:
-    """Make `time`, or another axis, the dimension scale of every series in `group`."""
+    """Attach the axis `time` as the dimension scale to every series in `group`."""
     scale = h5d.open(group.id, time.encode())
     h5ds.set_scale(scale, time.encode())
     for name in group.id:
@@ -206,7 +204,7 @@ def attach_time(group: h5py.Group, time: str = "time") -> None:
 def create_series(
     group: h5py.Group, name: str, length: int, chunk: int, shuffled: bool
 ) -> h5d.DatasetID:
-    """A dataset for samples, whose chunks are put there ready."""
+    """Create a dataset for samples; the caller writes compressed chunks."""
     size, limit = (length,), (max(length, chunk),)
     space = h5s.create_simple(size, limit)
     return h5d.create(group.id, name.encode(), _SAMPLE, space, _series_plan(chunk, shuffled))

@@ -1,4 +1,4 @@
-"""Texts that are as long as their run, in pieces: none of them is ever in memory whole."""
+"""Texts with the size of a run, in pieces: never complete in memory."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SHORT = 32_000
-"""Bytes of a text that lies in its own header; HDF5 allows 64 kB with attributes."""
+"""Largest text in an object header (bytes); HDF5 allows 64 kB with attributes."""
 
 _BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
 class LongText:
-    """A text by its pieces, UTF-8, which are made anew whenever they are asked for."""
+    """A text by its pieces (UTF-8), which each call of `pieces` generates again."""
 
     pieces: Callable[[], Iterable[bytes]]
     size: int
@@ -23,7 +23,7 @@ class LongText:
 
 
 def text_of(pieces: Callable[[], Iterable[bytes]]) -> str | LongText:
-    """The text, if it is short."""
+    """The text itself if it is short, else a `LongText`."""
     digest, size, short = hashlib.sha256(), 0, b""
     for piece in pieces():
         digest.update(piece)
@@ -33,7 +33,7 @@ def text_of(pieces: Callable[[], Iterable[bytes]]) -> str | LongText:
 
 
 def file_pieces(path: Path, size: int | None = None) -> Iterator[bytes]:
-    """The first `size` bytes of a file of JSON lines, or all of it; they have no NUL."""
+    """The first `size` bytes of a file of JSON lines, or the whole file; contains no NUL."""
     with path.open("rb") as file:
         left = path.stat().st_size if size is None else size
         while block := file.read(min(_BLOCK, left)):

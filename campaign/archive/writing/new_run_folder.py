@@ -22,7 +22,7 @@ from campaign.trial import Trial, canonical_json
 
 
 def make_folder(folder: Path, header: RunHeader, trials: Sequence[Trial]) -> Journal:
-    """Make a run's folder, under another name until everything is in it."""
+    """Create a run's folder, under a temporary name until it is complete; return its journal."""
     part = folder.with_name(folder.name + PART)
     if part.is_dir():
         remove_folder(part)

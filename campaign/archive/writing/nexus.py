@@ -1,10 +1,10 @@
 """The NeXus application definition that the trials of an archive follow, `NXfriction_trial`.
 
-It says what every program may rely on: which channels there are at least, that each has a unit,
-what the bench consists of. `nxvalidate` holds a file against it: `docs/reading-archives.md`.
+It guarantees to other programs: the minimum channels, a unit of each, and the description of the
+bench. `nxvalidate` checks a file against it: `docs/reading-archives.md`.
 
-A trial says that it follows the definition when it does. One that recorded nothing, or that comes
-from a bench without one of the required channels, is archived all the same, without saying so.
+A trial that follows the definition is marked so. A trial without samples, or without one of the
+required channels, is archived without this mark.
 """
 
 from __future__ import annotations
@@ -34,33 +34,33 @@ DEFINITION = "NXfriction_trial"
 VERSION = "2.0"
 
 REQUIRED = (COMMAND, GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE, MOTOR_CURRENT, DRIVE_TORQUE)
-"""The channels without which an entry does not follow the definition."""
+"""The channels that the definition requires."""
 
 MEMBERS = ("definition", "instrument")
-"""What an entry that follows the definition has besides its samples."""
+"""Members of an entry that follows the definition, besides its samples."""
 
 _SENSORS = {"gyro": GYRO_RATE, "encoder": RELATIVE_ANGLE, "current_sensor": MOTOR_CURRENT}
 _GAIN_UNITS = {"rate": ("A s/rad", "A/rad"), "current": ("V/A", "V/(A s)")}
 
 
 def definition_path() -> Path:
-    """The definition's own file, for validators: `nxvalidate -a FILE`."""
+    """Path of the definition, for validators: `nxvalidate -a FILE`."""
     return Path(__file__).with_name(f"{DEFINITION}.nxdl.xml")
 
 
 def follows_definition(channels: Iterable[ChannelInfo]) -> bool:
-    """Whether a recording of these channels is one that the definition describes."""
+    """Whether a recording of these channels follows the definition."""
     return {channel.name for channel in channels}.issuperset(REQUIRED)
 
 
 def write_definition(entry: h5py.Group, bench: InstrumentDescription) -> None:
-    """Say that `entry` follows the definition, and describe its bench."""
+    """Mark `entry` as following the definition, and describe its bench."""
     hdf5.put_text(entry, "definition", DEFINITION, version=VERSION)
     h5o.copy(_template(bench).id, b"instrument", entry.id, b"instrument")
 
 
 def differences(entry: h5py.Group, bench: InstrumentDescription) -> Iterator[tuple[str, str]]:
-    """What of an entry's definition and instrument is not what the bench says: name, and what."""
+    """Members of definition and instrument that differ from the bench: name and problem."""
     definition = entry["definition"]
     if definition[()] != DEFINITION.encode() or definition.attrs.get("version") != VERSION:
         yield "definition", f"is not {DEFINITION} {VERSION}"
@@ -69,17 +69,17 @@ def differences(entry: h5py.Group, bench: InstrumentDescription) -> Iterator[tup
         lambda name, item: wanted.update({name: item} if isinstance(item, h5py.Dataset) else {})
     )
     for name, expected in wanted.items():
-        found = entry["instrument"].get(name)
-        same = isinstance(found, h5py.Dataset) and found[()] == expected[()]
-        if not same or found.attrs.get("units") != expected.attrs.get("units"):
+        actual = entry["instrument"].get(name)
+        same = isinstance(actual, h5py.Dataset) and actual[()] == expected[()]
+        if not same or actual.attrs.get("units") != expected.attrs.get("units"):
             yield f"instrument/{name}", "is not what the bench in the record says"
 
 
 @dataclass(frozen=True)
 class InstrumentDescription:
-    """What the instrument tells of a bench: its name, and gains as (loop, proportional, integral).
+    """Bench data in an instrument: name, and gains as (loop, proportional, integral).
 
-    An archive keeps benches of any origin, so nothing of their layout is taken for granted.
+    An archive may contain benches of any origin, so their layout is not assumed.
     """
 
     name: str
@@ -90,16 +90,16 @@ class InstrumentDescription:
     def of(cls, bench: Tree) -> InstrumentDescription:
         loops = bench.get("controller")
         gains = (
-            (loop, *found)
+            (loop, *pair)
             for loop in _GAIN_UNITS
-            if isinstance(loops, Mapping) and (found := _parallel_gains(loops.get(loop)))
+            if isinstance(loops, Mapping) and (pair := _parallel_gains(loops.get(loop)))
         )
         return cls(str(bench.get("name", "")), tuple(gains), sides_in(bench))
 
 
 @lru_cache(maxsize=32)
 def _template(bench: InstrumentDescription) -> h5py.File:
-    """A file in memory that holds the instrument."""
+    """A file in memory with the instrument, to copy from."""
     file = hdf5.memory_file("instrument")
     instrument = hdf5.make_group(file, "instrument", "NXinstrument")
     hdf5.put_text(instrument, "name", bench.name)
@@ -118,11 +118,11 @@ def _template(bench: InstrumentDescription) -> h5py.File:
 
 
 def _parallel_gains(controller: object) -> tuple[float, float] | None:
-    """Proportional and integral gain (SI) of a controller of a bench; None when it does not say."""
+    """Proportional and integral gain (SI, parallel form) of a controller; None if not stated."""
     if not isinstance(controller, Mapping):
         return None
     proportional, integral = controller.get("proportional"), controller.get("integral")
     if not isinstance(proportional, int | float) or not isinstance(integral, int | float):
         return None
-    ideal = controller.get("form") == "ideal"  # its integral gain multiplies inside the other
+    ideal = controller.get("form") == "ideal"  # the proportional gain multiplies its integral gain
     return float(proportional), float(proportional * integral if ideal else integral)

@@ -25,10 +25,10 @@ Array = NDArray[np.float64]
 
 
 class PackedFile:
-    """A trial file that is being written."""
+    """A trial file during writing."""
 
     def __init__(self, path: Path) -> None:
-        """Raises OSError."""
+        """Create the file. Raises OSError."""
         keep_umask()
         self._file = path.open("wb")
         self._digest = hashlib.sha256()
@@ -36,7 +36,7 @@ class PackedFile:
         self.put(MAGIC)
 
     def put(self, content: bytes) -> Place:
-        """Append bytes; returns where they lie. Raises OSError."""
+        """Append bytes; return their place. Raises OSError."""
         place = self._size, len(content)
         self._file.write(content)
         self._digest.update(content)
@@ -44,24 +44,24 @@ class PackedFile:
         return place
 
     def finish(self, trial: PackedTrial) -> tuple[str, int]:
-        """Write the rest and close the file; returns its SHA-256 and its bytes."""
+        """Write the rest and close the file; return its SHA-256 and its size (bytes)."""
         start, _ = self.put(trial.model_dump_json(exclude_defaults=True).encode())
         self.put(start.to_bytes(POINTER, "little"))
         self._file.close()
         return self._digest.hexdigest(), self._size
 
     def close(self) -> None:
-        """Let go of it, unfinished."""
-        with contextlib.suppress(OSError, AttributeError):  # the latter: it was never opened
+        """Close the file, unfinished."""
+        with contextlib.suppress(OSError, AttributeError):  # the latter: opening failed
             self._file.close()
 
     def __del__(self) -> None:
-        """Of a trial whose thread was left behind."""
+        """Close the file of a trial with an abandoned thread."""
         self.close()
 
 
 def copy_packed(source: Path, trial: PackedTrial, path: Path) -> tuple[str, int]:
-    """Write a trial, whose chunks lie in `source`, as a trial file; returns SHA-256 and bytes."""
+    """Write a trial with its chunks in `source` as a trial file; return SHA-256 and size."""
     target = PackedFile(path)
     try:
         with source.open("rb") as file:
@@ -83,11 +83,11 @@ def copy_packed(source: Path, trial: PackedTrial, path: Path) -> tuple[str, int]
 
 
 class SampleColumns:
-    """Series of equal length, packed as their samples come; one chunk of each is in memory.
+    """Series of equal length, compressed during recording; one chunk of each is in memory.
 
     Args:
-        names: of the series, in the order of the rows that `append` takes.
-        file: where chunks go.
+        names: names of the series, in the order of the rows of `append`.
+        file: destination of the chunks.
     """
 
     def __init__(self, names: Sequence[str], file: PackedFile, chunk: int = CHUNK) -> None:
@@ -102,26 +102,26 @@ class SampleColumns:
 
     @property
     def length(self) -> int:
-        """Samples appended so far."""
+        """Number of samples appended so far."""
         return self._written + self._filled
 
     @property
     def buffered_bytes(self) -> int:
-        """Memory that waits for its chunk to fill; constant."""
+        """Size of the chunk buffers (bytes); constant."""
         return self._buffer.nbytes
 
     @property
     def series(self) -> tuple[PackedSeries, ...]:
-        """Where the samples lie, once it is finished."""
+        """Places of the samples; complete after `finish`."""
         chunk = max(1, min(self._written, self._buffer.shape[1]))
-        told = zip(self._names, self._shuffled, self._places, strict=True)
+        columns = zip(self._names, self._shuffled, self._places, strict=True)
         return tuple(
             PackedSeries(name=name, chunk=chunk, shuffled=shuffled, chunks=tuple(places))
-            for name, shuffled, places in told
+            for name, shuffled, places in columns
         )
 
     def append(self, rows: Sequence[Array]) -> list[Array]:
-        """Add samples, one row per series; returns the whole chunks written, as new arrays."""
+        """Add samples, one row per series; return the full chunks written, as new arrays."""
         total = len(rows[0])
         taken = 0
         chunks = []
@@ -137,7 +137,7 @@ class SampleColumns:
         return chunks
 
     def finish(self) -> tuple[Array, list[str]]:
-        """Write what is left; returns that, shape (rows, m), and the digest of every series."""
+        """Write the rest; return it, shape (rows, m), and the digest of every series."""
         rest = self._buffer[:, : self._filled].copy()
         self._write_chunk()
         return rest, [digest.hexdigest() for digest in self._digests]
@@ -156,6 +156,6 @@ class SampleColumns:
         self._buffer[:, self._filled :] = 0.0
         # A short recording is one chunk of its own length.
         size = self._buffer.shape[1] if self._written else self._filled
-        told = zip(self._buffer, self._shuffled, self._places, strict=True)
-        for row, shuffled, places in told:
+        columns = zip(self._buffer, self._shuffled, self._places, strict=True)
+        for row, shuffled, places in columns:
             places.append(self._file.put(pack(row[:size], shuffled)))

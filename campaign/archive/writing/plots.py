@@ -1,13 +1,13 @@
 """A figure panel as NeXus data: curves over one x in one group.
 
-An NXdata group has one x for all of its curves. Curves of a panel that have the same x are plotted
-together, and so are those that lie beside each other, such as the two directions of a friction map;
-where one has no point it is NaN. All others get a group of their own.
+An NXdata group has one x for all of its curves. Curves of a panel with the same x share a group.
+So do curves on separate ranges of x, such as the two directions of a friction map; a curve is NaN
+outside its range. All others get their own group.
 
-Curves that are drawn beside one place are not over one x: each has its points in one series then.
+Curves that are drawn with an offset beside one place do not share an x.
 
-Several viewers show the first curve of a group and no other, or draw intervals of the first alone.
-Where the curves are single points, such as one for each method, a series of all of them is first.
+Several viewers show only the first curve of a group, or only its intervals. If all curves are
+single points, such as one per method, the first series contains all of them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 from campaign.result import Array, Curve, Panel
 
 SYMMETRIC = 0.1
-"""Share of its half-width by which an interval may be off its middle and still be `value ± half`:
-as where numbers are written (`campaign.text.interval`)."""
+"""Largest offset of an interval's center, relative to its half-width, for the form `value ± half`;
+as in printed numbers (`campaign.text.interval`)."""
 
 
 INTERVAL = {
@@ -32,7 +32,7 @@ INTERVAL = {
     "high": "upper end of the 95 % interval",
     "lower_edge": "lower edge of the band",
 }
-"""What stands beside a series, by the ending of its name."""
+"""Meaning of a series' companions, by the ending of their names."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class Plot:
 
     Attributes:
         x: shape (n,).
-        curves: each with its name and where in `x` it begins.
+        curves: each with its name and the index in `x` where it begins.
     """
 
     x: Array
     curves: tuple[tuple[str, Curve, int], ...]
 
     def spread(self, values: Array, start: int) -> Array:
-        """What a curve has at its own points, over all of `x`: NaN elsewhere; shape (n,)."""
+        """Extend the values of a curve to all of `x`, with NaN elsewhere; shape (n,)."""
         if len(values) == len(self.x):
             return values
         whole = np.full(len(self.x), np.nan)
@@ -57,11 +57,11 @@ class Plot:
 
 
 def plots_of(panel: Panel) -> list[Plot]:
-    """The plots of a panel, that which tells most first: it is the one that viewers open."""
+    """The plots of a panel, the most important first: viewers open it."""
     alike: dict[tuple[bytes, float], list[Curve]] = {}
     for curve in panel.curves:
         alike.setdefault((_floats(curve.x).tobytes(), curve.aside), []).append(curve)
-    bundles: list[list[list[Curve]]] = []  # of curves that lie side by side, those with one x
+    bundles: list[list[list[Curve]]] = []  # per plot: groups of curves with one x, side by side
     for curves in alike.values():
         beside = next((b for b in bundles if all(_apart(curves[0], c[0]) for c in b)), None)
         if beside is None:
@@ -72,7 +72,7 @@ def plots_of(panel: Panel) -> list[Plot]:
 
 
 def joined(plot: Plot) -> Curve | None:
-    """All points of a plot as one curve, where each of its several curves is one point."""
+    """All points of a plot as one curve; None unless it has several curves of one point each."""
     curves = [curve for _, curve, _ in sorted(plot.curves, key=lambda each: each[2])]
     if len(curves) < 2 or not len(curves) == len(plot.x) == sum(len(c.x) for c in curves):
         return None
@@ -88,7 +88,7 @@ def joined(plot: Plot) -> Curve | None:
 
 
 def half_widths(values: Array, low: Array, high: Array) -> Array | None:
-    """Half of each interval, shape (n,), NaN where there is none; None where any is lopsided."""
+    """Half-widths of the intervals, shape (n,), NaN without one; None if any is asymmetric."""
     half = 0.5 * (high - low)
     off = np.abs(high + low - 2 * values)
     given = np.isfinite(half)
@@ -96,7 +96,7 @@ def half_widths(values: Array, low: Array, high: Array) -> Array | None:
 
 
 def names_of(wanted: Sequence[str]) -> list[str]:
-    """Names as NeXus allows them, each once."""
+    """Valid and unique NeXus names, in the order of `wanted`."""
     taken: dict[str, None] = {}
     for text in wanted:
         name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")[:50] or "unnamed"
@@ -105,13 +105,13 @@ def names_of(wanted: Sequence[str]) -> list[str]:
 
 
 def unused(name: str, taken: Container[str]) -> str:
-    """A name, with a number where somebody has it already."""
+    """`name`, or with a number appended if it is taken."""
     numbered = (f"{name}_{number}" for number in count(2))
     return next(each for each in chain([name], numbered) if each not in taken)
 
 
 def _plot(bundle: list[list[Curve]]) -> Plot:
-    """Groups of curves side by side, in the order of x."""
+    """The plot of groups of curves side by side, in the order of x."""
     ordered = sorted(bundle, key=lambda curves: _ends(curves[0])[0])
     starts = np.cumsum([0, *(len(curves[0].x) for curves in ordered)])
     placed = [
@@ -132,14 +132,14 @@ def _background(plot: Plot) -> int:
 
 
 def _has_ends(curve: Curve) -> bool:
-    """Whether any of its points has an interval, if only on one side."""
+    """Whether any of its points has an interval, at least on one side."""
     return any(
         end is not None and np.isfinite(_floats(end)).any() for end in (curve.low, curve.high)
     )
 
 
 def _rank(curve: Curve) -> int:
-    """How far in the background it is: what has intervals in front, then what was measured."""
+    """Order of a curve: 0 with intervals, 1 measured, 2 reference, thin or band."""
     if _has_ends(curve) and curve.style not in ("thin", "band"):
         return 0
     if curve.series in ("reference", "alternative") or curve.style in ("thin", "band"):
@@ -148,7 +148,7 @@ def _rank(curve: Curve) -> int:
 
 
 def _apart(one: Curve, other: Curve) -> bool:
-    """Whether both run along x, and one of them is over before the other begins."""
+    """Whether both have increasing x, and their ranges of x do not overlap."""
     if not (_runs_along(one) and _runs_along(other)):
         return False
     (low, high), (lowest, highest) = _ends(one), _ends(other)
@@ -170,8 +170,8 @@ def _floats(values: Array) -> Array:
 
 
 def parts_of(curve: Curve) -> Iterator[tuple[str, Array, Array | None]]:
-    """What a curve has besides x and y: the ending of its name in the file, its numbers, and which
-    array of the curve it is; None for one that was made of others.
+    """Companions of a curve: ending of the name in the file, values, and the array of the curve;
+    None for a computed array.
     """
     if curve.low is not None and curve.high is not None and _has_ends(curve):
         low, high = _floats(curve.low), _floats(curve.high)

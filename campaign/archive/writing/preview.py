@@ -1,4 +1,4 @@
-"""Preview of a long recording: few points that keep every peak."""
+"""Preview of a long recording: few points that preserve every peak."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PREVIEW_POINTS = 20_000
-"""Most points of a preview: viewers in a browser are slow beyond some 100 000."""
+"""Largest number of points of a preview: viewers in a browser are slow above about 100 000."""
 
 
 class Preview:
-    """Collects the minimum and maximum of ever longer stretches, in flat memory.
+    """Minimum and maximum of segments of increasing length, in constant memory.
 
-    Stretches begin one sample long and double whenever there would be too many, so the result
-    depends on the samples and on `PREVIEW_POINTS` alone. Fed with blocks whose length is a power
-    of two (but for the last).
+    Segments begin with one sample, and double when there are too many. So the result depends only
+    on the samples and on `PREVIEW_POINTS`. Requires blocks whose length is a power of two, except
+    the last block.
     """
 
     def __init__(self, points: int = PREVIEW_POINTS) -> None:
@@ -51,10 +51,9 @@ class Preview:
 
 
 def _merge_pairs(extremes: Array) -> Array:
-    """Extremes of stretches twice as long; an odd last one stays as it is.
+    """Extremes of segments of double length; an odd last segment stays unchanged.
 
-    A comparison with NaN is false: an undefined sample loses to a number on its right, so it hides
-    no later peak.
+    If the left sample is NaN, the right one is used, so NaN hides no later peak.
     """
     count = extremes.shape[1]
     even = count - count % 2

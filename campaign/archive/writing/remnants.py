@@ -1,7 +1,6 @@
 """Remnants of killed processes in a results folder, and their removal.
 
-Nothing that it did not write is ever removed: files are known by their names, and a folder goes
-only when it is empty.
+Only files written by this program (recognized by name) are removed, and only empty folders.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ _TRIAL_FILE = re.compile(r"trial-[0-9]{5,10}(-[0-9]{1,6})?\.(?:trial|nxs)")
 
 
 def is_own(name: str) -> bool:
-    """Whether this program gives such a name to a file in the folder of a run."""
+    """Whether `name` is a name of this program's files in the folder of a run."""
     whole = name.removesuffix(PART)
     return name in _OWN or whole in _OWN or _TRIAL_FILE.fullmatch(whole) is not None
 
 
 def remove_folder(folder: Path) -> list[Path]:
-    """Remove a run's folder with what this program wrote there; returns what else there was.
+    """Remove this program's files in a run's folder, and the folder; return other files.
 
-    What else there was stays where it is, and so does the folder then.
+    Other files stay, and then the folder too.
     """
     others = []
-    # What tells of the run goes last: half removed, it is still seen to be a run's folder.
+    # Header and journal are removed last, so a partly removed folder is recognizable as a run's.
     for path in sorted(folder.iterdir(), key=lambda path: path.name in (HEADER, JOURNAL)):
         if is_own(path.name) and not path.is_dir():
             path.unlink()
@@ -46,27 +45,27 @@ def remove_folder(folder: Path) -> list[Path]:
 
 
 def take_over(folder: Path, target: Path) -> None:
-    """Move what this program did not write from a run's folder into another."""
+    """Move the files that this program did not write from a run's folder into another."""
     for path in sorted(folder.iterdir()):
         if not is_own(path.name) or path.is_dir():
             path.rename(target / path.name)
 
 
 def find_remnants(results: Path) -> dict[Path, str]:
-    """What killed processes left in a results folder, and what it is."""
-    found = {}
+    """Remnants of killed processes in a results folder, each with a description."""
+    remnants = {}
     with contextlib.suppress(OSError):
         names = {path.name for path in results.iterdir()}
         for name in sorted(names):
             if (what := _remnant(name, names)) and not _in_use(results, name):
-                found[results / name] = what
-    return found
+                remnants[results / name] = what
+    return remnants
 
 
 def clear_beginning(results: Path, run: str) -> None:
-    """Remove a folder of a run that was never finished; the caller holds the run's lock.
+    """Remove an unfinished new folder of a run; the caller holds the run's lock.
 
-    A folder beside its sealed file is left alone: should that file be damaged, it may have the run.
+    A folder beside its sealed file stays: if that file is damaged, the folder may have the run.
     """
     part = results / f"{run}{PARTIAL}{PART}"
     if part.is_dir():
@@ -84,7 +83,7 @@ def _remnant(name: str, names: set[str]) -> str:
 
 
 def _in_use(results: Path, name: str) -> bool:
-    """Whether a process is writing that run just now."""
+    """Whether a process is writing that run now."""
     run = name.removesuffix(PART).removesuffix(PARTIAL).removesuffix(SEALED)
     lock = results / (name if name.endswith(".lock") else f".{run}.lock")
     if os.name == "nt" or not lock.exists():

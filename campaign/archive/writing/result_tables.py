@@ -17,10 +17,10 @@ INDEX = "index"
 
 
 def put_table(parent: h5py.Group, name: str, table: Table, signal: str = "") -> bool:
-    """A table; returns whether it has numbers to plot, over the number of the row.
+    """Write a table; return whether it has a column of numbers to plot over the row number.
 
-    `signal` is the column to plot; else it is the first with estimates, or the first with numbers
-    that were found. A table without any is no NXdata.
+    `signal` is the column to plot; by default the first with estimates, else with inexact numbers,
+    else with exact numbers. A table without numbers is not an NXdata.
     """
     if not table.rows:
         return False
@@ -46,7 +46,7 @@ def put_table(parent: h5py.Group, name: str, table: Table, signal: str = "") -> 
 
 
 def put_findings(parent: h5py.Group, name: str, findings: Sequence[Finding]) -> None:
-    """Findings as a table: what was found, its interval, why there is none, and each condition."""
+    """Write findings as a table: value, interval or reason for no interval, conditions."""
     known = [finding.known for finding in findings]
     ends = [estimate.combined for estimate in known]
     conditions = dict.fromkeys(key for finding in findings for key in finding.conditions)
@@ -90,7 +90,7 @@ def _put_column(
 
 
 def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence[Cell]) -> None:
-    """The ends of a column's intervals, and half of each where none of them is lopsided."""
+    """Write the ends of a column's intervals, and the half-widths if all are symmetric."""
     if not any(isinstance(cell, Estimate) for cell in cells):
         return
     ends = [cell.combined if isinstance(cell, Estimate) else (None, None) for cell in cells]
@@ -99,8 +99,8 @@ def _put_intervals(group: h5py.Group, name: str, column: Column, cells: Sequence
     parts = {"errors": half, "low": low, "high": high}
     for ending, values in parts.items():
         if values is not None and np.isfinite(values).any():
-            told = _told_of(column, f", {INTERVAL[ending]}")
-            hdf5.put_series(group, unused(f"{name}_{ending}", group), values, **told)
+            attributes = _told_of(column, f", {INTERVAL[ending]}")
+            hdf5.put_series(group, unused(f"{name}_{ending}", group), values, **attributes)
 
 
 def _told_of(column: Column, more: str = "") -> dict[str, str]:
@@ -110,7 +110,7 @@ def _told_of(column: Column, more: str = "") -> dict[str, str]:
 
 
 def _telling(column: Column, cells: Sequence[Cell], signal: str) -> int:
-    """How far it is from being what a viewer should plot."""
+    """Rank of a column as the default plot; 0 is best."""
     if column.name == signal:
         return 0
     if any(isinstance(cell, Estimate) for cell in cells):
@@ -119,11 +119,11 @@ def _telling(column: Column, cells: Sequence[Cell], signal: str) -> int:
 
 
 def _is_numeric(cells: Sequence[Cell]) -> bool:
-    """Whether there are numbers and nothing else; True and False are words."""
-    told = [value for value in map(bare, cells) if value is not None]
-    numbers = all(isinstance(v, int | float | np.number) for v in told)
+    """Whether a column contains only numbers or estimates; True and False count as text."""
+    values = [value for value in map(bare, cells) if value is not None]
+    numbers = all(isinstance(v, int | float | np.number) for v in values)
     estimated = any(isinstance(cell, Estimate) for cell in cells)
-    return numbers and not any(isinstance(v, bool) for v in told) and bool(told or estimated)
+    return numbers and not any(isinstance(v, bool) for v in values) and bool(values or estimated)
 
 
 def _numbers(values: Iterable[Value]) -> Array:

@@ -1,8 +1,8 @@
 """Writing `RUN-results.nxs`: results as NeXus, beside the run.
 
-Every process of the file is the analysis of one test; each panel of its figures and each of its
-tables can be plotted, and the most telling one is what viewers open. What this program reads back
-is one text, `record`, which names the arrays among them. The same results give the same bytes.
+Each process of the file is the analysis of one test. Each panel of its figures and each of its
+tables can be plotted; viewers open the most important one. This program reads back one text,
+`record`, which refers to the arrays by path. The same results give the same bytes.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ PUBLISHED = "published"
 ARRAYS = "arrays"
 """Arrays of results that are in no plot."""
 MEMBERS = ("title", "entry_identifier", "program_name", "run", RECORD, ARRAYS)
-"""What the entry has besides the tests."""
+"""Members of the entry other than the tests."""
 
 
 def _refuse_foreign(run: Path) -> None:
-    """UsageError when what lies where the results of `run` belong is something else."""
+    """Raise UsageError if a file at the results path of `run` is not a results file."""
     path = results_path(run)
     if (path.exists() or path.is_symlink()) and not is_results_file(path):
         raise UsageError(
@@ -60,27 +60,27 @@ def _refuse_foreign(run: Path) -> None:
 
 
 def write_results(run: Path, found: RunResults) -> Path:
-    """Write the results of the run at `run` beside it, whole or not at all; returns their path.
+    """Write the results of the run at `run` beside it, completely or not at all; return their path.
 
-    Older results are replaced. Raises UsageError when something else is in their place,
-    ArchiveError when they cannot be written; what was there is then as it was.
+    Replaces older results. Raises UsageError if another file is at that path, ArchiveError if the
+    write fails; the existing file then stays unchanged.
     """
-    written = prepare_results(run, found)
+    prepared = prepare_results(run, found)
     try:
-        return written.publish()
+        return prepared.publish()
     finally:
-        written.discard()
+        prepared.discard()
 
 
 @dataclass(frozen=True)
 class PreparedResults:
-    """Results that are written, and are nobody's results before they are published."""
+    """Results in a temporary file, not valid until published."""
 
     part: Path
     path: Path
 
     def publish(self) -> Path:
-        """Put them where results belong, in place of older ones. Raises as `write_results`."""
+        """Move them to the results path, replacing older ones. Raises as `write_results`."""
         try:
             publish(self.part, self.path)
         except OSError as error:
@@ -88,30 +88,30 @@ class PreparedResults:
         return self.path
 
     def discard(self) -> None:
-        """Remove what was not published."""
+        """Remove the temporary file, if not published."""
         with suppress(OSError):
             self.part.unlink(missing_ok=True)
 
 
 def prepare_results(run: Path, found: RunResults) -> PreparedResults:
-    """Write results without replacing any; raises as `write_results`. Discard them in the end."""
+    """Write results without replacing any; raises as `write_results`. The caller discards them."""
     _refuse_foreign(run)
     path = results_path(run)
-    written = PreparedResults(path.with_name(f".{path.name}.{os.getpid()}{PART}"), path)
+    prepared = PreparedResults(path.with_name(f".{path.name}.{os.getpid()}{PART}"), path)
     try:
-        with hdf5.closing(hdf5.create_file(written.part)) as file:
+        with hdf5.closing(hdf5.create_file(prepared.part)) as file:
             place = _Writer(file).write(found)
-        digest = sha256_of(written.part, place)
-        with written.part.open("r+b") as raw:
+        digest = sha256_of(prepared.part, place)
+        with prepared.part.open("r+b") as raw:
             raw.seek(place[0])
             raw.write(digest.encode("ascii"))
     except OSError as error:
-        written.discard()
+        prepared.discard()
         raise _cannot_be_written(path, error) from None
     except BaseException:
-        written.discard()
+        prepared.discard()
         raise
-    return written
+    return prepared
 
 
 def _cannot_be_written(path: Path, error: OSError) -> ArchiveError:
@@ -119,14 +119,14 @@ def _cannot_be_written(path: Path, error: OSError) -> ArchiveError:
 
 
 class _Writer:
-    """Writes a file; `places` says by identity where each array of the results went."""
+    """Writer of a results file; `places` maps the id of each array to its path in the file."""
 
     def __init__(self, file: h5py.File) -> None:
         self.file = file
         self.places: dict[int, str] = {}
 
     def write(self, found: RunResults) -> tuple[int, int]:
-        """Everything; returns where the hash of the file belongs."""
+        """Write all content; return the offset and length of the file's hash."""
         hdf5.put_attribute(self.file, "NX_class", "NXroot")
         hdf5.put_attribute(self.file, "creator", "campaign")
         hdf5.put_attribute(self.file, "creator_version", found.version)
@@ -141,8 +141,8 @@ class _Writer:
         for number, (test, name) in enumerate(zip(found.tests, names, strict=False), start=1):
             if self._test(entry, name, number, test, found):
                 opened[test.name] = name
-        telling = opened.get(found.telling[0]) if found.telling else None
-        shown = [telling, *opened.values()]
+        most_important = opened.get(found.telling[0]) if found.telling else None
+        shown = [most_important, *opened.values()]
         if found.published is not None:
             process = _process(entry, names[-1], len(names), "campaign", found.version, found.date)
             if put_table(process, "table", found.published, signal="deviation"):
@@ -155,9 +155,9 @@ class _Writer:
         return hdf5.blank_digest(entry[group], name)
 
     def _record(self, entry: h5py.Group, found: RunResults) -> None:
-        """The text; arrays that are in no plot go beside it."""
+        """Write the record text; arrays that are in no plot go into a group beside it."""
         arrays = hdf5.make_group(entry, ARRAYS, "NXcollection")
-        others: list[Array] = []  # which also keeps them: another one would get their identity
+        others: list[Array] = []  # keeps the arrays alive: a new array could reuse a freed id
 
         def place(array: Array) -> str:
             if id(array) not in self.places:
@@ -172,21 +172,21 @@ class _Writer:
     def _test(
         self, entry: h5py.Group, name: str, number: int, test: ResultsOfTest, found: RunResults
     ) -> bool:
-        """The analysis of one test; returns whether there is anything in it to plot."""
+        """Write the analysis of one test; return whether it contains a plot."""
         version = test.version or found.version
         process = _process(entry, name, number, test.program, version, found.date)
-        told = hdf5.make_group(process, "test", "NXcollection")
+        part = hdf5.make_group(process, "test", "NXcollection")
         for field in ("name", "kind", "title", "problem"):
-            hdf5.put_text(told, field, getattr(test, field))
+            hdf5.put_text(part, field, getattr(test, field))
         result = test.result
         if result.notes:
             _note(process, "notes", "text/plain", "\n".join(result.notes))
-        for told, findings in (
+        for part, findings in (
             ("key_numbers", result.key_numbers),
             ("findings", result.findings),
         ):
             if findings:
-                put_findings(process, told, findings)
+                put_findings(process, part, findings)
         figures = {
             figure.key: next(iter(shown), "")
             for figure, key in zip(
@@ -212,7 +212,7 @@ class _Writer:
         return bool(default)
 
     def _figure(self, process: h5py.Group, inside: str, name: str, figure: Figure) -> Iterator[str]:
-        """The plots of a figure, each named when it is written."""
+        """Write the plots of a figure; yield the name of each."""
         for number, panel in enumerate(figure.panels, start=1):
             sound = Panel(panel.x, panel.y, [c for c in panel.curves if _plottable(c)], panel.title)
             for place, plot in enumerate(plots_of(sound), start=1):
@@ -245,15 +245,15 @@ class _Writer:
                 hdf5.put_series(group, part, values, **_told_of(panel.y, f", {INTERVAL[ending]}"))
         for own, curve, start in plot.curves:
             cut = _cut(curve, plot, start)
-            told = _told_of(panel.y, _which(curve, plot))
-            hdf5.put_series(group, own, plot.spread(_floats(curve.y), start), **told)
+            attributes = _told_of(panel.y, _which(curve, plot))
+            hdf5.put_series(group, own, plot.spread(_floats(curve.y), start), **attributes)
             self.places[id(curve.x)] = f"{inside}{name}/{x_name}{cut}"
             self.places[id(curve.y)] = f"{inside}{name}/{own}{cut}"
         for own, curve, start in plot.curves:
             for ending, values, array in parts_of(curve):
                 part = unused(f"{own}_{ending}", group)
-                told = _told_of(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
-                hdf5.put_series(group, part, plot.spread(values, start), **told)
+                attributes = _told_of(panel.y, f"{_which(curve, plot)}, {INTERVAL[ending]}")
+                hdf5.put_series(group, part, plot.spread(values, start), **attributes)
                 if array is not None:
                     self.places[id(array)] = f"{inside}{name}/{part}{_cut(curve, plot, start)}"
         hdf5.attach_time(group, x_name)
@@ -295,32 +295,32 @@ def _describe(entry: h5py.Group, found: RunResults) -> None:
 
 
 def _put_scales(group: h5py.Group, panel: Panel) -> None:
-    """What silx and H5Web are told of logarithmic axes."""
+    """Attribute that selects logarithmic axes in silx and H5Web."""
     if "log" in (panel.x.scale, panel.y.scale):
         style = f'{{"axes_scale_types":["{panel.x.scale}"],"signal_scale_type":"{panel.y.scale}"}}'
         hdf5.put_attribute(group, "SILX_style", style)
 
 
 def _told_of(axis: Axis, more: str = "") -> dict[str, str]:
-    """Attributes of what is plotted along an axis; SI, and the unit that a reader is shown."""
+    """Attributes of a series along an axis: name, SI unit, unit for display."""
     unit = f" ({axis.unit})" if axis.unit else ""
     units = {"units": axis.unit, "display_units": axis.display or axis.unit} if axis.unit else {}
     return {"long_name": f"{axis.label}{more}{unit}", **units}
 
 
 def _cut(curve: Curve, plot: Plot, start: int) -> str:
-    """Which part of a series over all of x is the curve's own."""
+    """Slice of the curve in a series over all of x, as text; empty if it is the whole series."""
     length = len(curve.x)
     return "" if length == len(plot.x) else f":{start}:{start + length}"
 
 
 def _which(curve: Curve, plot: Plot) -> str:
-    """What tells the curve from the first of its plot, whose name viewers put at the axis."""
+    """Label of the curve; empty for the first of its plot, whose name viewers put at the axis."""
     return f", {curve.label}" if curve.label and curve is not plot.curves[0][1] else ""
 
 
 def _plottable(curve: Curve) -> bool:
-    """Whether it has a y for each x; what a plug-in made otherwise is kept and not plotted."""
+    """Whether all arrays have one value per x; other curves (from plug-ins) are only archived."""
     arrays = (curve.x, curve.y, curve.low, curve.high, curve.y_low)
     return all(each is None or np.shape(each) == (len(curve.x),) for each in arrays)
 

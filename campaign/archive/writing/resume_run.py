@@ -17,16 +17,16 @@ from campaign.archive.writing.run_lock import RunLock
 from campaign.errors import ArchiveError, UsageError
 
 RESUMABLE = (RunStatus.INCOMPLETE, RunStatus.INTERRUPTED, RunStatus.FAULT)
-"""How a run has to stand for somebody to go on with it."""
+"""Statuses of a run that can be resumed."""
 
 
 def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
-    """The folder of the run at `path`, what its journal tells, that, and the right to write it.
+    """The folder of the run at `path`, the content of its journal, the journal, and the lock.
 
-    A folder that was killed while it was sealed may be reopened whatever it says of its end.
+    A folder of a process killed during sealing may be reopened with any status.
 
     Raises:
-        UsageError: there is nothing to go on with, or another process writes the run.
+        UsageError: the run cannot be resumed, or another process writes it.
         ArchiveError: the run is damaged, or its folder cannot be written; nothing was changed.
     """
     folder, sealed = path.with_suffix(PARTIAL), path.with_suffix(SEALED)
@@ -42,7 +42,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
             from campaign.archive.writing.unseal_run import unseal
 
             unseal(sealed)
-        set_aside_signature(sealed)  # also one that a crash left when its file was gone
+        set_aside_signature(sealed)  # also one that a crash left without its file
         story = _read_folder(folder)
         journal = Journal(folder / JOURNAL, whole=story.size)
         return folder, story, journal, lock
@@ -50,7 +50,7 @@ def reopen(path: Path) -> tuple[Path, Story, Journal, RunLock]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[RunLock]:
-    """The run's lock; given up again when the block fails."""
+    """Acquire the run's lock; release it if the block fails."""
     try:
         lock = RunLock.acquire(folder.parent, folder.stem)
     except OSError as error:
@@ -74,8 +74,8 @@ def _check_sealed(sealed: Path) -> None:
 
 
 def _read_folder(folder: Path) -> Story:
-    """What is in the folder, checked. Raises ArchiveError naming the trial file that is wrong."""
-    read_header(folder)  # or it is of another format
+    """Check the files of the folder and read its journal. Raises ArchiveError with the file."""
+    read_header(folder)  # raises if the format is another
     story = read_journal(folder / JOURNAL)
     for finished in story.files:
         path = folder / finished.file

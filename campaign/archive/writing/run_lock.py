@@ -1,7 +1,7 @@
 """Lock of a run: one writing process, until it is sealed or released.
 
-The system gives a lock up when its process ends, however it ends, so a kill leaves at most an empty
-hidden file behind, which locks nothing.
+The system releases a lock when its process ends in any way, so a kill leaves at most an empty
+hidden file without a lock.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Self
 from campaign.errors import UsageError
 
 _TRIES, _PAUSE = 5, 0.01
-"""times, and s between them: who lists runs holds a lock for an instant."""
+"""Number of attempts, and pause (s) between them: listing runs holds a lock for an instant."""
 
 
 class RunLock:
-    """The right to write the run `name`; `acquire` it, `release` it."""
+    """The right to write the run `name`: `acquire`, then `release`."""
 
     def __init__(self, path: Path, name: str, descriptor: int) -> None:
         self.name = name
@@ -28,7 +28,7 @@ class RunLock:
 
     @classmethod
     def acquire(cls, results: Path, name: str) -> Self:
-        """Take the lock of run `name`.
+        """Acquire the lock of run `name`.
 
         Raises:
             UsageError: another process has it.
@@ -44,20 +44,20 @@ class RunLock:
                 )
             if _is_still(path, descriptor):
                 return cls(path, name, descriptor)
-            os.close(descriptor)  # its last owner removed the name while we waited for it
+            os.close(descriptor)  # its last owner removed the file while this process waited
 
     def release(self) -> None:
-        """Give it up; the second time nothing happens."""
+        """Release the lock; a second call does nothing."""
         if self._descriptor < 0:
             return
-        with contextlib.suppress(OSError):  # Windows removes no open file: it stays, unlocked
+        with contextlib.suppress(OSError):  # Windows cannot remove an open file: it stays, unlocked
             self._path.unlink(missing_ok=True)
         os.close(self._descriptor)
         self._descriptor = -1
 
 
 def _is_still(path: Path, descriptor: int) -> bool:
-    """Whether `path` is the file that was locked, and not one made after that was removed."""
+    """Whether `path` is still the locked file, and not a new one after its removal."""
     try:
         return os.path.samestat(path.stat(), os.fstat(descriptor))
     except FileNotFoundError:
@@ -65,7 +65,7 @@ def _is_still(path: Path, descriptor: int) -> bool:
 
 
 def _lock_soon(descriptor: int) -> bool:
-    """Whether it could be locked before long."""
+    """Try to lock, several times; return whether it succeeded."""
     for _ in range(_TRIES):
         if _lock(descriptor):
             return True
@@ -74,7 +74,7 @@ def _lock_soon(descriptor: int) -> bool:
 
 
 def _lock(descriptor: int) -> bool:
-    """Whether it could be locked; a file system that knows no locks does not keep us from work."""
+    """Try to lock; return False if busy. A file system without locks counts as locked."""
     if os.name == "nt":
         import msvcrt
 

@@ -20,10 +20,10 @@ def new_run_name(results: Path, protocol_stem: str, now: datetime) -> str:
 
 @contextmanager
 def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[RunLock]:
-    """The right to write a run of a new name, until the block ends or the run is closed.
+    """Lock of a run with a new name, until the block ends or the run is closed.
 
-    Runs that are begun in the same second get different names. Raises UsageError when nothing can
-    be written in `results`, which is made if need be.
+    Runs that begin in the same second get different names. Creates `results` if it is missing.
+    Raises UsageError if it cannot be written.
     """
     new = not results.exists()
     try:
@@ -40,7 +40,7 @@ def reserved_name(results: Path, protocol_stem: str, now: datetime) -> Iterator[
     finally:
         lock.release()
         if new:
-            with suppress(OSError):  # a run was begun there
+            with suppress(OSError):  # it is not empty after the start of a run
                 results.rmdir()
 
 
@@ -49,7 +49,7 @@ def _first_lock(results: Path, stem: str, now: datetime) -> RunLock:
         try:
             lock = RunLock.acquire(results, name)
         except UsageError:
-            continue  # somebody is about to begin it
+            continue  # another process begins this run
         if not _taken(results, name):
             return lock
         lock.release()

@@ -1,8 +1,8 @@
-"""From the folder of a run to its sealed file.
+"""Conversion of the folder of a run to its sealed file.
 
-The file grows in the folder while the trials still run (`Sealer`), so that a long campaign does not
-end with a long wait. It is nothing but a copy until it is whole, checked and renamed: what finished
-is in the folder's trial files and its journal, and from those it can be made anew at any time.
+The file is written in the folder during the trials (`Sealer`), so that a long campaign does not end
+with a long wait. Until it is complete, checked and renamed, it is only a copy of the folder's trial
+files and journal, from which it can be made again at any time.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from campaign.archive.writing.sealed_file import SealedFile, check_sealed
 from campaign.errors import ArchiveError
 from campaign.recording import Outcome
 
-_FREE = 1 << 28  # bytes that stay free for the trials while their copies are made beside them
-_AT_ONCE = 2  # more than one finishes at a time, so that those that waited are caught up with
+_FREE = 1 << 28  # bytes of disk that stay free for the trials during copying
+_AT_ONCE = 2  # copies per finished trial; more than one, so that waiting trials are caught up
 _FAILURES = (OSError, RuntimeError, ValueError, ArchiveError)
 
 
 def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
     """Make one file of a run's folder, check it, and only then remove the folder.
 
-    The folder's journal says which trials there are. `begun` has the copies of some of them. Raises
-    ArchiveError, leaving the folder as it is and no file, when a trial is not what the journal says
-    or the disk is full.
+    The folder's journal lists the trials. `begun` has the copies of some of them. Raises
+    ArchiveError if a trial differs from the journal or the disk is full; the folder then stays
+    unchanged, without a sealed file.
     """
     sealed, part = folder.with_suffix(SEALED), folder / SEALING
     try:
@@ -61,21 +61,21 @@ def seal_folder(folder: Path, begun: SealedFile | None = None) -> Path:
         raise ArchiveError(
             f"{sealed}: could not be sealed: {why(error)}; every finished trial is in {folder}"
         ) from None
-    with contextlib.suppress(OSError):  # a remnant does no harm: the sealed file goes first
+    with contextlib.suppress(OSError):  # a remnant is harmless: readers prefer the sealed file
         remove_folder(folder)
     return sealed
 
 
 class Sealer:
-    """Copies trials into the sealed file while others are executed, by whoever finished one.
+    """Copies trials into the sealed file during execution, in the thread that finished a trial.
 
-    No thread of its own: beside those that execute trials it would only wait with them for h5py's
-    one lock, and on a bench that moves this is done between trials, while the bench is at rest.
+    It has no thread of its own, which would only wait for h5py's single lock. On a moving bench it
+    copies between trials, while the bench is at rest.
 
-    Trials are copied in the order of the plan, so that equal runs make equal files whatever the
-    machine was busy with: a trial waits for those before it, and what did not complete at the first
-    attempt, and may be executed again, waits for the end. Whatever goes wrong here costs time only:
-    `seal` then begins anew.
+    Trials are copied in the order of the plan, so that equal runs give equal files, independent of
+    the load of the machine: a trial waits for those before it. A trial that did not complete at the
+    first attempt, and may be repeated, is copied at the end. An error here costs only time: `seal`
+    then starts again.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -87,11 +87,11 @@ class Sealer:
         self._gave_up = False
 
     def add(self, finished: TrialFinished) -> None:
-        """A trial's file is on the disk and the journal tells of it."""
+        """Register a trial whose file is on the disk and whose line is in the journal."""
         self._first.setdefault(finished.trial, finished)
 
     def advance(self) -> None:
-        """Copy what is next, if it is there and no other thread is about it. It never fails."""
+        """Copy the next trials, if finished and no other thread is copying; errors end copying."""
         if not self._busy.acquire(blocking=False):
             return
         try:
@@ -108,14 +108,14 @@ class Sealer:
             self._busy.release()
 
     def seal(self) -> Path:
-        """Make the file whole: `seal_folder`."""
+        """Complete the file: `seal_folder`."""
         with self._busy:
             begun, self._file = self._file, None
             self._gave_up = True
             return seal_folder(self._folder, begun)
 
     def discard(self) -> None:
-        """Leave no file."""
+        """Remove the file."""
         with self._busy:
             self._give_up()
 

@@ -19,13 +19,13 @@ from campaign.archive.writing.default_plot import Aim, beside
 from campaign.recording import ChannelInfo
 
 _MOST_FORMS = 256
-"""Groups that are kept for copying."""
+"""Largest number of template groups in memory."""
 
 
 class EntryWriter:
-    """Writes the entries of trials into a sealed file.
+    """Writer of the entries of trials in a sealed file.
 
-    Groups of samples that differ in samples alone are made once, in memory, and copied.
+    Groups of samples that differ only in samples are created once, in memory, and copied.
     """
 
     def __init__(self, file: h5py.File) -> None:
@@ -36,7 +36,7 @@ class EntryWriter:
     def write(
         self, name: str, record: TrialRecord, packed: PackedTrial, source: BinaryIO
     ) -> dict[tuple[str, str], tuple[h5d.DatasetID, Series]]:
-        """Write a trial, whose chunks lie in `source`; returns its series by group and name."""
+        """Write a trial with its chunks in `source`; return its series by group and name."""
         entry = hdf5.make_group(self._file, name, "NXentry")
         if packed.groups:
             shown = "preview" if "preview" in packed.groups else "data"
@@ -53,19 +53,19 @@ class EntryWriter:
             template = self._template(form)
             h5o.copy(self._made.id, template, entry.id, group.encode())
             data = entry[group]
-            hdf5.link(entry, "title", data, "title")  # viewers look for it beside the samples
+            hdf5.link(entry, "title", data, "title")  # viewers expect it beside the samples
             for each in series:
                 dataset = h5d.open(data.id, each.name.encode())
                 for number, (offset, size) in enumerate(each.chunks):
                     source.seek(offset)
                     dataset.write_direct_chunk((number * each.chunk,), source.read(size))
-                told = form.length, each.chunk, each.shuffled
-                written[group, each.name] = dataset, dataset_series(dataset, data, each.name, *told)
+                spec = form.length, each.chunk, each.shuffled
+                written[group, each.name] = dataset, dataset_series(dataset, data, each.name, *spec)
             hdf5.attach_time(data)
         return written
 
     def _template(self, form: _Form) -> bytes:
-        """The name of the group without samples, which is made when it is first asked for."""
+        """Name of the template group without samples, created on first use."""
         if form not in self._forms:
             if len(self._forms) == _MOST_FORMS:
                 self._forms.clear()
@@ -78,12 +78,12 @@ class EntryWriter:
 
 @dataclass(frozen=True)
 class _Form:
-    """What trials have in common whose groups of samples differ in samples alone.
+    """Common properties of groups of samples that differ only in samples.
 
     Attributes:
         signal, others: the channels that viewers plot.
-        length: samples of a series.
-        series: the channel, samples of a chunk, and whether chunks are shuffled.
+        length: samples per series.
+        series: the channel, samples per chunk, and whether chunks are shuffled.
     """
 
     signal: str
@@ -94,16 +94,16 @@ class _Form:
     @classmethod
     def of(cls, group: str, record: TrialRecord, series: Sequence[PackedSeries]) -> Self:
         infos = {info.name: info for info in (TIME, *record.series)}
-        told = tuple((infos[each.name], each.chunk, each.shuffled) for each in series)
+        layouts = tuple((infos[each.name], each.chunk, each.shuffled) for each in series)
         if group == "preview" and record.preview is not None:
-            return cls(record.preview.channel, (), record.preview.samples, told)
+            return cls(record.preview.channel, (), record.preview.samples, layouts)
         names = [info.name for info in record.series]
         signal = Aim.of_tree(record.trial).channel(names)
         others = tuple(beside(infos[signal], record.series))
-        return cls(signal, others, record.samples or 0, told)
+        return cls(signal, others, record.samples or 0, layouts)
 
     def make(self, file: h5py.File, name: str) -> None:
-        """Make the group, without samples."""
+        """Create the group, without samples."""
         group = hdf5.make_group(file, name, "NXdata")
         hdf5.put_attribute(group, "signal", self.signal)
         if self.others:

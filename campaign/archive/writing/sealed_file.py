@@ -1,4 +1,4 @@
-"""The sealed file while it is made: copied trials, header, check."""
+"""The sealed file during writing: copied trials, header, check."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ from campaign.recording import Outcome
 from campaign.trial import Tree, canonical_json
 
 Placed = Mapping[tuple[str, str], tuple[str, tuple[Place, ...]]]
-"""The unit of each series of a trial, and where its chunks lie, by group and name."""
+"""Unit and places of chunks of each series of a trial, by group and name."""
 Text = str | LongText | int
 
 
 class SealedFile:
-    """A sealed file that is being made: `copy` every attempt, `finish`, and `put_hash`.
+    """A sealed file during writing: `copy` every attempt, `finish`, and `put_hash`.
 
     Attributes:
-        copied: what was copied, by the name of its group.
-        placed: where the samples lie that were read back, by the name of the trial's group.
-        not_kept: why an attempt has only its record, by the name that its group would have.
+        copied: copied attempts, by the name of their group.
+        placed: places of the samples that were read back, by the name of the trial's group.
+        not_kept: reason why an attempt has only its record, by the name its group would have.
     """
 
     def __init__(self, part: Path) -> None:
@@ -59,18 +59,18 @@ class SealedFile:
         self._part = part
         self._trees: dict[str, str] = {}  # lines by digest
         self._instruments: dict[nexus.InstrumentDescription, str] = {}
-        self._hash_place: tuple[int, int]  # once it is finished
+        self._hash_place: tuple[int, int]  # set by `finish`
         self._file = hdf5.create_file(part)
         self._entries = EntryWriter(self._file)
 
     def is_part_of(self, wanted: Mapping[str, TrialFinished]) -> bool:
-        """Whether all that was copied is among `wanted`, under the same names."""
+        """Whether all copied attempts are in `wanted`, with the same names."""
         return self.copied.items() <= wanted.items()
 
     def copy(self, folder: Path, finished: TrialFinished, entry: str) -> None:
         """Copy an attempt from its file, and read every sample of the copy back.
 
-        Raises ArchiveError when it is not what the journal says was written.
+        Raises ArchiveError if the file differs from the journal.
         """
         path, name = folder / finished.file, entry_name(finished.trial)
         if sha256_of(path) != finished.sha256:
@@ -94,7 +94,7 @@ class SealedFile:
         self.copied[entry] = finished
 
     def finish(self, folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> None:
-        """Write everything but the trials, and close the file."""
+        """Write everything except the trials, and close the file."""
         texts = _texts(folder, header, story, ended)
         planned = read_text(folder / PLAN_TREES)
         lines = dict(zip(parse_trees(planned), planned.splitlines(), strict=True)) | self._trees
@@ -117,11 +117,11 @@ class SealedFile:
             for offset, long in rooms.items():
                 raw.seek(offset)
                 raw.writelines(long.pieces())
-                if raw.tell() != offset + long.size:  # longer, it lies on samples now
+                if raw.tell() != offset + long.size:  # a longer text has overwritten samples
                     raise ArchiveError(f"{folder}: a text was changed while it was sealed")
 
     def _index(self, folder: Path) -> Iterator[bytes]:
-        """The records, each with its end, in the order of trials; they are on the disk anyway."""
+        """The records as lines, in the order of trials, read again from the trial files."""
         for entry in sorted(self.copied, key=_by_number):
             finished = self.copied[entry]
             packed = read_packed(folder / finished.file, entry_name(finished.trial))
@@ -130,10 +130,10 @@ class SealedFile:
             yield f"{packed.record}\n".encode()
 
     def put_hash(self) -> None:
-        """Put the hash of the whole file into the file.
+        """Write the hash of the whole file into the file.
 
-        It counts its own place as zeros, so it travels with the file, survives a viewer that opens
-        the file for writing and changes nothing, and finds any byte that is not as it was sealed.
+        The hash counts its own bytes as zeros. It stays in the file, is unaffected by a viewer that
+        opens the file for writing without changes, and detects any changed byte.
         """
         digest = sha256_of(self._part, self._hash_place)
         with self._part.open("r+b") as file:
@@ -141,14 +141,14 @@ class SealedFile:
             file.write(digest.encode("ascii"))
 
     def discard(self) -> None:
-        """Leave no file."""
+        """Close and remove the file."""
         with contextlib.suppress(OSError, RuntimeError, ValueError):
             self._file.close()
         with contextlib.suppress(OSError):
             self._part.unlink(missing_ok=True)
 
     def _describe(self, entry: str, record: TrialRecord, trees: Mapping[str, Tree]) -> None:
-        """Say that it follows the application definition; each bench is described once."""
+        """Mark it as following the application definition; each bench is described once."""
         if not nexus.follows_definition(record.series):
             return
         described = nexus.InstrumentDescription.of(trees[str(record.trial["bench"])])
@@ -162,9 +162,8 @@ class SealedFile:
 
 
 def check_sealed(part: Path, file: SealedFile) -> None:
-    """Open the new file again and hold it against what was written: every text against the seal,
-    the record of every trial, and where its samples lie, which were read back when they were
-    copied. Raises ArchiveError.
+    """Open the new file again and check it: every text against the seal, the record of every trial,
+    and the places of its samples, which were read back during copying. Raises ArchiveError.
     """
     damaged = DamageList(part)
     with safe_hdf5.open_file(part) as opened, safe_hdf5.guarded(part):
@@ -180,7 +179,7 @@ def check_sealed(part: Path, file: SealedFile) -> None:
 
 
 def _check_entry(entry: h5py.Group, finished: TrialFinished, placed: Placed) -> None:
-    """The record is the one of the journal, and samples lie where they were read back."""
+    """Check record against journal, and places of samples. Raises ArchiveError."""
     kept = safe_hdf5.inner_group(entry, "record")
     safe_hdf5.text_at(kept, "json", finished.record)
     safe_hdf5.text_at(kept, "trees")
@@ -198,7 +197,7 @@ def _digest(text: Text) -> str:
 
 
 def _texts(folder: Path, header: RunHeader, story: Story, ended: RunEnded) -> dict[str, Text]:
-    """The texts of `/run` that are known without the trials, by their place."""
+    """The texts of `/run` that do not depend on the trials, by their place."""
     failed = sum(f.outcome is not Outcome.COMPLETED for f in story.finished.values())
     texts: dict[str, Text] = {
         "title": header.title or header.protocol_name or header.name,
@@ -245,13 +244,13 @@ _CLASSES = {"provenance": "NXcollection", "outcome": "NXcollection"}
 def _put(
     run: h5py.Group, place: str, text: Text, header: RunHeader, rooms: dict[int, LongText]
 ) -> None:
-    """Write a text; of a long one `rooms` is told where it goes."""
+    """Write a text; for a long text, only allocate it and add its offset to `rooms`."""
     group_name, _, name = place.rpartition("/")
     group = run
     if group_name:
         nx_class = _CLASSES.get(group_name, "NXnote")
-        there = group_name in run
-        group = run[group_name] if there else hdf5.make_group(run, group_name, nx_class)
+        exists = group_name in run
+        group = run[group_name] if exists else hdf5.make_group(run, group_name, nx_class)
     if isinstance(text, int):
         hdf5.put_integer(group, name, text)
     elif isinstance(text, LongText):
@@ -264,13 +263,13 @@ def _put(
 
 
 def _by_number(entry: str) -> tuple[int, float]:
-    """The order of trials, an earlier attempt before the one that counts."""
+    """Sort key: trial number, then attempt; the last attempt comes last."""
     _, number, *attempt = entry.split("_")
     return int(number), int(attempt[1]) if attempt else math.inf
 
 
 def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None:
-    """The attributes of a file's root; `shown` is the entry that viewers open first."""
+    """Write the attributes of a file's root; `shown` is the entry that viewers open first."""
     hdf5.put_attribute(file, "NX_class", "NXroot")
     hdf5.put_attribute(file, "creator", "campaign")
     hdf5.put_attribute(file, "creator_version", __version__)
@@ -282,7 +281,7 @@ def _write_root(file: h5py.File, created: str, shown: h5py.Group | None) -> None
 def _shown(
     file: h5py.File, placed: Collection[str], folder: Path, story: Story
 ) -> h5py.Group | None:
-    """What a viewer opens first: see `default_plot`."""
+    """The entry that a viewer opens first: see `default_plot`."""
     completed = [n for n, each in story.finished.items() if each.outcome is Outcome.COMPLETED]
     with_samples = [
         n

@@ -1,4 +1,4 @@
-"""The file of one trial while it is written: a `Recorder` of samples."""
+"""The file of one trial during writing: a `Recorder` of samples."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ from campaign.trial import Trial
 Array = NDArray[np.float64]
 
 Publish = Callable[[Path, Path], Path]
-"""Puts a file on the disk under its real name, at once or with others; returns its present one."""
+"""Publishes a file under its final name, at once or later with others; returns its present path."""
 Written = tuple[int, str, list[SeriesRecord]]
 """Length of every series, digest of the time base, and the channels."""
 
 
 @dataclass(frozen=True)
 class FinishedFile:
-    """A trial file that is whole.
+    """A complete trial file.
 
     Attributes:
-        name: the file's real one.
-        archived: the trial as the file has it, under the file's present name; a short recording is
-            still in memory.
-        sha256: of the file.
+        name: the final name of the file.
+        archived: the trial in the file, with the file's present path; a short recording is still
+            in memory.
+        sha256: hash of the file.
         record: digest of the trial's record.
     """
 
@@ -67,9 +67,9 @@ class FinishedFile:
 
 
 class TrialFile:
-    """Takes a trial's samples as they come (a `Recorder`).
+    """Writer of a trial's samples during recording (a `Recorder`).
 
-    Closed, it is whole, and published at once or with others.
+    `close` completes the file and publishes it, at once or later with others.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class TrialFile:
         not_kept: NotKept | None = None,
         publish: Publish | None = None,
     ) -> None:
-        """`not_kept`: says at the end why of the samples only digests are kept; None: they are."""
+        """`not_kept`: at the end, returns the reason to keep only digests; None: keep samples."""
         self._trial = trial
         self._attempt = attempt
         self._rule = not_kept
@@ -91,11 +91,11 @@ class TrialFile:
         self._channels: tuple[ChannelInfo, ...] = ()
         self._shown = 0
         self._columns: SampleColumns | None = None
-        self._held = np.empty((0, 0))  # rows of a trial whose end decides what is kept
-        self._count = 0  # of samples in it
+        self._held = np.empty((0, 0))  # buffered rows, if the ending decides on keeping samples
+        self._count = 0  # number of samples in `_held`
         self._preview = Preview()
         self._events: list[Event] = []
-        self._whole: Array | None = None  # a recording that was one chunk
+        self._whole: Array | None = None  # a recording of one chunk
         try:
             self._file = PackedFile(self._part)
         except OSError as error:
@@ -113,7 +113,7 @@ class TrialFile:
         self._held = np.empty((1 + len(names), 0))
 
     def append(self, time: Array, block: Array) -> None:
-        """Add samples: `time` (n,) in s, `block` (channels, n); ArchiveError on a full disk."""
+        """Add samples: `time` (n,) in s, `block` (channels, n). Raises ArchiveError (disk full)."""
         if self._columns is None:
             raise BackendError(f"{self._trial.name}: samples came before the channels' names")
         if time.ndim != 1 or block.shape != (len(self._channels), len(time)):
@@ -175,7 +175,7 @@ class TrialFile:
         return FinishedFile(self._final.name, archived, digest, size, record.sha256)
 
     def discard(self) -> None:
-        """Leave nothing of it. Never fails: what cannot be removed is no archive by its name."""
+        """Remove the file. Never fails: by its name, a remaining file is not an archive."""
         self._file.close()
         with contextlib.suppress(OSError):
             self._part.unlink(missing_ok=True)
@@ -183,7 +183,7 @@ class TrialFile:
     def _finish_samples(
         self, groups: dict[str, tuple[PackedSeries, ...]]
     ) -> tuple[Written | None, PreviewRecord | None]:
-        """What the record says of the samples, and of their preview where one was written."""
+        """Write the rest of the samples; return their record data, and those of a preview."""
         if self._columns is None:
             return None, None
         if self._not_kept and self._whole is not None:
@@ -206,8 +206,8 @@ class TrialFile:
 
     def _described(self, length: int, digests: Iterable[str]) -> Written:
         time, *of_channels = digests
-        told = zip(self._channels, of_channels, strict=True)
-        return length, time, [SeriesRecord.of(*both) for both in told]
+        pairs = zip(self._channels, of_channels, strict=True)
+        return length, time, [SeriesRecord.of(*both) for both in pairs]
 
     def _put(self, columns: SampleColumns, rows: Sequence[Array]) -> None:
         with self._writing():
@@ -215,7 +215,7 @@ class TrialFile:
                 self._add_to_preview(chunk)
 
     def _hold(self, time: Array, block: Array) -> None:
-        """Keep samples in memory until the trial ends; room for all of them is made at once."""
+        """Buffer samples until the trial ends; memory for the planned duration is allocated."""
         start, self._count = self._count, self._count + len(time)
         if self._count > self._held.shape[1]:
             planned = math.ceil(self._trial.task.duration * self._trial.task.sample_rate) + 1
@@ -226,7 +226,7 @@ class TrialFile:
         self._held[1:, start : self._count] = block
 
     def _put_held(self, columns: SampleColumns) -> None:
-        """Write what waited for the trial's end, unless only its digests are wanted."""
+        """Write the buffered samples, unless only their digests are kept."""
         self._whole = self._held[:, : self._count]
         if not self._not_kept:
             self._put(columns, list(self._whole))
@@ -236,7 +236,7 @@ class TrialFile:
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
-        """A failure to write leaves no part file behind and says which trial is lost."""
+        """On a write error, remove the part file and raise ArchiveError for the lost trial."""
         try:
             yield
         except (OSError, RuntimeError, ValueError) as error:
@@ -250,7 +250,7 @@ def _publish_now(part: Path, final: Path) -> Path:
 
 
 def lost_trial(part: Path, error: Exception, count: int = 1) -> ArchiveError:
-    """Why trials could not be written, the first as `part`, and what that means for the others."""
+    """Error for `count` trials that could not be written, the first as `part`."""
     if isinstance(error, FileNotFoundError) or not part.parent.is_dir():
         return ArchiveError(
             f"{part.parent}: is gone: it was moved or removed while the run went on; wherever it "

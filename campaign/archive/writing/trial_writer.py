@@ -29,13 +29,13 @@ Array = NDArray[np.float64]
 
 
 class FolderWriter:
-    """Writes trials into the folder of a run whose journal another process has.
+    """Writer of trials into the folder of a run, for a process without the journal.
 
-    What is finished counts once `publish` has put it on the disk, together.
+    Finished trials become valid when `publish` puts them on the disk together.
 
     Args:
-        folder: of the run.
-        attempts: how often each trial is executed with this one, by number.
+        folder: folder of the run.
+        attempts: number of this attempt at each trial, by trial number.
     """
 
     def __init__(self, folder: Path, attempts: Mapping[int, int], timing: Timing = UNTIMED) -> None:
@@ -57,7 +57,7 @@ class FolderWriter:
         return TrialWriter.open(self._folder, trial, attempt, note, self._timing, not_kept, publish)
 
     def publish(self) -> None:
-        """Put the trials on the disk that were finished. Raises ArchiveError: none counts."""
+        """Put the finished trials on the disk. If it raises ArchiveError, none is valid."""
         from campaign.archive.writing.trial_file import lost_trial
 
         files, self._files = self._files, []
@@ -71,12 +71,12 @@ class FolderWriter:
             raise lost_trial(files[0][0], error, count=len(files)) from None
 
     def take_files(self) -> dict[str, bytes]:
-        """The content of the trials that were finished, by file; nothing stays in the folder."""
+        """Contents of the finished trials, by file name; the files are removed from the folder."""
         files, self._files = self._files, []
-        found = {final.name: part.read_bytes() for part, final in files}
+        contents = {final.name: part.read_bytes() for part, final in files}
         for part, _ in files:
             part.unlink()
-        return found
+        return contents
 
     def take_entries(self) -> tuple[Entry, ...]:
         """The journal entries since the last call."""
@@ -86,7 +86,7 @@ class FolderWriter:
 
 
 class TrialWriter:
-    """Takes one trial's recording: a `campaign.recording.Recorder` that ends in a file.
+    """Writer of one trial's recording to a file (a `campaign.recording.Recorder`).
 
     Use it from one thread; several may be open at once. End it with `finish` or `abandon`.
     """
@@ -99,7 +99,7 @@ class TrialWriter:
         note: Callable[[Entry], None],
         timing: Timing = UNTIMED,
     ) -> None:
-        """`note` puts a line into the run's journal."""
+        """`note` adds a line to the run's journal."""
         self._trial = trial
         self._attempt = attempt
         self._file = file
@@ -128,7 +128,7 @@ class TrialWriter:
 
     @property
     def attempt(self) -> int:
-        """How often the trial is executed with this one, from 1."""
+        """Number of this attempt, from 1."""
         return self._attempt
 
     def start(self, channels: tuple[ChannelInfo, ...]) -> None:
@@ -155,16 +155,16 @@ class TrialWriter:
         windows: Iterable[Window] = (),
         estimates: Iterable[Estimate] = (),
     ) -> None:
-        """Keep the trial. When this returns, no crash can lose it; of a `FolderWriter`, once that
-        has published it.
+        """Archive the trial. After the return, no crash can lose it; with a `FolderWriter`, after
+        `publish`.
 
         Args:
-            ending: however it ended: a failed trial is kept too.
+            ending: any ending: a failed trial is archived too.
             started, ended: ISO 8601 with a time zone.
-            windows, estimates: what was found of it meanwhile; kept with it.
+            windows, estimates: results obtained during the trial, archived with it.
 
         Raises:
-            ArchiveError: it could not be written; nothing of it remains.
+            ArchiveError: the file could not be written and was removed.
         """
         self._open = False
         with self._timing.span(Work.TRIAL_FILES):
@@ -185,12 +185,12 @@ class TrialWriter:
         self._kept = finished, file.archived
 
     def measure(self, measure: Measure) -> str:
-        """Keep what `measure` finds in the samples of the trial, which is finished.
+        """Measure the metrics of the finished trial and add them to the journal.
 
-        What is kept is a line of the journal: the trial's file is whole and stays as it is.
+        The trial's file stays unchanged.
 
         Returns:
-            Why nothing was measured, in one line; empty when something was, or nobody looked.
+            Reason why nothing was measured, in one line; empty if measured, or not attempted.
 
         Raises:
             ArchiveError: the journal cannot be written.
@@ -200,18 +200,18 @@ class TrialWriter:
         finished, archived = self._kept
         if archived.not_kept or not archived.channels():
             return ""
-        found = measure(archived)
+        metrics = measure(archived)
         try:
-            if found.estimates:
-                self._note(trial_measured(utc_now(), finished, found))
+            if metrics.estimates:
+                self._note(trial_measured(utc_now(), finished, metrics))
         except ArchiveError:
             raise
-        except Exception as error:  # noqa: BLE001 - a plug-in's, of which no line can be made
+        except Exception as error:  # noqa: BLE001 - metrics of a plug-in may not be serializable
             return f"what was measured cannot be kept: {type(error).__name__}: {why(error)}"
-        return found.problem
+        return metrics.problem
 
     def abandon(self, at: str, reason: str = "") -> None:
-        """Keep nothing of the trial but that it was begun."""
+        """Discard the trial; only its start is noted in the journal."""
         if not self._open:
             return
         self._open = False

@@ -1,8 +1,8 @@
-"""From a sealed run back to a folder, so that the run can continue.
+"""Conversion of a sealed run back to a folder, so that the run can continue.
 
-The folder is built and checked under a name that no reader takes for a run. It gets its real name
-while the sealed file is still there, and counts from the moment that this is gone: at every instant
-one whole run is on the disk, and it is clear which one.
+The folder is built and checked under a name that readers ignore. It gets its final name while the
+sealed file still exists, and is valid from the removal of that file. So at every instant exactly
+one valid and complete run is on the disk.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ from campaign.trial import canonical_json
 
 
 def unseal(sealed: Path) -> Path:
-    """Replace a sealed run by its folder; returns that.
+    """Replace a sealed run by its folder; return the folder.
 
-    The caller holds the run's lock. Raises ArchiveError, leaving the sealed run as it was, when it
-    is damaged or the folder cannot be written.
+    The caller holds the run's lock. Raises ArchiveError if the run is damaged or the folder cannot
+    be written; the sealed run then stays unchanged.
     """
     folder = sealed.with_suffix(PARTIAL)
     part = folder.with_name(folder.name + PART)
@@ -57,7 +57,7 @@ def unseal(sealed: Path) -> Path:
         keep_umask()
         part.mkdir()
         _fill(sealed, part)
-        if folder.is_dir():  # a remnant: where both are found, the sealed run counts
+        if folder.is_dir():  # a remnant: if both exist, the sealed run is valid
             take_over(folder, part)
             remove_folder(folder)
         part.rename(folder)
@@ -81,7 +81,7 @@ def _check_sealed(sealed: Path) -> None:
 
 
 def _fill(sealed: Path, folder: Path) -> None:
-    """Write everything that the run's folder had when it was sealed."""
+    """Write the content of the run's folder from before sealing."""
     run = read_sealed(sealed)
     if run.damaged:
         raise ArchiveError(str(run.damaged[0]))
@@ -101,7 +101,7 @@ def _fill(sealed: Path, folder: Path) -> None:
                 packed = _without_samples(lines[finished.record], trees, not_kept[entry])
             else:
                 packed = packed_entry(sealed, entry)
-            name = file_name(finished.trial, finished.attempt)  # once it had another ending
+            name = file_name(finished.trial, finished.attempt)  # older programs: another suffix
             written[finished.file] = _write(folder, sealed, packed, finished, name)
     write_lines_atomically(folder / JOURNAL, _journal(run.journal, written))
 
@@ -116,7 +116,7 @@ def _without_samples(line: str, trees: Trees, not_kept: str) -> PackedTrial:
 def _write(
     folder: Path, sealed: Path, packed: PackedTrial, finished: TrialFinished, name: str
 ) -> TrialFinished:
-    """Write a trial's file and read it back; returns the journal's line of it, as it is now."""
+    """Write a trial's file and read it back; return its updated line of the journal."""
     part = folder / (name + PART)
     digest, size = copy_packed(sealed, packed, part)
     problems = list(read_trial_file(part, finished).problems())
@@ -127,11 +127,11 @@ def _write(
 
 
 def _journal(text: str, written: dict[str, TrialFinished]) -> Iterator[str]:
-    """The journal as it was, but for the hashes of the trial files, which are new ones."""
+    """The lines of the journal, with the new names, hashes and sizes of the trial files."""
     for line in text.splitlines():
-        told = json.loads(line)
-        if told["event"] == "trial finished":
-            new = written[told["file"]]
-            told |= {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
-            line = canonical_json(told)
+        entry = json.loads(line)
+        if entry["event"] == "trial finished":
+            new = written[entry["file"]]
+            entry |= {"file": new.file, "sha256": new.sha256, "bytes": new.bytes}
+            line = canonical_json(entry)
         yield line + "\n"

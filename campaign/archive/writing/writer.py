@@ -1,4 +1,4 @@
-"""Writing a run: a folder in progress, one file once sealed."""
+"""Writing a run: a folder while in progress, one file after sealing."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ __all__ = ["RunWriter", "TrialWriter"]
 
 
 class RunWriter:
-    """Writes one run: `create` or `resume` it, `begin` each trial, `seal` it.
+    """Writer of one run: `create` or `resume` it, `begin` each trial, `seal` it.
 
-    Threads may share it. No other process can write the run meanwhile.
+    Thread-safe. Its lock excludes other processes.
 
     Attributes:
-        timing: told what is done for trial files and journal, and for the sealed file.
+        timing: sink of the time spent on trial files and journal, and on the sealed file.
     """
 
     def __init__(self, folder: Path, journal: Journal, lock: RunLock) -> None:
         from campaign.archive.writing.seal_run import Sealer
 
         self.timing: Timing = UNTIMED
-        self._shown = folder  # as it was typed
-        self._folder = folder.absolute()  # whatever folder a plug-in goes to
+        self._shown = folder  # as typed by the user
+        self._folder = folder.absolute()  # a plug-in may change the working directory
         self._journal = journal
         self._run_lock = lock
         self._lock = threading.Lock()
@@ -63,9 +63,9 @@ class RunWriter:
     def create(
         cls, results: Path, header: RunHeader, trials: Sequence[Trial], lock: RunLock | None = None
     ) -> Self:
-        """Begin a run in `results`, which is made if need be.
+        """Begin a run in `results`, which is created if missing.
 
-        `lock` is the right to write it, where the caller has it already (`naming.reserved_name`).
+        `lock` is the run's lock, if the caller has it already (`run_names.reserved_name`).
 
         Raises:
             UsageError: the folder cannot be made or written, or has a run of that name.
@@ -100,18 +100,18 @@ class RunWriter:
         command: Sequence[str],
         changes: Sequence[str] = (),
     ) -> Self:
-        """Go on with a run that was interrupted, killed or ended by a fault.
+        """Resume a run that was interrupted, killed or ended by a fault.
 
-        A sealed run is opened up again: its folder takes its place. What was finished, `finished`
-        tells; a trial that is begun again gets a further attempt, and the last one counts.
+        A sealed run is replaced by its folder. `finished` lists the finished trials. A repeated
+        trial gets a new attempt; the last one is used.
 
         Args:
             path: the folder, or the sealed file.
             at, host, versions, command, changes: for the journal; see `journal.RunResumed`.
 
         Raises:
-            UsageError: there is nothing to go on with, or another process writes the run.
-            ArchiveError: the run is damaged, named by file, or cannot be written. It is as it was.
+            UsageError: the run cannot be resumed, or another process writes it.
+            ArchiveError: the run is damaged (with the file) or cannot be written; it is unchanged.
         """
         folder, story, journal, lock = reopen(path)
         writer = cls(folder, journal, lock)
@@ -136,20 +136,20 @@ class RunWriter:
 
     @property
     def folder(self) -> Path:
-        """Where the run lies while it is in progress."""
+        """Folder of the run while it is in progress."""
         return self._shown
 
     @property
     def finished(self) -> Mapping[int, Outcome]:
-        """How the last attempt at each trial ended, by number; those of before a resume, too."""
+        """Outcome of the last attempt at each trial, by number, also from before a resume."""
         with self._lock:
             return {number: self._last[number].outcome for number in sorted(self._last)}
 
     def begin(self, trial: Trial, keeping: SampleRetention = KEEP_ALL) -> TrialWriter:
-        """A writer for `trial`, the next attempt at it. Raises ArchiveError when there is no room.
+        """A writer for the next attempt at `trial`. Raises ArchiveError if it cannot be written.
 
-        A trial is executed by one thread at a time. `keeping` says whether its samples are
-        kept: their digests are, and all else that there is to say of it.
+        Execute a trial in one thread at a time. `keeping` decides whether its samples are kept;
+        their digests and all other data always are.
         """
         attempt, note = self.attempt(trial), self.note
         not_kept = keeping.rule(trial, attempt)
@@ -159,7 +159,7 @@ class RunWriter:
         return writer
 
     def attempt(self, trial: Trial) -> int:
-        """Which one the next attempt at `trial` is, from 1."""
+        """Number of the next attempt at `trial`, from 1."""
         with self._lock:
             last = self._last.get(trial.number)
         return last.attempt + 1 if last else 1
@@ -167,17 +167,17 @@ class RunWriter:
     def decision(
         self, decision: str, reason: str, trial: int | None = None, *, at: str = ""
     ) -> None:
-        """Note what the run does besides its plan; `at` is now unless it is given."""
+        """Note a decision outside the plan; `at` is by default the present time."""
         self.note(Decision(at=at or utc_now(), trial=trial, decision=decision, reason=reason))
 
     def trials_followed(self, followed: TrialsFollowed) -> None:
-        """Note which trials follow from others, before the first of them is begun."""
+        """Note the trials of a stage, before the first of them begins."""
         self.note(followed)
 
     def archived(self, number: int) -> ArchivedTrial:
         """The last finished attempt at a trial of this run, read from its file, with its metrics.
 
-        Raises ArchiveError when it cannot be read, LookupError when there is none.
+        Raises ArchiveError if it is unreadable, LookupError if there is none.
         """
         from campaign.archive.reading.folder import read_trial_file
 
@@ -188,21 +188,21 @@ class RunWriter:
         return with_metrics(archived, self._told(place))
 
     def metrics(self) -> dict[int, tuple[Estimate, ...]]:
-        """What was measured in the last finished attempt at each trial, by number."""
+        """Metrics of the last finished attempt at each trial, by number."""
         with self._lock:
             places = {
                 number: self._measured.get(last.record) for number, last in self._last.items()
             }
-        told = ((number, self._told(place)) for number, place in places.items())
-        return {number: each.estimates for number, each in told if each is not None}
+        lines = ((number, self._told(place)) for number, place in places.items())
+        return {number: each.estimates for number, each in lines if each is not None}
 
     def _told(self, place: int | None) -> TrialMeasured | None:
-        """What was measured, from the journal: of all trials it would fill the memory."""
+        """Metrics at an offset of the journal; not cached, because all would fill the memory."""
         entry = None if place is None else self._journal.entry(place)
         return entry if isinstance(entry, TrialMeasured) else None
 
     def operator_step(self, trial: int, step: str, answer: str, *, at: str = "") -> None:
-        """Note what a person was asked to do before `trial`, and the answer."""
+        """Note a step requested from the operator before `trial`, and the answer."""
         self.note(OperatorStep(at=at or utc_now(), trial=trial, step=step, answer=answer))
 
     def seal(
@@ -213,12 +213,12 @@ class RunWriter:
         *,
         ended: str,
     ) -> Path:
-        """Close the run, however it ended, and make one file of it; returns its path.
+        """Close the run with any status, and make one file of it; return its path.
 
-        Trials that are still open are abandoned. `ended` is ISO 8601 with a time zone.
+        Open trials are abandoned. `ended` is ISO 8601 with a time zone.
 
         Raises:
-            ArchiveError: no file could be made; the folder stays, with all that was finished.
+            ArchiveError: sealing failed; the folder stays, with all finished trials.
         """
         try:
             self._abandon_open(ended)
@@ -230,7 +230,7 @@ class RunWriter:
             self.close()
 
     def close(self) -> None:
-        """Let go of the run as it is, unsealed: another process may go on with it."""
+        """Release the run unsealed: another process may resume it."""
         self._sealer.discard()
         self._journal.close()
         self._run_lock.release()
@@ -242,7 +242,7 @@ class RunWriter:
             writer.abandon(at, "the run ended")
 
     def note(self, *entries: Entry) -> None:
-        """Put lines into the journal, all or none; of a finished trial its file is on the disk."""
+        """Add lines to the journal, all or none; the file of a finished trial must be on disk."""
         places = self._journal.append(*entries)
         for entry, place in zip(entries, places, strict=True):
             if isinstance(entry, TrialFinished):
