@@ -22,7 +22,7 @@ from campaign.report.drawing.figures import draw
 from campaign.report.page import interactive as module
 from campaign.report.page.folder import ShownFigure
 from campaign.report.page.interactive import growing, zooms
-from campaign.result import Axis, Curve, Figure, Panel
+from campaign.result import Axis, Curve, Figure, Mark, Panel
 
 pytestmark = pytest.mark.usefixtures("drawings_kept")
 
@@ -59,6 +59,20 @@ def test_quotes_of_the_data_stand_as_they_are_and_nothing_leaves_their_element(
     told = str(module.interactive([shown]).data)
     assert "<" not in told
     assert json.loads(html.unescape(told))["figure-1"]["panels"] == [panel]
+
+
+def test_an_interval_has_both_of_its_ends_in_the_units_of_its_axis() -> None:
+    curve = Curve(np.arange(9.0), np.arange(9.0), "a", "a")
+    marks = (Mark("window", x=1.0, until=2.0), Mark("band", y=0.5, until=1.0), Mark("line", x=3.0))
+    axes = Axis("t", "s", "ms"), Axis("rate", "rad/s", "deg/s")
+    shown = Figure("k", "Title", "c", "a", (Panel(*axes, (curve,), marks=marks),))
+    (panel,) = module._figure(shown, None)["panels"]
+    band = {"y": np.rad2deg(0.5), "until": np.rad2deg(1.0)}
+    assert panel["marks"] == [
+        {"label": "window", "x": 1000.0, "until": 2000.0},
+        {"label": "band", **{name: pytest.approx(value) for name, value in band.items()}},
+        {"label": "line", "x": 3000.0},
+    ]
 
 
 def test_without_what_it_adds_the_page_is_the_static_one_to_the_byte(

@@ -86,8 +86,16 @@
     for (const mark of panel.marks) {
       const x = "x" in mark ? u.valToPos(mark.x, "x", true) : null;
       const y = "y" in mark ? u.valToPos(mark.y, "y", true) : null;
-      if (x !== null) line(colour("muted"), [3, 2], [x, bbox.top], [x, bbox.top + bbox.height]);
-      if (y !== null) line(colour("muted"), [3, 2], [bbox.left, y], [bbox.left + bbox.width, y]);
+      if ("until" in mark) {
+        const until = u.valToPos(mark.until, x === null ? "y" : "x", true);
+        ctx.globalAlpha = 0.12;
+        if (x === null) ctx.fillRect(bbox.left, y, bbox.width, until - y);
+        else ctx.fillRect(x, bbox.top, until - x, bbox.height);
+        ctx.globalAlpha = 1;
+      } else {
+        if (x !== null) line(colour("muted"), [3, 2], [x, bbox.top], [x, bbox.top + bbox.height]);
+        if (y !== null) line(colour("muted"), [3, 2], [bbox.left, y], [bbox.left + bbox.width, y]);
+      }
       ctx.fillText(mark.label, (x ?? bbox.left) + 4 * ratio, (y ?? bbox.top + 14 * ratio) - 3 * ratio);
     }
     ctx.restore();

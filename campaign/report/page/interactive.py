@@ -140,8 +140,9 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _mark(mark: Mark, panel: Panel) -> dict[str, Any]:
-    """A labelled line; of a stretch, only its beginning."""
-    ends = {"x": (mark.x, panel.x), "y": (mark.y, panel.y)}
+    """A labelled line, or the beginning and the end of an interval."""
+    across = panel.x if mark.x is not None else panel.y
+    ends = {"x": (mark.x, panel.x), "y": (mark.y, panel.y), "until": (mark.until, across)}
     shown = {
         name: value * scale_of(axis)
         for name, (value, axis) in ends.items()
