@@ -266,7 +266,7 @@ def scoreboard_table(scoreboard: Scoreboard) -> Table:
     )
     cells = map(_line, scoreboard.lines)
     lines = tuple({column.name: each[column.name] for column in columns} for each in cells)
-    return Table("published", "Published values and what was found", columns, lines)
+    return Table("published", "Published values and results", columns, lines)
 
 
 def _line(line: Line) -> dict[str, Cell]:

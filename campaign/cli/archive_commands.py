@@ -335,7 +335,7 @@ def show(
     run: given.NewestRun = None,
     results: given.Results = RESULTS,
     metrics: Annotated[
-        bool, flag("--metrics", "Also what each recording says by itself, with intervals.")
+        bool, flag("--metrics", "Also the metrics of each recording, with intervals.")
     ] = False,
     as_json: given.Json = False,
 ) -> Ended:

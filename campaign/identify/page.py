@@ -101,7 +101,7 @@ def article_of(found: Identification, command: str, bench: str = "") -> Article:
 
 def _parts(found: Identification, making: _Making) -> Iterator[Part]:
     shown = [(each, each.result) for each in found.sections if each.result is not None]
-    yield Part("found", "What was found", tuple(_found(found, shown, making)))
+    yield Part("found", "Findings", tuple(_found(found, shown, making)))
     for section, result in shown:
         summary = section.model.summary
         anchor = f"method-{section.model.name.replace('_', '-')}"
@@ -151,8 +151,8 @@ def _advice(parameter: Parameter) -> str:
         source = in_axis_terms(parts[0].source)
         cure = CURES.get(parts[0].source, f"know the {source} better")
         return (
-            f"{begin} Most of it is systematic ({source}), and no longer recording makes that "
-            f"smaller: {cure}."
+            f"{begin} Most of it is systematic ({source}); a longer recording does not reduce "
+            f"it: {cure}."
         )
     longer = "four times as much of the same motion halves it"
     return f"{begin} To halve it, {parameter.advice}; or {longer}." if parameter.advice else (

@@ -29,7 +29,7 @@ def declared_figure(each: TrendSeries, trends: Trends, headline: str, place: int
     return Figure(
         f"declared-{place}",
         each.series.name[:1].upper() + each.series.name[1:],
-        f"{headline}. Bars are 95 % intervals of each run by itself"
+        f"{headline}. Bars are 95 % intervals of each run alone"
         + ("; the band is that of the line." if each.verdict is not Verdict.JUMPED else
            "; lines are the levels before and behind."),
         headline,

@@ -208,7 +208,7 @@ def test_a_window_is_taken_by_its_name_and_not_by_its_place():
     done = recorded("frequency_response", both, both, windows)
     assert done.trial.windows == (Window("steady", 4.0, 16.0),)
     assert done.trial.point["frequency"] == pytest.approx(2.0, rel=1e-3)
-    with pytest.raises(ValueError, match="a window 'rest' says nothing here; it is 'steady'"):
+    with pytest.raises(ValueError, match="a window 'rest' has no meaning here; it is 'steady'"):
         recorded("frequency_response", both, both, windows[:1])
 
 

@@ -162,7 +162,7 @@ def test_a_force_that_follows_nothing_wanted_has_no_loop() -> None:
     draw = np.random.default_rng(5)
     other = replace(motion, force=draw.standard_normal(len(motion.time)))
     wanted = motion_of_position(TIME, wanted_motion()[0], motion.force, 100.0)
-    with pytest.raises(ValueError, match="does not follow from what was wanted"):
+    with pytest.raises(ValueError, match="does not follow from the setpoints"):
         find_loop(other, wanted, 100.0)
 
 

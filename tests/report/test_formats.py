@@ -197,7 +197,7 @@ def test_the_opening_says_in_markdown_what_it_says_on_the_page(made_up, tmp_path
         ),
     }
     folder = build(made_up, run, tmp_path / "out", "markdown", experiments=kinds).path.parent
-    text = (folder / "report.md").read_text().split("## What was found")[1].split("\n## ")[0]
+    text = (folder / "report.md").read_text().split("## Findings")[1].split("\n## ")[0]
     assert "2 tests, " in text
     assert "Without an interval: one recording only." in text
     assert "No result: No map." in text
@@ -206,7 +206,7 @@ def test_the_opening_says_in_markdown_what_it_says_on_the_page(made_up, tmp_path
 def test_the_figure_on_top_is_shown_once_and_first(folder: Path) -> None:
     text = (folder / "report.md").read_text()
     top, rest = text.split("\n## Scoreboard")
-    assert "**Figure 1. " in top.split("## What was found")[1]
+    assert "**Figure 1. " in top.split("## Findings")[1]
     assert "**Figure 1. " not in rest
     assert "is at the top of the report" in rest
 

@@ -131,7 +131,7 @@ def test_what_is_not_in_an_interval_on_top_is_told_there(
     )
     texts = [report.path, *(report.path.with_suffix(suffix) for suffix in (".md", ".tex"))]
     for text in (path.read_text(encoding="utf-8") for path in texts):
-        top = text[text.index("What was found") :]
+        top = text[text.index("Findings") :]
         top = re.split(r"</section>|\n## |\\(?:sub)*section", top)[0]
         assert top.count(f"{str(ONE_TRIAL)[1:]}.") == 1
         assert top.count(f"{str(ONE_DAY)[1:]}.") == 1

@@ -107,7 +107,7 @@ def test_what_has_changed_is_named_with_its_size(made_up: ModuleType, tmp_path: 
     assert "monday" in document.references.stated["breakaway"].table.note
     page, folder, _ = render(run, tmp_path, kinds, templates_folder())  # type: ignore[arg-type]
     assert answer.prediction in page
-    assert "Identified before, and found now" in page
+    assert "Identified before, and estimated now" in page
     assert "tables/breakaway-stated.csv" in folder.files
 
 
@@ -149,7 +149,7 @@ def test_what_nobody_identified_is_not_told_as_changed(made_up: ModuleType, tmp_
     *_, document = analysed(made_up, tmp_path, told, rig=bench(origin="given"))
     said = document.opening.answers[0].prediction
     assert said.startswith("1 of 1 numbers differ from what the bench file states: Coulomb")
-    assert document.references.stated["breakaway"].table.title == "Stated by the bench, and found"
+    assert document.references.stated["breakaway"].table.title == "Stated and estimated"
     assert "monday" not in document.references.stated["breakaway"].table.note
 
 

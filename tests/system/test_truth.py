@@ -161,7 +161,7 @@ def test_the_report_opens_it_when_the_analyses_are_done(
     )
     html, folder, _ = render(open_run(archive), tmp_path, experiments(), templates_folder())
     assert order == ["analysis", "truth"]
-    assert "True and found" in html
+    assert "True and estimated values" in html
     assert "Plan and analysis were given the stated bench" in html
     (text,) = (text for name, text in folder.files.items() if name.endswith("map-truth.csv"))
     rows = [row for row in csv.reader(text.splitlines()) if row[0] == "viscous friction σ2"]

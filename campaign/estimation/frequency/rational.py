@@ -36,7 +36,7 @@ LARGE_RESIDUALS = Cause(
 )
 ALIKE_RESIDUALS = Cause(
     "residuals alike",
-    "what it leaves is alike at neighbouring frequencies ({correlation:.2f})",
+    "its residuals correlate at neighbouring frequencies ({correlation:.2f})",
 )
 
 

@@ -19,9 +19,7 @@ from campaign.estimation.inverse.terms import Term
 from campaign.reason import Cause
 
 METHOD = "least squares; deviation with autocorrelation (Newey and West)"
-TOO_FEW_ROWS = Cause(
-    "too few independent rows", "what is left over is worth too few independent rows"
-)
+TOO_FEW_ROWS = Cause("too few independent rows", "the residuals have too few independent rows")
 
 
 def estimates(

@@ -48,7 +48,7 @@ def by_instruments(pieces: Sequence[Piece], instruments: Sequence[Piece]) -> Ins
     across = other.T @ design
     length = np.linalg.norm(other, axis=0)
     if not np.all(length > 0):
-        raise ValueError("what was wanted never asks for some term of the model")
+        raise ValueError("the setpoints do not excite some term of the model")
     scaled = across / np.outer(length, np.linalg.norm(design, axis=0))
     if np.linalg.cond(scaled) > 1e8:
         raise ValueError("the setpoints do not separate the model's terms")

@@ -67,7 +67,7 @@ def find_loop(motion: Motion, wanted: Motion, low_pass: float) -> Loop:
     left = force - design @ values
     explained = 1.0 - float(np.var(left) / max(np.var(force), np.finfo(float).tiny))
     if explained < FOLLOWS or not (values[0] >= 0.0 and values[1] > 0.0):
-        raise ValueError("the force does not follow from what was wanted as of a loop")
+        raise ValueError("the force does not follow from the setpoints as in a loop")
     ahead = np.asarray(design[:, 2:] @ values[2:])
     return Loop(float(values[0]), float(values[1]), ahead, explained)
 

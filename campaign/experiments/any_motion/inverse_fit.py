@@ -42,7 +42,7 @@ ROUNDS = 4
 """Most times that terms are chosen at a delay, and the delay is found anew with them."""
 BENDS = Cause(
     "friction bends",
-    "friction bends over these rates: it is one share of a sum, and nothing by itself",
+    "friction is nonlinear over these rates: it is one share of a sum, without own meaning",
 )
 STATED = Cause("stated", "stated")
 

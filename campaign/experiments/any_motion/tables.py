@@ -15,9 +15,7 @@ from campaign.result import Cell, Column, Table
 
 STRONG = 0.9
 """Correlation from which on two coefficients are told to go together."""
-AS_THEY_ARE = Cause(
-    "sum over rows", "a sum over all rows: what it would be of other rows, blocks say"
-)
+AS_THEY_ARE = Cause("sum over rows", "a sum over all rows; blocks show how it varies")
 DEVIATION = Cause("deviation", "a deviation, not a quantity of the rig")
 
 

@@ -409,7 +409,7 @@ def _named(offered: OfferedRecording) -> Iterator[TrialRequest]:
     wrong = [window.name for window in offered.windows if window.name not in DIRECTIONS]
     if wrong:
         raise ValueError(
-            f"a window {wrong[0]!r} says nothing here; they are {', '.join(DIRECTIONS)}"
+            f"a window {wrong[0]!r} has no meaning here; they are {', '.join(DIRECTIONS)}"
         )
     rate = offered.read([GYRO_RATE])
     speeds = [

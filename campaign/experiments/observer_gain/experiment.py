@@ -309,7 +309,7 @@ def _table(gains: list[Gain], remark: str) -> Table:
             Column("state", "Loop"),
         ),
         rows=tuple(_row(gain) for gain in gains),
-        note="The error by Eq. 5.4 is what it makes of the friction that acted in the same trial. "
+        note="The error by Eq. 5.4 is calculated from the friction in the same trial. "
         "Equations 5.4 and 5.5 are taken with the bench's PI controller in place of a constant. "
         f"The error is that of the position, 1σ.{remark}",
     )

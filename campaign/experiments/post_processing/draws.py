@@ -55,7 +55,7 @@ def merged(results: Mapping[Value, Result]) -> Result:
 def _table(found: Iterable[Finding], seeds: tuple[Value, ...]) -> Table:
     return Table(
         key="draws",
-        title="What the draws of the bench found",
+        title="Results of the draws",
         columns=(
             Column("quantity", "Quantity"),
             Column("conditions", "Conditions"),

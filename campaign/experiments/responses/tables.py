@@ -44,7 +44,7 @@ def sources_table(found: Sequence[Source]) -> Table:
     ]
     return Table(
         "responses",
-        "Responses, and what they were measured with",
+        "Responses and their measurement",
         (
             NAME,
             EXCITATION,

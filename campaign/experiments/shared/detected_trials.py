@@ -33,7 +33,7 @@ def _stated(offered: OfferedRecording, name: str) -> Window | None:
     """The window that somebody has named so. Raises ValueError where there are only others."""
     names = [window.name for window in offered.windows]
     if names and name not in names:
-        raise ValueError(f"a window {names[0]!r} says nothing here; it is {name!r}")
+        raise ValueError(f"a window {names[0]!r} has no meaning here; it is {name!r}")
     return next((window for window in offered.windows if window.name == name), None)
 
 

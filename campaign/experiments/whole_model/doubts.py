@@ -37,7 +37,7 @@ UNRESOLVED = Cause(
 )
 CORRELATED = Cause(
     "residuals correlated",
-    "the model lacks something: what it leaves over is correlated ({rows} rows are worth {worth})",
+    "the model is incomplete: its residuals are correlated (effective size {worth} of {rows} rows)",
 )
 WORTH = 0.5
 """of the rows, below which residuals are worth too little for what happens in reversals."""

@@ -141,11 +141,15 @@ def _stated(run: RunReader, test: AnalysedTest) -> Found | None:
     identified = bench.known.identified if measured else None
     if identified is None:
         before, said = "what the bench file states", "The bench file states them"
-        title, column, differ = "Stated by the bench, and found", "Stated", f"differ from {before}"
+        title, column, differ = (
+            "Stated and estimated",
+            "Stated",
+            f"differ from {before}",
+        )
     else:
         before, title, column = (
             "what was identified",
-            "Identified before, and found now",
+            "Identified before, and estimated now",
             "Identified",
         )
         differ = "changed since they were identified"

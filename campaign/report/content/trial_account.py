@@ -244,7 +244,7 @@ def _tables(archived: ArchivedTrial, recording: Recording | None, story: Lines) 
     """Tables of metrics, events, attempts and decisions of the trial."""
     yield Table(
         "metrics",
-        "What the recording says by itself",
+        "Metrics of the recording",
         (
             Column("name", "Quantity"),
             Column("value", "Value, 95 % interval"),

@@ -112,7 +112,7 @@ def _table(test: AnalysedTest, plants: Mapping[str, Tree], units: TestUnits) -> 
         note += " Plan and analysis were given the stated bench, not this one."
     return Table(
         key="truth",
-        title="True and found",
+        title="True and estimated values",
         columns=(
             Column("quantity", "Quantity"),
             Column("conditions", "Conditions"),

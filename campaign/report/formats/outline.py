@@ -84,7 +84,7 @@ def _counted(count: int, what: str) -> list[str]:
 def _opening(layout: Layout) -> Iterator[Piece]:
     """Quality of the run, its key numbers with all remarks, and the leading figure."""
     opening = layout.document.opening
-    yield Heading(2, "What was found", "opening")
+    yield Heading(2, "Findings", "opening")
     yield from (Paragraph(why, role="warning") for why in opening.wrong)
     if opening.compared:
         yield Paragraph(opening.compared)

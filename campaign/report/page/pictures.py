@@ -41,9 +41,9 @@ def overview(
     return folder.picture(
         drawn,
         "Deviation from the published values",
-        "One sign per published number: how far the reproduced value is from it, and what the"
-        " comparison is worth; pointing at a sign shows which number it is. The axis is linear up"
-        " to ±1 % and logarithmic beyond.",
+        "One sign per published number: its position is the deviation of the reproduced"
+        " value, its shape the status of the comparison. Point at a sign for its number. The axis"
+        " is linear up to ±1 % and logarithmic beyond.",
         agreement(scoreboard),
         "scoreboard",
     )

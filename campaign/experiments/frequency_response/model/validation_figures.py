@@ -29,10 +29,8 @@ SELDOM = math.sqrt(-math.log(0.05))
 LAGS = 30
 """of an autocorrelation, at most."""
 MODEL = Column("model", "Model", exact=True)
-OF_LINES = Cause(
-    "over these lines", "over these lines: what it would be of others, their deviations say"
-)
-IN_LAST_COLUMN = Cause("deviation in a column", "how sure it is, the last column says")
+OF_LINES = Cause("over these lines", "a mean over these lines; their deviations show how it varies")
+IN_LAST_COLUMN = Cause("deviation in a column", "the last column has its uncertainty")
 
 
 def validation_tables(validation: Validation) -> Iterator[Table]:
