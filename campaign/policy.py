@@ -20,16 +20,16 @@ from campaign.units import Time
 
 
 class Response(Options):
-    """What to do when a trial did not run to its end; a bare word is short for `{do = word}`."""
+    """Response to an incomplete trial; a bare word is short for `{do = word}`."""
 
     do: Literal["retry", "skip", "abort"] = "skip"
-    """Execute the trial again, go on with the next one, or end the run."""
+    """Execute the trial again, continue with the next one, or end the run."""
     times: int = Field(default=1, ge=1, le=1000)
-    """How often a trial is executed again at most."""
+    """Largest number of retries of a trial."""
     pause: Time = Field(default=0.0, ge=0)
-    """What is waited before it is; on a simulated bench nothing is waited for."""
+    """Pause before a retry; a simulated bench does not wait."""
     then: Literal["skip", "abort"] = "skip"
-    """What to do when the last retry has failed as well."""
+    """Response if the last retry fails too."""
 
     @model_validator(mode="before")
     @classmethod
@@ -49,7 +49,7 @@ class Rest(Options):
     every: Time = Field(gt=0)
     """Bench time between two pauses; a pause never interrupts a trial."""
     pause: Time = Field(gt=0)
-    """How long each lasts; on a simulated bench nothing is waited for."""
+    """Duration of each; a simulated bench does not wait."""
 
 
 Occasion = Literal[
@@ -67,7 +67,7 @@ NotKept = Callable[[Ending], str]
 
 
 class Policy(Options):
-    """What a protocol wants done; nothing ever moves after a safe state that was not confirmed."""
+    """Policy of a protocol; no motion follows a safe state that was not confirmed."""
 
     faults: dict[Occasion, Response] = {}
     rest: Rest | None = None

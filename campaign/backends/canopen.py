@@ -64,29 +64,29 @@ class CanopenOptions(Options):
     """Options of a drive."""
 
     port: str = ""
-    """Where it is: `can://INTERFACE/CHANNEL?node=N`, as `can://socketcan/can0?node=5`."""
+    """Address: `can://INTERFACE/CHANNEL?node=N`, such as `can://socketcan/can0?node=5`."""
     heartbeat: Time = Field(default=0.2, ge=0.05, le=5)
-    """Without a heartbeat for so long, the drive stops by itself."""
+    """The drive stops after this time without a heartbeat."""
     silence: Time = Field(default=2.0, ge=0.1, le=60)
-    """Without a sign of life of this program for so long, a trial is stopped."""
+    """A trial stops after this time without a sign of life of this program."""
     late: Time | None = Field(default=None, gt=0, le=60)
-    """Largest delay of a SYNC and of its answer; absent: half of the time between two samples."""
+    """Largest delay of a SYNC and of its answer; absent: half of the sample period."""
     safe_time: Time = Field(default=8.0, gt=0, le=9)
-    """How long the drive may take to be seen at rest and off."""
+    """Longest time until the drive is confirmed at rest and off."""
     eds: str = ""
-    """Path of the drive's EDS, of which vendor, product and data types are compared."""
+    """Path of the drive's EDS, to compare vendor, product and data types."""
     reverse: bool = False
-    """Whether positive is the drive's negative direction."""
+    """Whether the drive counts in the opposite direction."""
     units_per_turn: float | None = Field(default=None, gt=0)
     """Units of 6064h per turn of the load; absent: by the drive's own factors."""
     rate_units: float | None = Field(default=None, gt=0)
     """Units of 606Ch at one turn of the load per second; absent: by the drive's own factors."""
     rated_torque: Torque | None = Field(default=None, gt=0)
-    """Of the motor, for what is in per mille; absent: 6076h."""
+    """Rated torque of the motor, to convert per mille; absent: 6076h."""
     rated_current: Current | None = Field(default=None, gt=0)
-    """Of the motor; absent: 6075h."""
+    """Rated current of the motor; absent: 6075h."""
     clear_fault: bool = False
-    """Clear a fault of the drive when connecting; who sets it has seen why it was."""
+    """Clear a fault of the drive when connecting. Find its cause first."""
 
 
 class CanopenBackend:

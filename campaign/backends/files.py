@@ -86,22 +86,22 @@ class FilesOptions(Options):
     """Options of a hand-over."""
 
     folder: str = ""
-    """Where trials are handed out and recordings come back; `--handover` is short for it."""
+    """Folder for trials and their recordings; `--handover` sets it too."""
     mapping: str = ""
-    """The file whose `[columns.NAME]` say what the columns of recordings are; absent: the
-    protocol's own, or else `columns.toml` in the folder, of which a first version is written."""
+    """File with `[columns.NAME]`, which describe the columns of recordings. Absent: those of the
+    protocol, or else `columns.toml` in the folder; the run writes its first version."""
     columns: str = ""
-    """Which of them all recordings are read by; absent: the one there is, or the one that is
-    called as the test, or as the mode of the task."""
+    """NAME of the columns for all recordings; absent: the only one, or the one named as the test,
+    or as the mode of the task."""
     wait: Time = Field(default=WEEK, ge=0)
-    """How long a recording is waited for; then, and at once with 0 s, the run ends as interrupted,
-    and `campaign resume` goes on when it is back."""
+    """Longest wait for a recording. Then the run ends as interrupted; with 0 s it ends at once.
+    `campaign resume` continues it when the recording is available."""
     ahead: int = Field(default=100, ge=0, le=100_000)
-    """How many trials are handed out beyond the one that is due."""
+    """Number of trials to hand out beyond the one that is due."""
     settle: Time = Field(default=5.0, gt=0, le=3600)
-    """How long the files of a recording must not have changed, where nobody has marked it done."""
+    """A recording without the mark `done` is complete after this time without a change."""
     motion: Literal["none", "table"] = "none"
-    """What moves the hull: nothing, or a table that plays the column `base_acceleration`."""
+    """Source of hull motion: none, or a table that plays the column `base_acceleration`."""
 
     @field_validator("folder", "mapping")
     @classmethod

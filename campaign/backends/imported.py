@@ -23,7 +23,7 @@ from campaign.trial import Trial
 
 
 class ImportOptions(Options):
-    """The import has no options: trials say where their samples lie."""
+    """The import has no options: each trial states the source of its samples."""
 
 
 class ImportBackend:

@@ -53,15 +53,15 @@ class SerialOptions(Options):
     """Options of a controller on a line."""
 
     port: str = ""
-    """Where it is: `/dev/ttyUSB0`, `COM3`, or `socket://HOST:PORT`; `--port` is short for it."""
+    """Address: `/dev/ttyUSB0`, `COM3`, or `socket://HOST:PORT`; `--port` sets it too."""
     baud: int = Field(default=2_000_000, ge=1200, le=20_000_000)
     """Bits per second of a serial port."""
     motion: Literal["none", "emulated"] = "none"
-    """What moves the hull: nothing, or a rehearsal controller that emulates it."""
+    """Source of hull motion: none, or a controller emulator."""
     silence: Time = Field(default=3.0, gt=0, le=10)
-    """Without a word or an answer for so long, the connection is lost."""
+    """The connection is lost after this time without data or an answer."""
     safe_time: Time = Field(default=8.0, gt=0, le=9)
-    """How long the bench may take to be seen at rest with its drive off."""
+    """Longest time until the bench is confirmed at rest with its drive off."""
 
 
 class SerialBackend:

@@ -42,10 +42,10 @@ class SimOptions(Options):
     """Options of the simulated bench."""
 
     longest_step: Time | None = Field(default=None, gt=0, le=0.01)
-    """Longest integration step; absent: what the trial needs, 1 ms or 1/2^k of it. Sample rates and
-    the frequencies of sines make it shorter."""
+    """Longest integration step; absent: 1 ms or 1/2^k of it, as the trial needs. Sample rates and
+    the frequencies of sines shorten it."""
     check_step: bool = False
-    """Simulate each trial once more at half its step, and archive how much that changes."""
+    """Simulate each trial again at half its step, and archive the difference."""
 
 
 class _Known(NamedTuple):

@@ -64,11 +64,11 @@ class ForceRateOptions(Options):
     )
     """Slopes of the ramps."""
     peak_torque: Torque = Field(default=60.0, gt=0)
-    """Where a ramp ends if the load has not moved; above the breakaway torque expected."""
+    """End of a ramp if the load does not move; above the expected breakaway torque."""
     sliding_rate: AngularRate = Field(default=0.01, gt=0)
-    """Rate at which the load counts as sliding; the peak is looked for before it."""
+    """Rate at which the load counts as sliding; the peak is before that."""
     models: tuple[str, ...] = ()
-    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+    """Friction models to describe the bench's friction, one by one; none: its own."""
 
 
 def _trials(options: ForceRateOptions, bench: Bench) -> Iterator[TrialRequest]:

@@ -67,15 +67,15 @@ class FrictionLagOptions(Options):
     """Options of a friction-lag test."""
 
     mean_rate: AngularRate = Field(default=0.04, gt=0)
-    """Rate around which the swing goes."""
+    """Mean rate of the oscillation."""
     amplitude: AngularRate = Field(default=0.035, gt=0)
-    """Amplitude of the swing; below the mean rate, so that the load never stops."""
+    """Amplitude of the oscillation; below the mean rate, so that the load never stops."""
     frequencies: tuple[Frequency, ...] = Field(default=(1.0, 5.0, 20.0), min_length=1)
-    """Frequencies of the swing."""
+    """Frequencies of the oscillation."""
     cycles: int = Field(default=4, ge=2, le=1000)
-    """Cycles of the swing; the first one is not measured."""
+    """Cycles of the oscillation; the first one is not measured."""
     models: tuple[str, ...] = ()
-    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+    """Friction models to describe the bench's friction, one by one; none: its own."""
 
 
 def _trials(options: FrictionLagOptions, bench: Bench) -> Iterator[TrialRequest]:

@@ -28,19 +28,19 @@ class MoveOptions(Options):
     """Options of a move."""
 
     angle: Angle
-    """Angle of the load relative to the hull to move to."""
+    """Target angle of the load relative to the hull."""
     position: Angle = 0.0
-    """Angle of the load relative to the hull at the start."""
+    """Start angle of the load relative to the hull."""
     speed: AngularRate = Field(default=math.radians(5.0), gt=0)
-    """Rate between the ramps; a short way is over before it is reached."""
+    """Rate between the ramps; a short move does not reach it."""
     acceleration: AngularAcceleration = Field(default=math.radians(20.0), gt=0)
-    """Of the ramps at either end."""
+    """Acceleration of both ramps."""
     role: Literal["home", "warm-up"] = "home"
-    """What it is for: brings the axis to where the next test begins, or warms it up."""
+    """Purpose: moves the axis to the start of the next test, or warms it up."""
     cycles: int = Field(default=0, ge=0, le=10_000)
-    """How often it goes there and back; 0: there, and stays."""
+    """Number of moves there and back; 0: there only."""
     rest: Time = Field(default=0.5, ge=0.2)
-    """Standstill after each way."""
+    """Standstill after each move."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
 

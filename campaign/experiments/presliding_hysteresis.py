@@ -58,11 +58,11 @@ class PreslidingHysteresisOptions(Options):
     frequency: Frequency = Field(default=0.1, gt=0)
     """Frequency of the displacement; slow, or bristle damping widens the loops."""
     cycles: int = Field(default=8, ge=2, le=1000)
-    """Cycles of the displacement; the last one is measured. Small loops need some to close."""
+    """Cycles of the displacement; the last one is measured. Small loops need several to close."""
     sample_rate: Frequency = Field(default=200.0, gt=0, le=100_000)
     """Rate of the recording; at least 100 samples per cycle."""
     models: tuple[str, ...] = ()
-    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+    """Friction models to describe the bench's friction, one by one; none: its own."""
 
 
 def _trials(options: PreslidingHysteresisOptions, bench: Bench) -> Iterator[TrialRequest]:

@@ -56,23 +56,23 @@ class StepResponseOptions(Options):
     step: AngularRate = float(np.deg2rad(1.0))
     """Height of the step of the rate command; negative: downwards, or to the negative side."""
     ramp: Time = Field(default=0.005, ge=0)
-    """How long the command takes to rise: a jump would break any limit of acceleration, so 0 is
-    for recordings only."""
+    """Rise time of the command. A jump exceeds any limit of acceleration, so 0 is for recordings
+    only."""
     linear: bool = True
-    """Without the bench's friction, as the loop was tuned; false: as it is. Friction can be taken
-    away from a simulated bench only."""
+    """Without the bench's friction, as the loop was tuned; false: with it. Only a simulated bench
+    can omit friction."""
     compensation: str = "none"
-    """Compensation method, by its name on the bench; none for none."""
+    """Name of a compensation of the bench, or none."""
     rest: Time = Field(default=0.1, ge=LEAST_REST)
     """Standstill before the step."""
     duration: Time = Field(default=1.0, gt=0)
     """From the start of the step to the end of the trial."""
     band: float = Field(default=0.02, gt=0, lt=0.5)
-    """The response has settled once it stays this close, as a share of the step."""
+    """Half-width of the settling band, as a share of the step."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
     position: Angle = 0.0
-    """Angle of the load relative to the hull at the start."""
+    """Start angle of the load relative to the hull."""
 
     @field_validator("step")
     @classmethod

@@ -58,17 +58,17 @@ class StickSlipOptions(Options):
     """Options of a stick-slip test."""
 
     stiffness: RotationalStiffness = Field(default=100.0, gt=0)
-    """Of the spring."""
+    """Stiffness of the spring."""
     pull_rate: AngularRate = Field(default=0.02, gt=0)
     """Rate of the spring's far end."""
     duration: Time = Field(default=60.0, gt=0)
-    """Length of the pull."""
+    """Duration of the pull."""
     slip_rate: AngularRate = Field(default=0.02, gt=0)
     """Rate of the load that counts as a slip."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording; slips are timed between two samples."""
     models: tuple[str, ...] = ()
-    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+    """Friction models to describe the bench's friction, one by one; none: its own."""
 
 
 def _trials(options: StickSlipOptions, bench: Bench) -> Iterator[TrialRequest]:

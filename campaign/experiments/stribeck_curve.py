@@ -76,15 +76,15 @@ class StribeckCurveOptions(Options):
     )
     """Constant speeds; each is run in both directions."""
     settle_angle: Angle = Field(default=0.02, ge=0)
-    """Travel before a reading: many times what the bristles deflect."""
+    """Travel before a reading: many times the deflection of the bristles."""
     settle_time: Time = Field(default=0.2, ge=0)
     """Shortest time at constant speed before a reading."""
     window_time: Time = Field(default=0.1, gt=0)
-    """Length of the reading."""
+    """Duration of the reading."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
     models: tuple[str, ...] = ()
-    """Friction models to describe the bench's friction by, one after the other; none: its own."""
+    """Friction models to describe the bench's friction, one by one; none: its own."""
 
 
 def _trials(options: StribeckCurveOptions, bench: Bench) -> Iterator[TrialRequest]:

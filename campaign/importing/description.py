@@ -19,26 +19,26 @@ from campaign.recording import ChannelInfo
 
 
 class FileSnapshot(Options):
-    """A file as it was when the plan was made."""
+    """State of a file when the plan was made."""
 
     name: str
-    """As the mapping writes it."""
+    """Name in the mapping."""
     path: str
-    """Where it lay."""
+    """Its path then."""
     sha256: str
-    """Of its bytes."""
+    """SHA-256 of its bytes."""
     size: int
-    """Bytes."""
+    """Size in bytes."""
 
 
 class Cells(Options):
-    """One column of one table of one file, each by its place from 0."""
+    """One column of one table of one file, each by its index from 0."""
 
     file: int
     table: int
     column: int
     name: str = ""
-    """As the file has it."""
+    """Name in the file."""
 
     @property
     def rows_of(self) -> tuple[int, int]:
@@ -47,23 +47,23 @@ class Cells(Options):
 
 
 class ClockUsed(Options):
-    """How rows are told by their times: row k is at start + k / sample_rate, or as `cells` say."""
+    """Times of rows: row k is at start + k * step, or as `cells` state."""
 
     cells: Cells | None = None
     """A column of times."""
     factor: float = 1.0
     """From that column's unit to s."""
     step: float | None = None
-    """Of a clock that the file or the mapping states (s)."""
+    """Sample period that the file or the mapping states (s)."""
     start: float = 0.0
-    """Time of row 0 by such a clock (s)."""
+    """Time of row 0 with `step` (s)."""
 
 
 class ChannelSource(Options):
     """A channel: factor * (column - offset), read `shift` samples later; or from another channel.
 
-    `how` = column, copy, derivative or integral; where it is made from another channel, that one
-    stands before it.
+    `how` = column, copy, derivative or integral; a source channel precedes the channels made from
+    it.
     """
 
     name: str
@@ -72,23 +72,23 @@ class ChannelSource(Options):
     display_unit: str
     how: Literal["column", "copy", "derivative", "integral"] = "column"
     cells: Cells | None = None
-    """Of a column."""
+    """The column."""
     source: str = ""
-    """Of a copy, a derivative or an integral: the other channel."""
+    """Source channel of a copy, a derivative or an integral."""
     factor: float = 1.0
-    """From the column's unit to `unit`, with its sign and what it is multiplied by."""
+    """Factor from the column's unit to `unit`, with sign and scale."""
     offset: float = 0.0
-    """In the column's unit."""
+    """Offset in the column's unit."""
     shift: int = 0
-    """Samples by which the column is late."""
+    """Delay of the column in samples."""
     period: float | None = None
-    """Of a scale that begins anew and was made continuous, in `unit`."""
+    """Period of a scale that was unwrapped, in `unit`."""
     relative_uncertainty: float | None = None
-    """Of `factor` (1 sigma), as far as the mapping says."""
+    """Uncertainty of `factor` (1 sigma), if the mapping states it."""
     filter: str = ""
-    """What was done to it before it was recorded, in words."""
+    """Processing before the recording, in words."""
     own_rate: float | None = None
-    """How often it is new (Hz), where it comes from a slower clock and is held."""
+    """Update rate of a channel that a slower clock samples and holds (Hz)."""
     clock: ClockUsed | None = None
     """That slower clock."""
 
@@ -101,7 +101,7 @@ class ChannelSource(Options):
 
 
 class RecordingDescription(Options):
-    """A recording that a trial is served from.
+    """The recording that supplies a trial.
 
     The trial's time is 0 at its first row, and its samples are at k / sample_rate.
     """
@@ -110,21 +110,21 @@ class RecordingDescription(Options):
     table: tuple[int, int]
     """File and table whose rows are the trial's samples."""
     first: int
-    """Its first row, from 0."""
+    """First row, from 0."""
     rows: int
-    """How many."""
+    """Number of rows."""
     clock: ClockUsed
     sample_rate: float
-    """Of the trial (Hz)."""
+    """Sample rate of the trial (Hz)."""
     samples: int
-    """Of the trial; more than `rows` where gaps were marked."""
+    """Samples of the trial; more than `rows` if gaps are marked."""
     skip: int = 0
-    """Samples at the beginning that only serve channels which are put back by less."""
+    """Samples at the start that only channels with a smaller shift use."""
     repairs: tuple[str, ...] = ()
-    """What is done to the times."""
+    """Repairs of the times."""
     channels: tuple[ChannelSource, ...]
     remarks: tuple[str, ...] = ()
-    """What was done, and what was seen, in sentences."""
+    """Repairs and observations, in sentences."""
 
     @property
     def label(self) -> str:

@@ -62,54 +62,54 @@ class MappingError(ValueError):
 
 
 class ColumnPlace(Options):
-    """Which column of which table is meant."""
+    """Selects a column of a table."""
 
     column: str | int | None = None
-    """Name of the column as the file has it, or its place from 1."""
+    """Name of the column in the file, or its place from 1."""
     table: str = ""
-    """The part of the file it is in, where several have a column of that name."""
+    """Part of the file with the column, if several have one of that name."""
     file: int | None = Field(default=None, ge=1)
-    """Which of a recording's files it is in, from 1, where several have one of that name."""
+    """Number of the recording's file, from 1, if several have a column of that name."""
 
 
 class TimeColumn(ColumnPlace):
     """`[columns.NAME.time]`: when each row was sampled."""
 
     unit: str = ""
-    """Of the column, as in `ms`; absent: as the file states it."""
+    """Unit of the column, such as `ms`; absent: as the file states it."""
     sample_rate: Frequency | None = Field(default=None, gt=0)
-    """Where no column holds the time: how many rows there are in a second."""
+    """Rows per second, if no column holds the time."""
     repair: tuple[Repair, ...] = ()
-    """What may be done to times that are no even clock; it is archived that it was."""
+    """Permitted repairs of uneven times; the archive records them."""
 
 
 class ChannelColumn(ColumnPlace):
     """`[columns.NAME.CHANNEL]`: value = sign * times * (column - offset), then later by `delay`."""
 
     unit: str = ""
-    """Of the column; absent: as the file states it. `count` or `%` where that is what it counts."""
+    """Unit of the column; absent: as the file states it. `count` or `%` if it holds these."""
     times: str = ""
-    """By what the column is multiplied, as in `35.15 N/V`, where it measures something else."""
+    """Scale of the column, such as `35.15 N/V`, if it measures another quantity."""
     uncertainty: str = ""
-    """Standard uncertainty (1 sigma) of `times`, in its unit; or a share, as in `5 %`, also of a
-    column without `times`: what is not known is then the scale of the instrument."""
+    """Standard uncertainty (1 sigma) of `times`, in its unit or as a share such as `5 %`. Without
+    `times`, a share is the uncertainty of the instrument's scale."""
     offset: float = 0.0
-    """What the column reads at zero, in its own unit."""
+    """Reading of the column at zero, in its own unit."""
     sign: Literal[1, -1] = 1
-    """-1: the column counts the other way."""
+    """-1: the column counts in the opposite direction."""
     delay: Time = 0.0
-    """By how long the column is late; it is put back by whole samples."""
+    """Delay of the column; corrected by whole samples."""
     derive: str = ""
-    """Make it from another channel in place of a column: the rate from the angle."""
+    """Source channel in place of a column: the rate from the angle."""
     filter: str = Field(default="", max_length=200)
-    """What the drive did to it before it was recorded, in words; it is kept with the channel."""
+    """Processing by the drive before the recording, in words; kept with the channel."""
     label: str = Field(default="", max_length=120)
-    """What people call it; needed where the channel is one of your own."""
+    """Name to display; necessary for a channel of your own."""
     repair: tuple[Literal["unwrap"], ...] = ()
-    """unwrap: make an angle continuous whose scale wraps around."""
+    """unwrap: make a wrapped angle continuous."""
     accept: tuple[str, ...] = ()
-    """Kinds of defects that are as they should be, such as `clipping` of a drive that was meant to
-    be at its limit. A reader is told of them."""
+    """Kinds of expected defects, such as `clipping` of a drive that was meant to be at its limit.
+    The report states them."""
 
 
 class RowCondition(Options):
@@ -118,50 +118,50 @@ class RowCondition(Options):
     column: str | int
     """Name or place of the column."""
     equals: float
-    """What it reads there."""
+    """The value."""
 
 
 class Trigger(Options):
-    """Where a column rises through a level."""
+    """Row in which a column rises through a level."""
 
     column: str | int
     """Name or place of the column."""
     level: float
-    """What it rises through, as the column reads."""
+    """The level, as the column reads."""
     duration: Time = Field(gt=0)
-    """How long a trial is from there."""
+    """Duration of a trial from there."""
 
 
 class RecordingEntry(Options):
-    """One `[[test.recording]]`: a file, or several of one clock, that hold a trial or some."""
+    """One `[[test.recording]]`: a file, or several of one clock, with one or more trials."""
 
     file: str | tuple[str, ...]
-    """Path relative to the mapping; `*` stands for anything there: one recording for each file. A
-    list is one recording that lies in several files."""
+    """Path relative to the mapping; `*` matches any text: one recording for each file. A list is
+    one recording in several files."""
     columns: str = ""
-    """Which `[columns.NAME]` it is read by; absent where there is one."""
+    """NAME of its `[columns.NAME]`; absent if there is one only."""
     table: str = ""
-    """The part of the file that holds it, where there are several."""
+    """Part of the file that holds it, if there are several."""
     start: Time | None = None
-    """Begin here, by the file's own time..."""
+    """First time, by the file's clock."""
     stop: Time | None = None
-    """... and end here."""
+    """Last time, by the file's clock."""
     where: RowCondition | None = None
     """Only the rows in which a column has a value; each stretch of them is a trial."""
     each: str | int | None = None
-    """A column that tells trials apart: a trial for each stretch in which it does not change."""
+    """Column that separates trials: one for each stretch in which it is constant."""
     restarts: bool = False
-    """A trial for each stretch of the file in which its time goes on."""
+    """A trial for each stretch of the file in which its time increases."""
     trigger: Trigger | None = None
-    """A trial begins wherever a column rises through a level."""
+    """A trial starts wherever a column rises through a level."""
     trial: int | None = Field(default=None, ge=1)
-    """Which of the trials that the test plans this is, from 1; absent: it was planned by nobody."""
+    """Number of the trial in the test's plan, from 1; absent: it was not planned."""
     conditions: dict[str, str | float | int | bool] = {}
-    """What was set for it, as in `speed = "0.1 rad/s"`."""
+    """Conditions of the trial, such as `speed = "0.1 rad/s"`."""
     windows: dict[str, tuple[Time, Time]] = {}
-    """Parts that an analysis is to use, from the trial's beginning; absent: they are looked for."""
+    """Parts for the analysis, from the trial's start; absent: the analysis selects them."""
     note: str = Field(default="", max_length=500)
-    """Anything worth keeping with it."""
+    """Notes on the recording."""
 
     @property
     def choosing(self) -> tuple[Keys, str | int] | None:

@@ -59,9 +59,9 @@ class AxisOptions(Options):
     """The stabilized axis."""
 
     name: str
-    """Which axis of the platform this is, e.g. azimuth."""
+    """Axis of the platform, e.g. azimuth."""
     kind: Literal["rotary", "linear"] = "rotary"
-    """How it moves. Of a linear axis every angle is a position, every torque a force."""
+    """Type of motion. On a linear axis every angle is a position, every torque a force."""
     inertia: Inertia | None = Field(default=None, gt=0)
     """J: inertia of motor, transmission and load, seen at the load."""
 
@@ -91,7 +91,7 @@ class IdealRateController(Options):
     """PI of the rate loop in ideal form: i = Kp (e + Ki * integral of e)."""
 
     form: Literal["ideal"]
-    """ideal: the integral gain multiplies inside the proportional one."""
+    """ideal: the proportional gain multiplies the integral gain."""
     proportional: RateGain = Field(gt=0)
     """Kpv: current per rate error."""
     integral: InverseTime = Field(ge=0)
@@ -107,7 +107,7 @@ class ParallelRateController(Options):
     """PI of the rate loop in parallel form: i = Kp e + Ki * integral of e."""
 
     form: Literal["parallel"]
-    """parallel: the integral gain stands alone."""
+    """parallel: both gains are independent."""
     proportional: RateGain = Field(gt=0)
     """Kpv: current per rate error."""
     integral: RateIntegralGain = Field(ge=0)
@@ -123,7 +123,7 @@ class IdealCurrentController(Options):
     """PI of the current loop in ideal form: V = Kp (e + Ki * integral of e)."""
 
     form: Literal["ideal"]
-    """ideal: the integral gain multiplies inside the proportional one."""
+    """ideal: the proportional gain multiplies the integral gain."""
     proportional: CurrentGain = Field(gt=0)
     """Kpc: voltage per current error."""
     integral: InverseTime = Field(ge=0)
@@ -139,7 +139,7 @@ class ParallelCurrentController(Options):
     """PI of the current loop in parallel form: V = Kp e + Ki * integral of e."""
 
     form: Literal["parallel"]
-    """parallel: the integral gain stands alone."""
+    """parallel: both gains are independent."""
     proportional: CurrentGain = Field(gt=0)
     """Kpc: voltage per current error."""
     integral: CurrentIntegralGain = Field(ge=0)
@@ -167,15 +167,15 @@ class ControllerOptions(Options):
     current: CurrentController | None = None
     """The current PI. It stays continuous when the rate loop is sampled."""
     sample_rate: Frequency | None = Field(default=None, gt=0, le=1e5)
-    """Rate at which the rate loop and the compensation run; absent: they are continuous."""
+    """Sample rate of the rate loop and the compensation; absent: they are continuous."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
-    """From a sample to the current command that answers it."""
+    """Delay from a sample to its current command."""
     relative_rate_filter: Time = Field(default=0.0, ge=0)
-    """Time constant of the first-order low-pass of the relative rate that compensation uses."""
+    """Time constant of the first-order low-pass of the relative rate for compensation."""
     rate_feedback: Literal["gyro", "encoder"] = "gyro"
-    """What the rate loop is fed by: the gyro, or the relative rate that is made of the encoder."""
+    """Feedback of the rate loop: the gyro, or the relative rate from the encoder."""
     pointing_high_pass: Frequency = Field(default=0.0, ge=0)
-    """Corner of the first-order high-pass that the pointing error is seen through; 0 for none."""
+    """Corner of the first-order high-pass of the pointing error; 0 for none."""
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -210,9 +210,9 @@ class AppendageOptions(Options):
     inertia: Inertia = Field(gt=0)
     """Its inertia, a part of the axis' inertia."""
     frequency: Frequency = Field(gt=0)
-    """Its natural frequency when the load is held still."""
+    """Its natural frequency with the load at rest."""
     damping_ratio: float = Field(ge=0, le=2)
-    """Its damping ratio when the load is held still."""
+    """Its damping ratio with the load at rest."""
 
 
 UNLIMITED = "unlimited"
@@ -220,19 +220,19 @@ UNLIMITED = "unlimited"
 
 
 class LimitsOptions(Options):
-    """What must never be exceeded: checked before anything moves.
+    """Limits of the axis, checked before any motion.
 
-    All but acceleration and duration are watched during a trial as well.
+    All but acceleration and duration are also monitored during a trial.
     """
 
     angle: Angle = Field(gt=0)
-    """Largest angle of the load relative to the hull, either way from zero; "unlimited" for an
-    endless axis."""
+    """Largest angle of the load relative to the hull, in both directions from zero; "unlimited" for
+    an endless axis."""
     rate: AngularRate = Field(gt=0)
     """Largest rate of the load relative to the hull."""
     rate_time: Time = Field(default=0.01, gt=0, le=1.0)
-    """Over how long the measured rate is averaged before it is held against its limit; never so
-    long that the axis could go further than 2 % of the angle limit."""
+    """Averaging time of the measured rate for its limit. It is shorter if the axis could travel
+    further than 2 % of the angle limit."""
     acceleration: AngularAcceleration = Field(gt=0)
     """Largest commanded acceleration, of the load or of the hull."""
     torque: Torque = Field(gt=0)
@@ -259,14 +259,14 @@ def _archived(info: ValidationInfo) -> bool:
 
 
 class Bench(Options):
-    """A platform under test: what is known of it. `complete` says what a simulation needs more."""
+    """A platform under test; values may be unknown. `complete` names what a simulation needs."""
 
     name: str
-    """Its name, in the archive and on the page."""
+    """Its name, in the archive and the report."""
     description: str = ""
-    """What it is and where its numbers come from."""
+    """Description, and source of its numbers."""
     known: KnownOptions = KnownOptions()
-    """What is known of it, and which published cells it was made from."""
+    """Uncertainties of its values, and the published cells that it is based on."""
     axis: AxisOptions
     """The stabilized axis."""
     appendage: AppendageOptions | None = None
@@ -278,7 +278,7 @@ class Bench(Options):
     friction: dict[str, FrictionField] = Field(default={}, max_length=8)
     """The true friction, by interface (`load`, `motor` ...); `friction = {}` where unknown."""
     variation: VariationOptions | None = None
-    """How the friction of a simulated bench scatters; absent: it is always the same."""
+    """Scatter of the friction of a simulated bench; absent: none."""
     controller: ControllerOptions | None = None
     """The loops."""
     sensors: SensorsOptions = SensorsOptions()
@@ -286,7 +286,7 @@ class Bench(Options):
     compensation: dict[str, CompensationField] = {}
     """Compensation methods tuned for this bench, by the name that a test uses."""
     limits: LimitsOptions | None = None
-    """The limits; without them nothing may be moved."""
+    """The limits; without them no motion is allowed."""
 
     @model_validator(mode="before")
     @classmethod

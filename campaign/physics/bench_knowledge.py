@@ -29,14 +29,14 @@ Number = float | str
 
 
 class KnownValue(Options):
-    """How well one value of the bench is known."""
+    """Uncertainty and origin of a bench value."""
 
     interval: tuple[Number, Number] | None = None
     """Ends of its 95 % interval, in the unit of the value."""
     standard_uncertainty: Number | None = None
     """Its standard deviation, in the unit of the value or in percent; instead of the interval."""
     origin: Literal["given", "measured", "fitted", "assumed"] = "given"
-    """Where it comes from: a document or data sheet, a measurement, a calibration, a guess."""
+    """Its source: a document or data sheet, a measurement, a calibration, an assumption."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
@@ -54,51 +54,51 @@ class KnownValue(Options):
 
 
 class FingerprintOptions(Options):
-    """Which bench it is that something is known of; `campaign fingerprint` writes it."""
+    """Identity of the bench that `known` describes; `campaign fingerprint` writes it."""
 
     bench: Annotated[str, spelled(r"[0-9a-f]{16}", "16 hexadecimal digits")]
-    """Of all that acts on motion but the compensations."""
+    """Fingerprint of all that affects motion except the compensations."""
     compensation: dict[str, str] = {}
-    """Of each compensation, by its name."""
+    """Fingerprint of each compensation, by name."""
 
 
 class IdentifiedOptions(Options):
-    """What `campaign identify` took the values from that it wrote."""
+    """Source of the values that `campaign identify` wrote."""
 
     run: str
-    """The run, and its test where one was named."""
+    """The run, and its test if one was named."""
     digest: str
-    """Which stands for all of that run."""
+    """Digest of the run."""
     program: str
-    """And its version."""
+    """Program and version."""
     command: str
-    """That was given."""
+    """The command."""
 
 
 class KnownOptions(Options):
-    """What is known of a bench, and which published cells it was made from.
+    """Uncertainties of a bench, and the published cells that it is based on.
 
     Cells are named by `table`, `table/row` or `table/row/column`; `*` stands for any name.
     """
 
     document: str = ""
-    """Whose cells are meant: "thesis", or a file of published values, relative to the bench."""
+    """Source of the cells: "thesis", or a file of published values, relative to the bench."""
     given: tuple[str, ...] = ()
-    """Published cells it was given: what a test finds of them is `recovered`."""
+    """Published cells that are inputs of the bench; results for them are `recovered`."""
     fitted: tuple[str, ...] = ()
-    """Published cells it was fitted to: those are `calibrated`."""
+    """Published cells that the bench was fitted to; they are `calibrated`."""
     seen: tuple[str, ...] = ()
-    """Published cells that were looked at while its structure was chosen: they are `selected`."""
+    """Published cells that were inspected to choose its structure; they are `selected`."""
     operating: tuple[str, ...] = ()
     """Paths of the bench that a test may change without altering the bench: preload, day."""
     values: dict[str, KnownValue] = {}
-    """How well values are known, by their path, e.g. "motor.torque_constant"."""
+    """Uncertainty of values, by their path, e.g. "motor.torque_constant"."""
     correlations: tuple[tuple[str, str, float], ...] = ()
-    """Pairs of paths in `values` whose errors go together, with their correlation coefficient."""
+    """Pairs of paths in `values` with correlated errors, and their correlation coefficient."""
     fingerprint: FingerprintOptions | None = None
-    """Which bench all of this is said of."""
+    """Identity of the bench that all of this describes."""
     identified: IdentifiedOptions | None = None
-    """Which recordings values were identified from."""
+    """Recordings that values were identified from."""
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -61,7 +61,7 @@ class CompleteController(ControllerOptions):
 
 
 class CompleteBench(Bench):
-    """A bench that can be simulated; `complete` makes it of one that has all of that."""
+    """A bench that can be simulated; `complete` makes it from a bench with all values."""
 
     axis: CompleteAxis
     motor: CompleteMotor

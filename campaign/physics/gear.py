@@ -29,7 +29,7 @@ class GearOptions(Options):
     """Travel of a linear load per revolution of a rotary motor, in place of the ratio; absent: the
     motor moves as the load does."""
     preload: PreloadOptions | None = None
-    """Its anti-backlash preload; absent: the friction parameters say it all."""
+    """Its anti-backlash preload; absent: the friction parameters include it."""
 
     @model_validator(mode="before")
     @classmethod

@@ -44,15 +44,15 @@ Shares = dict[
 
 
 class PreloadOptions(Options):
-    """The preload of the anti-backlash gear, told by the breakaway torque it leads to."""
+    """Preload of the anti-backlash gear, expressed as breakaway torque."""
 
     torque: Torque = Field(gt=0)
-    """Breakaway torque of the axis as the gear is preloaded now."""
+    """Breakaway torque of the axis with the present preload."""
     nominal: Torque = Field(gt=0)
-    """Breakaway torque that the friction parameters of this bench belong to."""
+    """Breakaway torque of the axis with the friction parameters of this bench."""
     shares: Shares = {"static_torque": 1.0}
-    """Share of the difference that a torque gains, seen at the load, by its path: `static_torque`
-    of all preloaded interfaces together, or `mesh.static_torque`."""
+    """Share of the difference that is added to a torque, seen at the load, by its path:
+    `static_torque` of all preloaded interfaces together, or `mesh.static_torque`."""
 
     @field_validator("shares", mode="before")
     @classmethod

@@ -34,13 +34,14 @@ TORQUES = "torques"
 
 
 class Scatter(Options):
-    """What a friction parameter is multiplied by: a distribution around 1.
+    """Factor of a friction parameter: a distribution around 1.
 
     `0.02` is short for `{ relative = 0.02 }`.
     """
 
     paths: tuple[str, ...] = ()
-    """What one common draw multiplies; its key is then any name. Absent: what its key says."""
+    """Parameters that one common draw multiplies; the key is then any name. Absent: that of the
+    key."""
     relative: float = Field(ge=0, le=0.3)
     """Relative standard deviation of a normal distribution."""
 
@@ -99,17 +100,17 @@ Scatters = dict[
 
 
 class VariationOptions(Options):
-    """How the friction of a simulated bench scatters: relative standard deviations by path."""
+    """Scatter of the friction of a simulated bench: relative standard deviations by path."""
 
     seed: int = Field(default=0, ge=0, lt=2**63)
-    """Of all draws."""
+    """Seed of all draws."""
     day: int = Field(default=0, ge=0, lt=2**31)
-    """Which day it is: each has its own friction; on day 0 it is exactly as described."""
+    """Number of the day: each has its own friction; on day 0 it is exactly as described."""
     day_to_day: Scatters = {}
-    """How a parameter scatters from day to day, by its path, `coulomb_torque` of every interface or
-    `load.coulomb_torque`: its relative standard deviation, or a table."""
+    """Scatter from day to day, by path, `coulomb_torque` of every interface or
+    `load.coulomb_torque`: a relative standard deviation, or a table."""
     trial_to_trial: Scatters = {}
-    """How a parameter scatters from trial to trial, in the same form."""
+    """Scatter from trial to trial, in the same form."""
 
     @field_validator("day_to_day", "trial_to_trial", mode="before")
     @classmethod

@@ -18,7 +18,7 @@ class RateSensor(Options):
     noise: AngularRate = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: AngularRate = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
+    """One count; 0 for no quantization."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
@@ -28,7 +28,7 @@ _PER_REVOLUTION = {"counts": 1.0, "lines": 4.0}
 
 
 class _Divided(Options):
-    """A sensor whose resolution may be given by how a revolution is divided."""
+    """A sensor whose resolution may be given as divisions of a revolution."""
 
     @model_validator(mode="before")
     @classmethod
@@ -52,8 +52,8 @@ class AngleSensor(_Divided):
     noise: Angle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: Angle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation. Instead, of a rotary encoder: `lines` or `counts` of a
-    revolution, such as `lines = 1024` of four counts each."""
+    """One count; 0 for no quantization. Instead, for a rotary encoder: `lines` or `counts` per
+    revolution, such as `lines = 1024` with four counts each."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
@@ -64,7 +64,7 @@ class MotorAngleSensor(_Divided):
     noise: MotorAngle = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: MotorAngle = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation. Instead: `lines` or `counts` of a motor revolution."""
+    """One count; 0 for no quantization. Instead: `lines` or `counts` per motor revolution."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
@@ -75,13 +75,13 @@ class CurrentSensor(Options):
     noise: Current = Field(default=0.0, ge=0)
     """Standard deviation of white noise per sample."""
     resolution: Current = Field(default=0.0, ge=0)
-    """One count; 0 for no quantisation."""
+    """One count; 0 for no quantization."""
     delay: Time = Field(default=0.0, ge=0, le=1.0)
     """Age of a reading, rounded to whole controller samples."""
 
 
 class SensorsOptions(Options):
-    """What the controller sees. A continuous controller sees everything exactly."""
+    """Sensors of the controller. A continuous controller has ideal sensors."""
 
     gyro: RateSensor = RateSensor()
     """Inertial rate of the load."""

@@ -23,19 +23,19 @@ class CalibrationParameter(Options):
         Field(max_length=60),
         spelled(r"[A-Za-z][A-Za-z0-9_-]*", "a letter, then letters, digits, - and _"),
     ]
-    """What the result calls it."""
+    """Name in the result."""
     path: str = ""
-    """The field of the bench that it is, e.g. axis.inertia."""
+    """Field of the bench, e.g. axis.inertia."""
     paths: tuple[str, ...] = ()
-    """Instead of `path`: several fields that it drives together."""
+    """Instead of `path`: several fields that it sets together."""
     factors: tuple[float, ...] = ()
-    """What each of `paths` is multiplied by; 1 when absent."""
+    """Factor of each of `paths`; 1 when absent."""
     lower: Number
     """Smallest value, with its unit."""
     upper: Number
     """Largest value, with its unit."""
     scale: Literal["log", "linear"] = "linear"
-    """Whether steps and random starts are even in its logarithm, or in itself."""
+    """Scale with even steps and random starts: the logarithm of the value, or the value."""
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -54,26 +54,27 @@ class CalibrationParameter(Options):
 
 
 class CalibrationOptions(Options):
-    """`[calibration]`: what of the bench is fitted to which published cells, and how."""
+    """`[calibration]`: parameters of a bench, and the published cells to fit them to."""
 
     bench: str
-    """The bench that is fitted; every test of the protocol uses it."""
+    """The bench to fit; every test of the protocol uses it."""
     cells: tuple[str, ...] = Field(min_length=1)
-    """What it is fitted to: `table`, `table/row` or `table/row/column`; * for any row."""
+    """Cells to fit to: `table`, `table/row` or `table/row/column`; * for any row."""
     without: tuple[str, ...] = ()
-    """Which of these are left out, in the same form."""
+    """Cells to omit, in the same form."""
     parameter: tuple[CalibrationParameter, ...] = Field(min_length=1)
     """The unknowns."""
     weights: dict[str, Number] = {}
-    """Standard deviation of the cells: "6 %", or in their unit, "0.3 Hz"; the closest name wins."""
+    """Standard deviation of the cells: "6 %", or in their unit, "0.3 Hz"; the most specific name
+    applies."""
     starts: int = Field(default=4, ge=1, le=1000)
-    """Fits from different places: the first from the bench as it is, the others at random."""
+    """Number of fits: the first starts from the bench as it is, the others at random."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Of the random starts, and of tests without a seed of their own."""
+    """Seed of the random starts, and of tests without their own seed."""
     max_evaluations: int = Field(default=60, ge=1, le=100_000)
-    """Steps of each fit at most; those that only take derivatives are not counted."""
+    """Most steps of each fit; steps for derivatives only are not counted."""
     loss: Literal["linear", "soft_l1", "huber", "cauchy", "arctan"] = "soft_l1"
-    """How a deviation counts: linear is plain least squares, the others curb outliers."""
+    """Weight of deviations: linear is least squares, the others reduce the effect of outliers."""
     tolerance: float = Field(default=1e-4, gt=0, lt=1)
     """Relative change of cost or parameters below which a fit has converged."""
     difference_step: float = Field(default=0.005, gt=0, le=0.1)
@@ -81,9 +82,9 @@ class CalibrationOptions(Options):
     longest_step: Time = Field(default=0.25e-3, gt=0, le=0.01)
     """Longest integration step of the simulation."""
     leave_out: str = "frequency"
-    """The condition whose values are left out one by one, to see how well the others predict."""
+    """Condition whose values are omitted one by one, to validate predictions from the others."""
     leave_out_evaluations: int = Field(default=5, ge=1, le=100_000)
-    """Steps of each of these refits at most; they begin at the optimum."""
+    """Most steps of each of these refits; they start at the optimum."""
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,11 @@ class RangeEntry(Options):
     stop: str | float
     """Last value, in the same unit."""
     num: int | None = Field(default=None, ge=1, le=LARGEST_AXIS)
-    """How many values, both ends included."""
+    """Number of values, both ends included."""
     spacing: Literal["linear", "log"] = "linear"
     """Equal steps, or equal ratios."""
     step: str | float | None = None
-    """Distance of the values, in the same unit; the last one does not pass `stop`."""
+    """Distance of the values, in the same unit; the last one does not exceed `stop`."""
 
 
 @dataclass(frozen=True)

@@ -68,21 +68,21 @@ class ExperimentKind:
 
 
 class OperatorEntry(Options):
-    """One `[[test.operator]]`: what a person must do to the bench."""
+    """One `[[test.operator]]`: an action of the operator at the bench."""
 
     text: str = Field(min_length=1, max_length=500)
-    """What to do; {a.dotted.path} stands for the value there."""
+    """The action; {a.dotted.path} stands for the value there."""
     sets: tuple[str, ...] = ()
-    """The swept paths that this sets, instead of the controller."""
+    """Swept paths that the operator sets, instead of the controller."""
 
 
 class CheckEntry(Options):
-    """`[check]`: one trial again and again."""
+    """`[check]`: one trial, repeated during the run."""
 
     test: str
     """The test whose first measurement is repeated."""
     every: int = Field(ge=1)
-    """After how many measurements of the whole plan."""
+    """Number of the plan's measurements between checks."""
 
 
 class TestEntry(Options):
@@ -92,35 +92,35 @@ class TestEntry(Options):
     model_config = ConfigDict(extra="ignore")
 
     name: Slug
-    """What the test is called; lower-case letters, digits, - and _; unique over all includes."""
+    """Name of the test: lower-case letters, digits, - and _; unique over all includes."""
     kind: str
     """The experiment, one of `campaign kinds`."""
     bench: str
     """Path of a bench, relative to this file, or the bare name of a shipped one."""
     truth: str = ""
-    """A bench that `sim` simulates in place of `bench`, which plan and analysis are not told of."""
+    """A bench that `sim` simulates in place of `bench`, hidden from plan and analysis."""
     title: str = ""
     """Heading of the test in the report."""
     description: str = ""
-    """What the test is for, in a sentence or two."""
+    """Purpose of the test, in a sentence or two."""
     group: str = ""
-    """Heading of a group of tests in the report's contents; that of the test before when absent."""
+    """Heading of a group of tests in the report's contents; absent: that of the test before."""
     leading_figure: str = ""
-    """Key of the figure of this test that stands on top of the report; chosen when absent."""
+    """Key of this test's figure at the top of the report; absent: it is selected."""
     reproduces: tuple[str, ...] = ()
-    """Published tables, figures and claims it speaks to: "5.2", "figure 5.4", "text 5.2.2.2"."""
+    """Published tables, figures and claims to compare with: "5.2", "figure 5.4", "text 5.2.2.2"."""
     matrix: dict[str, Any] = {}
-    """What is swept: dotted path to a list or a range."""
+    """The sweep: dotted path to a list or a range."""
     repeat: int = Field(default=1, ge=1)
-    """How often the whole matrix is executed."""
+    """Number of executions of the whole matrix."""
     order: Literal["as written", "shuffled"] = "as written"
     """Order of the measurements within each repetition."""
     seed: int | None = Field(default=None, ge=0, lt=2**63)
-    """Of everything random in the test; drawn and recorded when absent."""
+    """Seed of everything random in the test; absent: it is drawn and recorded."""
     operator: tuple[OperatorEntry, ...] = ()
-    """What a person must have done to the bench, each under `[[test.operator]]`."""
+    """Actions of the operator, each under `[[test.operator]]`."""
     recording: tuple[dict[str, Any], ...] = ()
-    """Files that were recorded elsewhere, in place of trials: `campaign import`."""
+    """Existing recordings, in place of trials: `campaign import`."""
 
 
 class ProtocolFile(Options):
@@ -129,29 +129,29 @@ class ProtocolFile(Options):
     title: str = ""
     """Heading of the report."""
     description: str = ""
-    """What the protocol is for."""
+    """Purpose of the protocol."""
     operator: str = ""
-    """Who is responsible for the run."""
+    """Person responsible for the run."""
     notes: str = ""
-    """Anything worth keeping with the run."""
+    """Notes on the run."""
     tags: tuple[str, ...] = ()
-    """Words to find the run by."""
+    """Keywords of the run."""
     include: tuple[str, ...] = ()
     """Paths of protocols, relative to this file, whose tests come before this file's."""
     published: str = "thesis"
     """Published values to compare with: a path relative to this file, "none" or "thesis"."""
     calibration: CalibrationOptions | None = None
-    """What `campaign calibrate` fits; `campaign run` does not look at it."""
+    """Settings of `campaign calibrate`; `campaign run` ignores them."""
     faults: dict[Occasion, Response] = {}
-    """What to do about a trial that did not run to its end: occasion to response."""
+    """Responses to incomplete trials, by occasion."""
     rest: Rest | None = None
     """Pauses in which the bench cools down."""
     keep: Keep = "all"
     """Trials whose samples are archived: "all", "none", "failed", "extremes" or N of each test."""
     check: CheckEntry | None = None
-    """A trial that is repeated to see that the bench is still the same."""
+    """A trial that is repeated to check that the bench has not changed."""
     columns: dict[str, dict[str, Any]] = {}
-    """What the columns of files from elsewhere are, by a name of your own: `campaign import`."""
+    """Columns of recordings, by a name of your own: `campaign import`."""
     test: tuple[dict[str, Any], ...] = ()
     """The tests, each under `[[test]]`."""
 

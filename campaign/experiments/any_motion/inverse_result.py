@@ -79,19 +79,18 @@ class InverseDynamicsOptions(Options):
     """Options of inverse dynamics."""
 
     low_pass: Frequency | None = Field(default=None, gt=0)
-    """Corner of the zero-phase low-pass of the motion; absent: 100 Hz, or a fifth of the sample
-    rate where that is less."""
+    """Corner frequency of the motion's zero-phase low-pass; absent: 100 Hz, or a fifth of the
+    sample rate if less."""
     decimation: int | None = Field(default=None, ge=1, le=1000)
-    """Of how many samples one is kept, behind a low-pass; absent: to about 100 Hz."""
+    """Decimation factor, behind a low-pass; absent: to about 100 Hz."""
     skip: Time = Field(default=0.0, ge=0)
-    """Left out at the beginning of each motion."""
+    """Time to omit at the start of each motion."""
     slowest: AngularRate | None = Field(default=None, ge=0)
-    """Rate below which the axis counts as standing still, and rows are left out; absent: 2 % of
-    its fastest."""
+    """Rows below this rate are standstill, and are omitted; absent: 2 % of the largest rate."""
     delay: Time | None = None
-    """By how much the force acts later than recorded; absent: it is found."""
+    """Delay of the acting force after the recorded one; absent: it is estimated."""
     terms: tuple[Annotated[str, AfterValidator(_known)], ...] = ()
-    """Names of the model's terms; absent: they are chosen."""
+    """Names of the model's terms; absent: they are selected."""
 
 
 def identify(data: TestData, options: InverseDynamicsOptions) -> Result:

@@ -93,28 +93,28 @@ class BreakawayOptions(Options):
     """Options of a breakaway test."""
 
     positions: tuple[Angle, ...] = Field(default_factory=default_positions, min_length=1)
-    """Angles of the load relative to the hull at which the ramp is run."""
+    """Angles of the load relative to the hull for the ramps."""
     directions: tuple[Literal["positive", "negative"], ...] = Field(
         default=("positive", "negative"), min_length=1, max_length=2
     )
     """Directions of the ramps, one after the other; friction may differ by direction."""
     torque_rate: TorqueRate = Field(default=1.0, gt=0)
-    """Slope of the ramp, at the load. Swept, it shows what the ramp's rate does to the results."""
+    """Slope of the ramp, at the load. Sweep it to see its effect on the results."""
     peak_torque: Torque = Field(default=60.0, gt=0)
-    """Where the ramp ends if the load has not moved; above the breakaway torque expected."""
+    """End of the ramp if the load does not move; above the expected breakaway torque."""
     rest: Time = Field(default=0.5, ge=0)
-    """Standstill before the ramp: it says what the gyro's bias is."""
+    """Standstill before the ramp, to estimate the gyro's bias."""
     sliding_rate: AngularRate = Field(default=0.005, gt=0)
-    """Rate at which the load counts as sliding; the trial ends when it is four times this fast, and
-    two counts of a gyro at least."""
+    """Rate at which the load counts as sliding. The trial ends at four times this rate, at least
+    two counts of the gyro."""
     fit_share: float = Field(default=0.8, gt=0.1, lt=1.0)
     """The presliding curve is fitted up to this share of the breakaway torque."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
     """Assumed damping ratio of presliding, from which sigma1 follows (Eq. 4.12)."""
     inertia: Inertia | None = Field(default=None, gt=0)
-    """J that Eq. 4.12 takes; absent: that of the bench."""
+    """J in Eq. 4.12; absent: that of the bench."""
     viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
-    """sigma2 that Eq. 4.12 takes off; absent: that of the bench's load side."""
+    """sigma2 to subtract in Eq. 4.12; absent: that of the bench's load side."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
 

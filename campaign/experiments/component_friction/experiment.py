@@ -59,24 +59,24 @@ class ComponentFrictionOptions(Options):
     """Options of a component friction test."""
 
     components: tuple[str, ...] = ()
-    """Interfaces of the bench's friction that are measured one by one; without any, all of them."""
+    """Friction interfaces of the bench to measure one by one; none: all of them."""
     direction: Literal["alternating", "positive", "negative"] = "alternating"
-    """Which way the component moves; friction may differ by direction."""
+    """Direction of the component's motion; friction may differ by direction."""
     scatter: float | None = Field(default=None, ge=0, le=0.3)
-    """Relative standard deviation of friction between measurements on a simulated bench. A part
-    scatters more in the hand than in its place. Absent: as the bench says."""
+    """Relative standard deviation of friction between measurements on a simulated bench. A removed
+    part scatters more than an installed one. Absent: that of the bench."""
     measurements: int = Field(default=10, ge=1, le=1000)
-    """How often each is measured."""
+    """Number of measurements of each component."""
     sensor_resolution: Torque = Field(default=0.01, ge=0)
-    """One count of the torque sensor, at the shaft it sits on; 0 for a perfect one."""
+    """One count of the torque sensor, at its shaft; 0 for an ideal sensor."""
     torque_rate: TorqueRate = Field(default=1.0, gt=0)
     """Slope of the ramp, at the load."""
     peak_torque: Torque | None = Field(default=None, gt=0)
-    """Where the ramp ends if nothing moves; absent: twice the friction that the bench describes."""
+    """End of the ramp if nothing moves; absent: twice the friction of the bench."""
     rest: Time = Field(default=0.2, ge=0)
     """Standstill before the ramp."""
     sliding_rate: AngularRate = Field(default=0.005, gt=0)
-    """Rate from which on the component slides; the trial ends at four times this rate."""
+    """Rate at which the component slides; the trial ends at four times this rate."""
     sample_rate: Frequency = Field(default=250.0, gt=0, le=100_000)
     """Rate of the recording."""
 

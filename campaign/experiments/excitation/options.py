@@ -35,7 +35,7 @@ class SignalTable(SeriesFile):
     """A command over time, from a CSV file with a header line."""
 
     value: str
-    """Unit of the value column: of a torque, a rate or an angle, whose rate is then commanded."""
+    """Unit of the value column: of a torque, a rate or an angle; an angle's rate is commanded."""
 
     @property
     def quantity(self) -> Quantity:
@@ -58,46 +58,46 @@ class ExcitationOptions(Options):
     """Options of an excitation."""
 
     signal: Kind = "multisine"
-    """multisine: odd, with random phases, for a frequency response; fourier: a series of an angle,
-    searched for inverse dynamics; chirp; noise; file: a table of your own."""
+    """multisine: odd, with random phases, for a frequency response; fourier: an optimized series of
+    an angle, for inverse dynamics; chirp; noise; file: a table of your own."""
     command: Literal["rate", "torque"] = "rate"
-    """rate: the rate loop is closed and follows it; torque: the loop is open."""
+    """rate: the closed rate loop follows it; torque: the loop is open."""
     amplitude: AngularRate = Field(default=float(np.deg2rad(10.0)), gt=0)
-    """Rate: largest value of a multisine, a chirp or noise."""
+    """Largest commanded rate of a multisine, a chirp or noise."""
     torque: Torque = Field(default=60.0, gt=0)
-    """Torque: largest value of a multisine, a chirp or noise."""
+    """Largest commanded torque of a multisine, a chirp or noise."""
     lowest: Frequency = Field(default=0.5, gt=0)
     """Lowest frequency of a multisine, a chirp or noise."""
     highest: Frequency = Field(default=30.0, gt=0)
     """Highest frequency of a multisine, a chirp or noise."""
     period: Time = Field(default=8.0, gt=0)
-    """Multisine: its lines are odd multiples of 1/period. Fourier: of the series."""
+    """Period of a Fourier series, or of a multisine: its lines are odd multiples of 1/period."""
     periods: int = Field(default=2, ge=1, le=10_000)
-    """Periods of a multisine or a series that are measured; two tell noise from distortion."""
+    """Measured periods of a multisine or a series; two separate noise from distortion."""
     realisations: int = Field(default=7, ge=1, le=1000)
-    """Trials of a multisine or noise, each with phases of its own; seven show how they scatter."""
+    """Trials of a multisine or noise, each with its own phases; seven show their scatter."""
     group: int = Field(default=3, ge=2, le=100)
-    """Of so many odd lines of a multisine one, drawn at random, is left out, to show distortion."""
+    """One random line of this many odd lines of a multisine is omitted, to show distortion."""
     phases: Literal["lowered", "random"] = "lowered"
-    """Multisine: lowered: random ones are changed until the crest factor is about 1.6; random: the
-    best of a few draws, about 2.6, as theory has them and noise is distributed."""
+    """Phases of a multisine. lowered: optimized to a crest factor of about 1.6; random: the best of
+    a few draws, about 2.6, as in theory, with the distribution of noise."""
     draws: int = Field(default=20, ge=1, le=10_000)
-    """Sets of random phases, of which the one with the lowest crest factor counts."""
+    """Number of sets of random phases; the lowest crest factor decides."""
     settle: Time = Field(default=1.0, ge=0)
-    """Of a multisine, before what is measured, for the transient to pass."""
+    """Unmeasured start of a multisine, for the transient to decay."""
     duration: Time = Field(default=60.0, gt=0)
-    """Of a chirp, to whole cycles, or of noise."""
+    """Duration of a chirp (in whole cycles) or of noise."""
     sweep: Law = "logarithmic"
-    """How the frequency of a chirp grows: by the same factor each second, or linear."""
+    """Growth of a chirp's frequency: by the same factor each second, or linear."""
     harmonics: int = Field(default=5, ge=2, le=50)
-    """of a Fourier series."""
+    """Harmonics of a Fourier series."""
     terms: tuple[str, ...] = Field(
         default=("inertia", "viscous", "coulomb_positive", "coulomb_negative"), min_length=1
     )
-    """Terms of the inverse dynamic model that a Fourier series is to tell apart; `offset` only with
-    one `coulomb`, and `gravity_sine`, `gravity_cosine` for an axis out of balance."""
+    """Terms of the inverse dynamic model that a Fourier series has to separate; `offset` only with
+    one `coulomb`, and `gravity_sine`, `gravity_cosine` for an unbalanced axis."""
     search: int = Field(default=200, ge=0, le=10_000)
-    """Generations of the search for the lowest condition number, of 40 series each."""
+    """Generations of the search for the lowest condition number, with 40 series each."""
     max_angle: Angle | None = Field(default=None, gt=0)
     """Largest angle of a Fourier series, from zero; absent: nine tenths of the bench's limit."""
     max_rate: AngularRate | None = Field(default=None, gt=0)
@@ -108,13 +108,13 @@ class ExcitationOptions(Options):
     """Largest torque of a Fourier series with its friction; absent: nine tenths of what the bench's
     limits of torque and current allow."""
     table: SignalTable | None = None
-    """The file of a command of your own, and its units."""
+    """File of your own command, and its units."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Of phases, noise, lines left out, and the search: with the same one they are the same."""
+    """Seed of phases, noise, omitted lines and search; the same seed repeats them."""
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
     compensation: str = "none"
-    """Compensation method, by its name on the bench; none for none."""
+    """Name of a compensation of the bench, or none."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording; at least 8 times the highest frequency."""
 

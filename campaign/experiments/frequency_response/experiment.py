@@ -89,36 +89,36 @@ class FrequencyResponseOptions(Options):
     loop: Literal["closed", "open"] = "closed"
     """closed: from rate command to gyro rate; open: from drive torque to gyro rate."""
     compensation: str = "none"
-    """Compensation method, by its name on the bench; none for none."""
+    """Name of a compensation of the bench, or none."""
     lowest: Frequency = Field(default=0.5, gt=0)
     """First frequency of the sweep."""
     highest: Frequency = Field(default=100.0, gt=0)
     """Last frequency of the sweep."""
     step: Frequency = Field(default=0.5, gt=0)
-    """Between the frequencies of the sweep."""
+    """Step of the frequencies of the sweep."""
     frequencies: tuple[Frequency, ...] = ()
-    """Frequencies of your own instead of lowest, highest and step."""
+    """Your own frequencies instead of lowest, highest and step."""
     amplitude: AngularRate = Field(default=float(np.deg2rad(30.0)), gt=0)
     """Closed loop: amplitude of the rate command. Friction makes the response depend on it."""
     max_acceleration: AngularAcceleration | None = Field(default=None, gt=0)
-    """Closed loop: the amplitude falls with frequency so that the command does not exceed this;
-    absent: nine tenths of what the bench's limits of acceleration, torque and current allow."""
+    """Closed loop: largest commanded acceleration; the amplitude decreases with frequency for it.
+    Absent: nine tenths of what the bench's limits of acceleration, torque and current allow."""
     torque: Torque = Field(default=60.0, gt=0)
-    """Open loop: amplitude of the torque at the load; above the breakaway torque. Friction that
-    differs by direction lets the load creep towards the easier one while it swings."""
+    """Open loop: amplitude of the torque at the load, above breakaway. If friction differs by
+    direction, the load drifts in the direction of lower friction."""
     cycles: int = Field(default=16, ge=1, le=10_000)
-    """Whole cycles that are measured at each frequency."""
+    """Whole cycles to measure at each frequency."""
     settle_cycles: int = Field(default=3, ge=0, le=1_000)
-    """Whole cycles before them, at least, for the transient to pass ..."""
+    """Fewest whole cycles before them, for the transient to decay."""
     settle_time: Time = Field(default=0.3, ge=0)
-    """... and as many more as last this long."""
+    """Shortest time of these cycles."""
     samples_per_cycle: int = Field(default=20, ge=8, le=10_000)
-    """of the recording, as far as a sampled controller has them."""
+    """Samples per cycle of the recording, at most those of a sampled controller."""
     position: Angle = 0.0
     """Angle of the load relative to the hull around which it swings."""
     refine: bool = False
-    """Closed loop: after the sweep, measure more frequencies around the crossings of -3 dB and
-    0 dB, and around a phase crossover within the sweep."""
+    """Closed loop: measure more frequencies after the sweep, around the crossings of -3 dB and 0
+    dB, and around a phase crossover within the sweep."""
 
     def without_effect(self) -> frozenset[str]:
         swept = {"lowest", "highest", "step"} if self.frequencies else set()

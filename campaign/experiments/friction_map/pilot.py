@@ -54,8 +54,8 @@ class PilotedMapOptions(VelocityMapOptions):
     """Options of a friction-velocity map, which may have a pilot."""
 
     pilot: bool = False
-    """Run 10 of the `points` first. Their friction decides which speeds between slowest and
-    fastest follow, and whether these settle and measure longer. `repeat` repeats the 10 only."""
+    """Run 10 of the `points` first. Their friction decides which speeds between slowest and fastest
+    follow, and whether these settle and measure longer. `repeat` repeats the 10 only."""
 
 
 def pilot_speeds(options: VelocityMapOptions) -> tuple[float, ...]:

@@ -52,28 +52,28 @@ class VelocityMapOptions(Options):
     """Options of a friction-velocity map."""
 
     slowest: AngularRate = Field(default=float(np.deg2rad(0.05)), gt=0)
-    """Lowest speed of the map..."""
+    """Lowest speed of the map."""
     fastest: AngularRate = Field(default=float(np.deg2rad(65.0)), gt=0)
-    """...and its highest..."""
+    """Highest speed of the map."""
     points: int = Field(default=80, ge=1, le=10_000)
-    """...and how many from one to the other, evenly in their logarithm: dense at low speed."""
+    """Number of speeds from slowest to fastest, even in the logarithm: dense at low speed."""
     speeds: tuple[AngularRate, ...] = ()
-    """Speeds of your own instead of slowest, fastest and points. Each is run in both directions."""
+    """Your own speeds instead of slowest, fastest and points. Each is run in both directions."""
     max_travel: Angle = Field(default=float(np.deg2rad(60.0)), gt=0)
-    """Longest way of one run, ramps included."""
+    """Longest travel of one run, ramps included."""
     max_time: Time = Field(default=20.0, gt=0)
     """Longest motion of one run; the shorter of this and max_travel counts."""
     window_time: Time = Field(default=2.0, gt=0)
-    """Shortest settled window that is averaged..."""
+    """Shortest settled window to average."""
     window_angle: Angle = Field(default=float(np.deg2rad(5.0)), gt=0)
-    """...or the time to travel this, whichever takes longer; as far as the run has room."""
+    """Shortest travel of that window. The longer of both counts, as far as the run has room."""
     settle_time: Time = Field(default=0.3, ge=0)
-    """After the ramp, before the window: for the loop to settle..."""
+    """Time from ramp to window, for the loop to settle."""
     settle_angle: Angle = Field(default=float(np.deg2rad(0.75)), ge=0)
-    """...or the time to travel this, whichever takes longer: friction's own memory is an angle.
+    """Travel from ramp to window; the longer of both counts. The memory of friction is an angle:
     7.5 times Ts / sigma0 leaves a thousandth of it, also after a reversal."""
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(300.0)), gt=0)
-    """Of the ramps."""
+    """Acceleration of the ramps."""
     rest: Time = Field(default=0.5, ge=0)
     """Standstill before each run."""
     warm_up_speed: AngularRate = Field(default=float(np.deg2rad(20.0)), gt=0)
@@ -81,16 +81,16 @@ class VelocityMapOptions(Options):
     warm_up_cycles: int = Field(default=3, ge=0, le=1000)
     """Moves out and back before the first point; 0 for no warm-up."""
     compensation: str = "none"
-    """Compensation while the map is measured; a map is normally taken without."""
+    """Compensation while the map is measured; normally none."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
     start_angles: tuple[Angle, ...] = ()
-    """Where runs begin: each speed is run from each, and its torques are averaged. Several, half a
-    period of friction's ripple apart, average it out. None: one, half of max_travel below zero."""
+    """Start angles of the runs: each speed is run from each, and its torques are averaged. Angles
+    half a period of friction's ripple apart cancel it. None: one, half of max_travel below zero."""
 
     spread_starts: bool = False
-    """Whether each run begins at another angle, by the golden ratio. A ripple of friction over
-    position then scatters between the points, and bends no curve."""
+    """Whether each run starts at another angle, by the golden ratio. A ripple of friction over
+    position then scatters the points, and does not bend the curve."""
 
     @model_serializer(mode="wrap")
     def _as_ever(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -38,13 +38,13 @@ LOADS_ALIKE = 1.05
 
 
 class StretchOptions(Options):
-    """How steady stretches are found."""
+    """Options of the search for steady stretches."""
 
     shortest: Time = Field(default=SHORTEST_TIME, gt=0)
-    """Shortest steady stretch that is read, where a trial names no windows."""
+    """Shortest steady stretch to use, if a trial has no windows."""
     slowest: AngularRate | None = Field(default=None, ge=0)
-    """Rate up to which the axis counts as standing still; absent: 3 % of the fastest of its trial.
-    A sweep over decades of speed in one trial needs less."""
+    """Largest rate that counts as standstill; absent: 3 % of the largest of the trial. A sweep over
+    decades of speed in one trial needs less."""
 
 
 def force_of(data: TrialData) -> str:

@@ -75,13 +75,13 @@ class ModelOutputOptions(Options):
     frequency: Frequency = Field(default=0.24, gt=0)
     """Frequency of the prescribed rate."""
     models: tuple[str, ...] = ("stribeck", "lugre")
-    """Friction models to describe the bench's friction by, beside each other; none: its own."""
+    """Friction models to describe the bench's friction, side by side; none: its own."""
     compensation: tuple[str, ...] = ()
-    """Compensations of the bench with a friction model inside, shown beside the friction."""
+    """Compensations of the bench with a friction model, shown beside the friction."""
     vary: tuple[str, ...] = ()
     """Parameters of the bench's friction to vary, one at a time."""
     factors: tuple[float, ...] = Field(default=(0.5, 1.5), max_length=100)
-    """What each varied parameter is multiplied by."""
+    """Factors of each varied parameter."""
     sample_rate: Frequency = Field(default=2000.0, gt=0, le=100_000)
     """Rate of the recording."""
 

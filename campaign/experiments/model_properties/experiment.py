@@ -45,10 +45,10 @@ class ModelPropertiesOptions(Options):
     """Options of a test of model properties."""
 
     models: tuple[str, ...] = Field(min_length=1, max_length=100)
-    """Friction models."""
+    """Friction models to classify."""
     sets: dict[str, dict[str, JsonValue]] = Field(min_length=1, max_length=10)
-    """Parameter sets by name, as in `[friction.NAME]`; a model takes the parameters that it has.
-    `model` of a set is the one whose Ts, Tc, vs and σ0 scale the experiments."""
+    """Parameter sets by name, as in `[friction.NAME]`; a model takes its own parameters. `model` of
+    a set is the one whose Ts, Tc, vs and σ0 scale the experiments."""
 
 
 def _trials(options: ModelPropertiesOptions, bench: Bench) -> Iterator[TrialRequest]:

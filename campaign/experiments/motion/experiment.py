@@ -54,7 +54,7 @@ class MotionOptions(StretchOptions):
     """Options of a recorded motion."""
 
     radius: Length | None = Field(default=None, gt=0)
-    """At which a normal load rubs on a rotary axis: for friction over normal load."""
+    """Radius of a normal load on a rotary axis, for friction over normal load."""
 
 
 def _found(

@@ -73,20 +73,20 @@ class ObserverGainOptions(SineMotionOptions):
     """Options of a study of the observer's gain."""
 
     observer: str = "observer"
-    """The disturbance observer, by its name on the bench."""
+    """Name of the disturbance observer on the bench."""
     corners: tuple[Frequency, ...] = Field(default=CORNERS, min_length=1, max_length=1000)
     """Corner frequencies N K0 / (2 pi J') to try; the bench's own is always among them."""
     noise_time: Time = Field(default=20.0, ge=0)
-    """Time over which the noise is measured; 0 for not at all."""
+    """Time to measure the noise; 0: noise is not measured."""
     disturbance: Torque = Field(default=5.0, gt=0)
     """Amplitude of the disturbance torque on the load."""
     disturbance_frequencies: tuple[Frequency, ...] = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-    """Of the disturbance torque; none: rejection is not measured."""
+    """Frequencies of the disturbance; none: rejection is not measured."""
     disturbance_cycles: int = Field(default=8, ge=1, le=10_000)
-    """Whole cycles of it that are measured."""
+    """Whole cycles of it to measure."""
     without_friction: bool = True
-    """Measure noise and rejection on the bench without its friction, as the equations are: in
-    simulation only. Else as it is: a stuck load neither follows nor shakes as they say."""
+    """Measure noise and rejection on the bench without its friction, as the equations assume: in
+    simulation only. With friction, a stuck load does not obey the equations."""
 
     def without_effect(self) -> frozenset[str]:
         rejection = {"disturbance", "disturbance_cycles"}

@@ -31,11 +31,11 @@ class PreslidingMultisineOptions(Options):
     periods: int = Field(default=10, ge=2, le=10_000)
     """Periods of the torque in a trial."""
     realisations: int = Field(default=1, ge=1, le=100)
-    """Trials of each amplitude, each with phases of its own."""
+    """Trials of each amplitude, each with its own phases."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Which phases; with the same seed they are the same."""
+    """Seed of the phases; the same seed repeats them."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
-    """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
+    """Assumed damping ratio, to compare with the measured damping (Eq. 4.12)."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording; at least 8 times the highest line."""
 
@@ -44,9 +44,9 @@ class PreslidingOptions(Options):
     """Options of the model `presliding`."""
 
     viscous_friction: RotationalDamping | None = Field(default=None, ge=0)
-    """sigma2 at the load, to be taken off the damping of small motions; absent: the bench's."""
+    """sigma2 at the load, to subtract from the damping of small motions; absent: the bench's."""
     damping_ratio: float = Field(default=0.8, gt=0, le=2.0)
-    """Assumed damping ratio that the measured damping is held against (Eq. 4.12)."""
+    """Assumed damping ratio, to compare with the measured damping (Eq. 4.12)."""
 
 
 MOTION = (GYRO_RATE, RELATIVE_RATE, RELATIVE_ANGLE)

@@ -53,21 +53,21 @@ class SensitivityOptions(SineMotionOptions):
     """Options of a sensitivity study."""
 
     compensation: str = "lugre"
-    """The model-based compensation that is varied, by its name on the bench."""
+    """Name of the bench's model-based compensation to vary."""
     parameters: tuple[str, ...] = Field(default=tuple(SYMBOLS), min_length=1)
-    """Parameters of its friction model, varied one at a time."""
+    """Parameters of its friction model to vary, one at a time."""
     changes: tuple[float, ...] = Field(default=CHANGES, min_length=1, max_length=1000)
     """Relative changes of each; -0.2 is 20 % less."""
     repeats: int = Field(default=3, ge=1, le=1000)
-    """Trials at each value, whose errors are averaged."""
+    """Trials at each value; their errors are averaged."""
     threshold: Angle = Field(default=0.2e-3, gt=0)
-    """Error whose passing counts as too much."""
+    """Largest admissible error."""
     threshold_ratio: float | None = Field(default=None, gt=1)
-    """Instead: how many times the error with the unchanged model counts as too much."""
+    """Instead: largest admissible ratio to the error with the unchanged model."""
     model_output: bool = True
     """Also run the model alone at a prescribed rate (Figures 5.12, 5.13): in simulation only."""
     model_change: float = Field(default=0.5, gt=0, lt=1)
-    """Relative change, either way, that its output is shown for."""
+    """Relative change, up and down, for which its output is shown."""
 
     def without_effect(self) -> frozenset[str]:
         threshold = set() if self.threshold_ratio is None else {"threshold"}

@@ -45,9 +45,9 @@ class SineMotionOptions(Options):
     acceleration: AngularAcceleration = Field(default=float(np.deg2rad(18.0)), gt=0)
     """Amplitude of the base's acceleration."""
     cycles: int = Field(default=3, ge=1, le=10_000)
-    """Whole cycles of the base motion that are measured."""
+    """Whole cycles of the base motion to measure."""
     settle_cycles: int = Field(default=1, ge=0, le=1_000)
-    """Cycles before them, for the transient to pass."""
+    """Cycles before them, for the transient to decay."""
     sample_rate: Frequency = Field(default=1000.0, gt=0, le=100_000)
     """Rate of the recording."""
 

@@ -83,13 +83,13 @@ class StabilizationOptions(SineMotionOptions):
     """Options of a stabilization test."""
 
     motion: Motion = SineMotion()
-    """How the hull moves; frequency, acceleration and cycles are those of a sine."""
+    """Motion of the hull; frequency, acceleration and cycles are those of a sine."""
     compensation: str = "none"
-    """Compensation method, by its name on the bench; none for none."""
+    """Name of a compensation of the bench, or none."""
     cycles: int = Field(default=6, ge=1, le=10_000)
-    """Whole cycles of the base motion that are measured."""
+    """Whole cycles of the base motion to measure."""
     settle_cycles: int = Field(default=2, ge=0, le=1_000)
-    """Cycles before them, for the transient to pass."""
+    """Cycles before them, for the transient to decay."""
 
     def without_effect(self) -> frozenset[str]:
         return frozenset(() if isinstance(self.motion, SineMotion) else OF_A_SINE)

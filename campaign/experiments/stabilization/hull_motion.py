@@ -27,11 +27,11 @@ class SeriesMotion(SeriesFile):
     kind: Literal["series"]
     """A measured time series."""
     value: str
-    """Unit of the value column: it says whether it is an angle, a rate or an acceleration."""
+    """Unit of the value column: of an angle, a rate or an acceleration."""
     lead_in: Time = Field(default=1.0, gt=0)
-    """Before the series, for the hull to come from rest to the rate with which it begins."""
+    """Time before the series, to bring the hull from rest to its initial rate."""
     settle: Time = Field(default=2.0, ge=0)
-    """Beginning of the series that is not measured, for the transient to pass."""
+    """Unmeasured start of the series, for the transient to decay."""
 
     @property
     def quantity(self) -> Quantity:
@@ -58,21 +58,21 @@ class ShipMotion(Options):
     peak_period: Time = Field(default=8.8, gt=0.5, le=30)
     """Period of the waves with the most energy."""
     natural_period: Time = Field(default=8.0, gt=0.5, le=60)
-    """Of the ship's roll."""
+    """Natural period of the roll."""
     damping_ratio: float = Field(default=0.1, gt=0, le=2)
-    """Of the ship's roll."""
+    """Damping ratio of the roll."""
     slope_coefficient: float = Field(default=0.75, gt=0, le=1)
     """Effective wave slope over the slope at the surface."""
     cutoff: Frequency = Field(default=0.35, gt=0, le=5)
-    """Above it waves no longer roll the ship; 0.35 Hz is a wave of 13 m, about a frigate's beam."""
+    """Waves above it do not roll the ship; 0.35 Hz is a wave of 13 m, about a frigate's beam."""
     components: int = Field(default=60, ge=10, le=500)
-    """Sines that the spectrum is cut into."""
+    """Number of sines that form the spectrum."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Which sea it is. Methods are comparable only in the same one; sweep it for several."""
+    """Seed of the sea. Methods are comparable only in the same sea; sweep it for several."""
     settle: Time = Field(default=20.0, ge=0)
-    """Beginning that is not measured."""
+    """Unmeasured time at the start."""
     duration: Time = Field(default=300.0, gt=0)
-    """What is measured."""
+    """Measured time."""
 
     @model_validator(mode="after")
     def _of_an_axis_that_turns(self) -> ShipMotion:

@@ -58,17 +58,17 @@ class WholeModelOptions(Options):
     """Options of whole models."""
 
     low_pass: Frequency | None = Field(default=None, gt=0)
-    """As of `inverse_dynamics`."""
+    """As in `inverse_dynamics`."""
     decimation: int | None = Field(default=None, ge=1, le=1000)
-    """As of `inverse_dynamics`."""
+    """As in `inverse_dynamics`."""
     skip: Time = Field(default=0.0, ge=0)
-    """As of `inverse_dynamics`."""
+    """As in `inverse_dynamics`."""
     starts: int = Field(default=2, ge=1, le=50)
     """Fits of each model, the first from plain inverse dynamics and the others at random."""
     model: str = ""
-    """Name of the model whose numbers are told; absent: the one that does best."""
+    """Model whose parameters are reported; absent: the best one."""
     models: tuple[str, ...] = Field(default=USUAL, min_length=1)
-    """Friction models that are fitted; the first with both directions alike, too."""
+    """Friction models to fit; the first also with equal directions."""
 
 
 def _identify(data: TestData, options: WholeModelOptions) -> Result:

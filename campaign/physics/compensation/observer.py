@@ -29,7 +29,7 @@ class ObserverOptions(Options):
     gain: ObserverGain = Field(gt=0)
     """K0: motor-side torque per rate error; N K0 / J is the corner frequency (rad/s)."""
     inertia: Inertia | None = Field(default=None, gt=0)
-    """J': the inertia that the observer assumes; the bench's own when absent."""
+    """J': the inertia that the observer assumes; absent: the bench's own."""
 
 
 def _build(options: ObserverOptions, inertia: float, ratio: float) -> Compensator:

@@ -62,7 +62,7 @@ or at the start of sticking; dwell time; |v| one lag ago; then |v| at step ends,
 
 
 class NegativeDirection(Options):
-    """What is different when sliding in the negative direction; the rest is as in the positive."""
+    """Parameters that differ in the negative direction; the others are as in the positive."""
 
     coulomb_torque: Torque | None = Field(default=None, gt=0)
     """Tc in the negative direction."""
@@ -82,19 +82,19 @@ class ArmstrongOptions(FrictionOptions):
     coulomb_torque: Torque = Field(gt=0)
     """Tc: friction of fast sliding, without the viscous part."""
     static_torque: Torque = Field(gt=0)
-    """Ts: torque at which it breaks away after a long rest."""
+    """Ts: breakaway torque after a long rest."""
     stribeck_velocity: AngularRate = Field(gt=0)
-    """vs: rate at which half of the excess over Tc is left (Lorentzian curve)."""
+    """vs: rate at which half of the excess over Tc remains (Lorentzian curve)."""
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
-    """sigma0: of the spring while it sticks."""
+    """sigma0: stiffness of the spring while it sticks."""
     memory_lag: Time = Field(default=0.0, ge=0, le=MOST_LAG)
-    """tau_L: how late the torque answers to the rate."""
+    """tau_L: delay of the torque after the rate."""
     dwell_time: Time = Field(gt=0, le=1e6)
-    """gamma: time at rest after which half of the static friction has come back."""
+    """gamma: time at rest that restores half of the static friction."""
 
 
 def _parameters(options: ArmstrongOptions) -> Array:

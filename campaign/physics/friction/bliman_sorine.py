@@ -60,7 +60,7 @@ LEAST = 1e-12
 
 
 class NegativeDirection(Options):
-    """What is different when sliding in the negative direction; the rest is as in the positive."""
+    """Parameters that differ in the negative direction; the others are as in the positive."""
 
     coulomb_torque: Torque | None = Field(default=None, gt=0)
     """Tc in the negative direction."""
@@ -76,19 +76,19 @@ class BlimanSorineOptions(FrictionOptions):
     model: Literal["bliman-sorine"]
     """Bliman-Sorine friction."""
     order: Literal[1, 2] = 2
-    """1: the fast part alone, settling at Tc. 2: fast part less slow part."""
+    """1: the fast part alone, with the final value Tc. 2: fast part minus slow part."""
     coulomb_torque: Torque = Field(gt=0)
     """Tc: friction of sliding, without the viscous part."""
     static_torque: Torque | None = Field(default=None, gt=0)
-    """Ts: where the fast part settles; the peak of friction is below it. Of the second order."""
+    """Ts: final value of the fast part; the peak of friction is below it. Second order only."""
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity; the thesis' model has none."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0 of the fast part; at the onset of presliding the slope is sigma0 - sigma0'."""
     slow_stiffness: RotationalStiffness | None = Field(default=None, gt=0)
-    """sigma0' of the slow part. Of the second order."""
+    """sigma0' of the slow part. Second order only."""
 
     def without_effect(self) -> frozenset[str]:
         """Options of the slow part for the first order."""

@@ -29,7 +29,7 @@ CURVE = ("coulomb_torque", "viscous_friction")
 
 
 class NegativeDirection(Options):
-    """What is different when sliding in the negative direction; the rest is as in the positive."""
+    """Parameters that differ in the negative direction; the others are as in the positive."""
 
     coulomb_torque: Torque | None = Field(default=None, gt=0)
     """Tc in the negative direction."""
@@ -47,7 +47,7 @@ class CoulombOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
 
 
 def steady_state(options: Any, velocity: Array) -> Array:

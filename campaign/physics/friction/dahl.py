@@ -45,11 +45,11 @@ class DahlOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity; the thesis' Dahl model has none."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: slope of torque over angle where the torque is zero."""
     exponent: float = Field(default=1.0, gt=0, le=10)
-    """i: shape of the presliding curve; below 1 it reaches Tc after a finite way."""
+    """i: shape of the presliding curve; below 1 it reaches Tc at a finite angle."""
 
 
 def _parameters(options: DahlOptions) -> Array:

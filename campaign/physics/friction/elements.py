@@ -24,13 +24,13 @@ class ElementOptions(Options):
     """The elements of a model."""
 
     elements: int = Field(default=10, ge=1, le=50)
-    """N: how many."""
+    """N: number of elements."""
     element_shape: float = Field(default=1.0, ge=0, le=10)
-    """p: element i slips after a way in proportion to i^p; with 0 all slip as one."""
+    """p: element i slips at a displacement proportional to i^p; with 0 all slip together."""
     torque_shares: tuple[Share, ...] = Field(default=(), max_length=50)
-    """alpha: share of the torque of each element, in place of N and p; they sum up to 1."""
+    """alpha: share of the torque of each element, instead of N and p; their sum is 1."""
     stiffness_shares: tuple[Share, ...] = Field(default=(), max_length=50)
-    """Share of the stiffness of each element, as many."""
+    """Share of the stiffness of each element; as many as `torque_shares`."""
 
     def without_effect(self) -> frozenset[str]:
         """N and p where the shares are listed."""

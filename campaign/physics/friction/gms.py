@@ -65,7 +65,7 @@ class GmsOptions(CurveOptions, ElementOptions):
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: sum of the stiffnesses of all elements."""
     attraction: TorqueRate = Field(gt=0)
-    """C: how fast slipping elements approach the Stribeck curve; the lag is s(v) / C."""
+    """C: speed at which slipping elements approach the Stribeck curve; the lag is s(v) / C."""
 
 
 def _parameters(options: GmsOptions) -> Array:

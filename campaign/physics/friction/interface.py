@@ -32,16 +32,16 @@ class Ripple(Options):
 
 
 class FrictionOptions(Options):
-    """What every friction interface has, whatever its model."""
+    """Options of every friction interface, for any model."""
 
     side: Literal["load", "motor"] = "load"
-    """Where it acts: a motor-side torque counts N times at the load."""
+    """Side on which it acts: a motor-side torque counts N times at the load."""
     velocity: Literal["load", "motor"] = "load"
-    """Which relative rate drives it: the load's, or the motor's (N times the load's)."""
+    """Relative rate that drives it: the load's, or the motor's (N times the load's)."""
     preloaded: bool = True
     """Whether the preload of the anti-backlash gear acts on this interface."""
     ripple: Ripple = Ripple()
-    """How the torque varies with the angle of the load."""
+    """Variation of the torque with the angle of the load."""
 
     @model_validator(mode="wrap")
     @classmethod

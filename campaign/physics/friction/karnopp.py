@@ -46,7 +46,7 @@ class KarnoppOptions(CurveOptions):
     model: Literal["karnopp"]
     """Karnopp friction."""
     zero_band: AngularRate = Field(gt=0)
-    """DV: below this rate friction is what brings the load to rest and holds it, at most Ts."""
+    """DV: below this rate friction stops the load and holds it, with at most Ts."""
 
 
 def _parameters(options: KarnoppOptions) -> Array:

@@ -49,12 +49,12 @@ NEAR = 1e-6
 
 
 class LeuvenOptions(LuGreOptions, ElementOptions):
-    """Parameters of Leuven friction; `bristle_stiffness` is the sum of all elements'."""
+    """Parameters of Leuven friction; `bristle_stiffness` is the sum over all elements."""
 
     model: Literal["leuven"]  # type: ignore[assignment]
     """Leuven friction."""
     transition_exponent: float = Field(default=1.0, gt=0, le=10)
-    """d of Equation 3.19: how sharply the hysteresis ends in sliding."""
+    """d of Equation 3.19: sharpness of the transition from hysteresis to sliding."""
     hysteresis_reserve: float = Field(default=1.0, ge=1, le=10)
     """Torque that all elements hold, relative to the largest of all Tc and Ts; at least 1."""
 

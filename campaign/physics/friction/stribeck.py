@@ -37,7 +37,7 @@ CURVE = (
 
 
 class NegativeDirection(Options):
-    """What is different when sliding in the negative direction; the rest is as in the positive."""
+    """Parameters that differ in the negative direction; the others are as in the positive."""
 
     coulomb_torque: Torque | None = Field(default=None, gt=0)
     """Tc in the negative direction."""
@@ -65,7 +65,7 @@ class CurveOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
 
 
 class StribeckOptions(FrictionOptions):
@@ -84,7 +84,7 @@ class StribeckOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """What differs in the negative direction."""
+    """Parameters of the negative direction."""
     sign_smoothing: AngularRate = Field(default=0.0, ge=0)
     """Velocity over which sgn(v) is smoothed to tanh(v / this); 0 for a jump."""
 

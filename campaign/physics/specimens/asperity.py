@@ -55,11 +55,11 @@ class AsperityOptions(Options):
     model: Literal["asperity"]
     """Generic asperity model."""
     coulomb_torque: Torque = Field(gt=0)
-    """Tc: what all contacts hold when just made."""
+    """Tc: torque that all contacts hold when new."""
     static_torque: Torque = Field(gt=0)
-    """Ts: what all contacts hold when rested; no less than Tc."""
+    """Ts: torque that all contacts hold after a long rest; at least Tc."""
     stribeck_velocity: AngularRate = Field(gt=0)
-    """vs: rate at which a contact lasts as long as the creep."""
+    """vs: rate at which the contact time equals the creep time."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: tangential stiffness of all contacts together."""
     asperities: int = Field(default=2000, ge=1, le=100_000)
@@ -67,7 +67,7 @@ class AsperityOptions(Options):
     spot_length: float = Field(default=20.0, gt=0, le=1000)
     """Length of a spot, in deflections Ts / sigma0."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Of the places and heights of spots."""
+    """Seed of the places and heights of spots."""
 
     @model_validator(mode="after")
     def _creep_adds(self) -> Self:

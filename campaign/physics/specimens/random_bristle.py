@@ -45,9 +45,10 @@ class RandomBristleOptions(Options):
     bristles: int = Field(default=25, ge=1, le=10_000)
     """N: number of bristles."""
     spacing: float = Field(default=1.0, ge=0.1, le=2)
-    """Delta / delta_s: a new bond is up to this far from the old one, in deflections of a snap."""
+    """Delta / delta_s: largest distance from the old bond to a new one, in deflections of a
+    snap."""
     seed: int = Field(default=1, ge=0, lt=2**63)
-    """Of the new bonds."""
+    """Seed of the new bonds."""
 
 
 def snap_deflection(options: RandomBristleOptions) -> float:

@@ -88,23 +88,24 @@ class FrequencyResponseOptions(Options):
     """Options of a frequency response."""
 
     excited: Excited = "auto"
-    """input: the torque was decided outside of any loop; reference: a loop made it, and the command
-    is what came into that from outside; auto: as the trials' modes say."""
+    """input: no loop acts on the torque; reference: a loop makes the torque, and the command is the
+    external input of the loop; auto: by the trials' modes."""
     estimator: Estimator = "H1"
-    """Of recordings whose torque was decided outside: H1 (noise on the rate), H2 (on the torque),
-    Hv (on both)."""
+    """Estimator for torques without a loop: H1 (noise on the rate), H2 (on the torque), Hv (on
+    both)."""
     resolution: Frequency | None = Field(default=None, gt=0)
-    """Of averaged spectra; absent: a sixteenth of all that was recorded is one segment."""
+    """Resolution of averaged spectra; absent: a segment is a sixteenth of all samples."""
     period: Time | None = Field(default=None, gt=0)
-    """Of a multisine in recordings of which no command says it; absent: as the command repeats."""
+    """Period of a multisine in recordings without its command; absent: that of the command."""
     lowest: Frequency = Field(default=0.0, ge=0)
-    """Lowest frequency that is fitted: friction bends responses below."""
+    """Lowest fitted frequency; friction distorts responses below it."""
     highest: Frequency = Field(default=1e5, gt=0)
-    """Highest frequency that is fitted."""
+    """Highest fitted frequency."""
     order: int = Field(default=6, ge=1, le=8)
-    """Highest order of a denominator that is tried."""
+    """Highest order of a denominator to try."""
     place: Literal["auto", "driven", "behind"] = "auto"
-    """Where the load's sensor is: on the inertia that the torque drives, or behind the spring."""
+    """Position of the load's sensor: on the inertia that the torque drives, or behind the
+    spring."""
 
 
 def identified(data: TestData) -> Result:
