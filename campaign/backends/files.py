@@ -370,7 +370,7 @@ def _open(options: Options) -> FilesBackend:
 
 BACKEND = BackendKind(
     name="files",
-    summary="any rig, by hand: trials are handed out as files, and recordings handed in",
+    summary="any rig, by hand: exchange of trial and recording files",
     options=FilesOptions,
     open=_open,
     source=Source.HARDWARE,

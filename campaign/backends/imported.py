@@ -98,7 +98,7 @@ def _open(options: Options) -> ImportBackend:
 
 BACKEND = BackendKind(
     name="import",
-    summary="recordings made elsewhere, as a mapping describes them",
+    summary="existing recordings, described by a mapping",
     options=ImportOptions,
     open=_open,
     source=Source.RECORDING,

@@ -276,7 +276,7 @@ def _open(options: Options) -> SimBackend:
 
 BACKEND = BackendKind(
     name="sim",
-    summary="the bench simulated from its description",
+    summary="simulation of the bench",
     options=SimOptions,
     open=_open,
     source=Source.SIMULATION,

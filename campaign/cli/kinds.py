@@ -29,14 +29,14 @@ from campaign.report.formats import formats
 from campaign.unit_grammar import listed
 from campaign.units import convert
 
-CHANNELS = ("recording", "channels", "the channels that analyses know, with unit and meaning")
+CHANNELS = ("recording", "channels", "channels of analyses, with unit and meaning")
 MODEL = "model of identify"
-UNITS_KIND = ("values", "units", "the units that values are written in, with their prefixes")
+UNITS_KIND = ("values", "units", "units of values, with their prefixes")
 MANY = 20
 """Least options of a table that is listed once only."""
 MOST = 60
 """Most options of a kind that a terminal shows at once."""
-BENCH = ("bench", "bench", "what a bench file may contain", Bench)
+BENCH = ("bench", "bench", "contents of a bench file", Bench)
 
 
 def list_kinds() -> None:
@@ -50,7 +50,7 @@ def list_kinds() -> None:
             else:
                 rows.append((room.room, name, f"{kind.summary}{_whose(room, name)}"))
     rows += [(MODEL, name, kind.model.summary) for name, kind in experiments_by_model().items()]
-    print_table(("room", "name", "what it is"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
+    print_table(("room", "name", "description"), [*rows, BENCH[:3], CHANNELS, UNITS_KIND])
     for problem in (*problems, *stray_entries()):
         print_note(problem, style="yellow")
 

@@ -238,7 +238,7 @@ def _analyse(data: TestData) -> Result:
     figure = Figure(
         key="friction-lag",
         title="Friction lag around the Stribeck curve",
-        caption="The rate swings above zero; arrows show which way a loop runs. "
+        caption="The rate stays above zero; arrows show which way a loop runs. "
         + " ".join(_what_shows(place, own) for place, own in loops),
         alt="Friction torque over rate: one loop per frequency around the curve of steady sliding.",
         panels=tuple(_panel(place, own) for place, own in loops),
@@ -284,7 +284,7 @@ def _panel(place: ConditionGroup, loops: list[Loop]) -> Panel:
 
 EXPERIMENT = Experiment(
     name="friction_lag",
-    summary="friction over a rate that swings above zero: loops that widen (Figure 2.10)",
+    summary="friction over a rate that oscillates above zero: loop width (Figure 2.10)",
     options=FrictionLagOptions,
     trials=_trials,
     analyse=_analyse,

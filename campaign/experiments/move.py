@@ -91,7 +91,7 @@ def _analyse(data: TestData) -> Result:
         return Result()
     table = Table(
         key="moves",
-        title="Where the axis was moved to",
+        title="Positions of the axis after moves",
         columns=(
             Column("trial", "Trial"),
             Column("role", "Role"),
@@ -126,7 +126,7 @@ def _row(data: TrialData) -> dict[str, Cell]:
 
 EXPERIMENT = Experiment(
     name="move",
-    summary="moving the axis to an angle, or to and fro to warm it up; nothing is measured",
+    summary="a move to an angle, or moves back and forth as a warm-up; no measurement",
     options=MoveOptions,
     trials=_trials,
     analyse=_analyse,

@@ -355,7 +355,7 @@ def map_of(measured: Measured, options: type[Options]) -> Figure | None:
     }
     return Figure(
         key="stick-slip",
-        title="Where a pulled load sticks and slips",
+        title="Conditions of stick-slip motion",
         caption=f"{_counts(measured)} A mark for each pull. Stick-slip: the load rests for about a "
         "fifth of a period in two or more periods in a row, up to the last. Too short: it first "
         f"slips after {SHORT:.0%} of the pull.",

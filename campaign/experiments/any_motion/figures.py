@@ -84,7 +84,7 @@ def residual_figure(found: InverseDynamics) -> Figure:
     step = float(np.median(np.diff(time)))
     return Figure(
         key="residuals",
-        title="What is left over",
+        title="Residual",
         caption=f"Residuals of the chosen model, {100 * fit.relative:.2f} % of the force, over "
         "time, rate and angle; and their autocorrelation, with the band (±1.96/√n) in which 95 % "
         f"of it would lie if they were white. {fit.count} rows are worth {fit.effective:.0f}.",
@@ -118,7 +118,7 @@ def validation_figure(found: InverseDynamics) -> Figure:
     told = f"{100 * share.value:.2f} %" if share is not None else ""
     return Figure(
         key="prediction",
-        title="Prediction of what was not fitted",
+        title="Prediction of the validation motion",
         caption="Torque of the validation motion and the chosen model's prediction, with what is "
         f"left over: {told} of the torque.",
         alt="Measured and predicted torque over time, and their difference.",
@@ -145,7 +145,7 @@ def models_figure(found: InverseDynamics) -> Figure:
         panels.append(Panel(TIME, LEFT, (curve,), f"{title}: {share:.2f} %"))
     return Figure(
         key="models",
-        title="What models leave over of the validation",
+        title="Validation residual of the models",
         caption="Residuals of the validation motion, one panel for each model, on one scale.",
         alt="Residuals over time of several models.",
         panels=tuple(panels),

@@ -70,7 +70,7 @@ def structures_table(found: InverseDynamics) -> Table:
         "this one's, on the same rows."
     )
     return Table(
-        "structures", "What was tried", tuple(columns), tuple(rows), note=note + (told * validated)
+        "structures", "Fitted structures", tuple(columns), tuple(rows), note=note + told * validated
     )
 
 

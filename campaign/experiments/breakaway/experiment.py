@@ -414,8 +414,8 @@ EXPERIMENT = Experiment(
     },
     model=Model(
         name="ramps",
-        summary="breakaway torque, stiffness of the interface that slips last, and what the others "
-        "carry, from ramps",
+        summary="from ramps: breakaway torque, stiffness of the last interface to slip, "
+        "torque of the others",
     ),
     key_numbers=(
         key("breakaway_torque", statistic="mean"),

@@ -111,7 +111,7 @@ def window_table(ramps: Ramps, suffix: str) -> Iterator[Table]:
         return
     yield Table(
         key=f"window{suffix}",
-        title="How much the fitted window matters to σ0",
+        title="Effect of the fitted window on σ0",
         columns=(
             Column("share", "Fitted up to (share of breakaway)", exact=True),
             Column("mean", "σ0, mean", "N m/rad", "N m/rad"),

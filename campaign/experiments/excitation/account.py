@@ -102,7 +102,7 @@ def _reached(accounts: Sequence[Account], mode: str, suffix: str) -> Table:
     asked = () if in_torque else (Column("asked_angle", "Angle asked", "rad", "deg", exact=True),)
     return Table(
         key=f"reached{suffix}",
-        title="What was asked, and what was reached",
+        title="Commanded and reached excitation",
         columns=(
             Column("trial", "Trial"),
             Column("realisation", "Realisation", exact=True),

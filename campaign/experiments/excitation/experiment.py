@@ -203,7 +203,7 @@ def _of_series(data: TestData, group: Sequence[TrialData], suffix: str) -> Resul
 
 EXPERIMENT = Experiment(
     name="excitation",
-    summary="a motion or torque to identify from: multisine, chirp, noise, Fourier series, file",
+    summary="motion or torque for identification: multisine, chirp, noise, Fourier series, file",
     options=ExcitationOptions,
     trials=_trials,
     analyse=_analyse,

@@ -55,7 +55,7 @@ def command_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     several = " Of several trials the first is drawn." if len(group) > 1 else ""
     return Figure(
         key=f"command{suffix}",
-        title="Command, and what came of it",
+        title="Command and response",
         caption=f"Left, {told}; right, where in frequency the command has its power, and what came "
         f"of it there, both over the largest of the command.{several}",
         alt="Command and measured course over time, and the levels of both over frequency.",
@@ -107,7 +107,7 @@ def plane_figure(group: Sequence[TrialData], suffix: str) -> Figure:
     angle = command.integral(time, 1) - command.integral(np.zeros(1), 1) + task.start_angle
     return Figure(
         key=f"plane{suffix}",
-        title="Where the series goes",
+        title="Path of the series",
         caption="Rate over angle of one period, setpoint and measured. Friction is determined at "
         "the rates of the path, torques that depend on position at its angles.",
         alt="Rate over angle, setpoint and measured.",

@@ -103,7 +103,7 @@ def margin_tables(sweeps: Sequence[Sweep], named: tuple[Column, ...]) -> Iterato
     yield _servo_table(named, [_servo_row(sweep, found) for sweep, found in read])
     yield Table(
         key="crossovers",
-        title="Where the margins were read",
+        title="Crossover frequencies of the margins",
         columns=(
             *named,
             Column("gain_crossover", "Gain crossover", "Hz", "Hz"),
@@ -125,7 +125,7 @@ def _effect_table(
     if rows:
         yield Table(
             key="compensation-effect",
-            title="What compensation changes",
+            title="Effect of compensation",
             columns=(
                 *named,
                 *(Column(name, f"{label}, change", u, d) for name, label, u, d in QUANTITIES),
@@ -206,7 +206,7 @@ def _all_crossings(
     ]
     return Table(
         key="all-crossings",
-        title="Every crossing that noise does not explain",
+        title="All crossings that exceed noise",
         columns=(
             *named,
             Column("level", "Crosses"),

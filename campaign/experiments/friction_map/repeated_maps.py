@@ -59,7 +59,7 @@ def overlay_figure(sets: Sequence[MapSet], trials: tuple[int, ...]) -> Figure:
     told = _drifts(shown)
     return Figure(
         key="sets",
-        title="Friction-velocity maps on one another",
+        title="Overlaid friction-velocity maps",
         caption=f"The same speeds in {len(shown)} {count}, each direction in its own sign"
         f"{'; below, difference from the first map' if len(shown) > 1 else ''}.{told} "
         "Bars: 95 %, window and scatter between points.",

@@ -157,7 +157,7 @@ def _analyse(data: TestData) -> Result:
 
 EXPERIMENT = Experiment(
     name="model_properties",
-    summary="which properties of friction each model has, by rules (Table 3.1)",
+    summary="friction properties of each model, by rules (Table 3.1)",
     options=ModelPropertiesOptions,
     trials=_trials,
     analyse=_analyse,

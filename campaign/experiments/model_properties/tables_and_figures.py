@@ -201,7 +201,7 @@ def _decisions(found: Sequence[ModelVerdict]) -> Figure:
 
     return Figure(
         key="model-properties",
-        title="What decides on the properties of each model",
+        title="Criteria for the properties of each model",
         caption="Numbers over their thresholds, by parameter set. Right of the line at 1 a "
         "property is met, if its further condition holds; between the lines it is met partly. "
         f"Numbers below {ENDS[0]:g} or above {ENDS[1]:g} are drawn there.",

@@ -138,7 +138,7 @@ def _analyse(data: TestData) -> Result:
 
 EXPERIMENT = Experiment(
     name="motion",
-    summary="any recorded motion: its course, tracking error, and friction where it is steady",
+    summary="any recorded motion: time series, tracking error, friction of steady parts",
     options=MotionOptions,
     trials=nothing_to_plan,
     analyse=_analyse,

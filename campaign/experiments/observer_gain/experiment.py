@@ -297,7 +297,7 @@ def _row(gain: Gain) -> dict[str, Cell]:
 def _table(gains: list[Gain], remark: str) -> Table:
     return Table(
         key="observer-gain",
-        title="What the observer's gain gives and costs",
+        title="Benefits and costs of the observer gain",
         columns=(
             Column("corner", "Corner frequency", "Hz", "Hz", exact=True),
             Column("gain", "K0 at the load", "N m s/rad", "N m s/rad", exact=True),

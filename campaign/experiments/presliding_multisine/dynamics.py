@@ -220,7 +220,7 @@ def _left_figure(found: PreslidingDynamics, suffix: str, trials: tuple[int, ...]
     error = np.array([abs(band.error) for band in bands])
     return Figure(
         key=f"left-over{suffix}",
-        title="What the fit leaves over",
+        title="Residual of the fit",
         caption="Autocorrelation of the residuals, with the noise taken for an autoregression: "
         "between the lines is what white noise has. Beside it the residuals' share of the motion "
         "by frequency: an elastic part or a second inertia would stand out.",

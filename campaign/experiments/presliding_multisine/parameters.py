@@ -149,7 +149,7 @@ def _missed_table(
     rows += [(each, "unseen", share) for each, share in zip(unseen, missed, strict=True)]
     return Table(
         "presliding-missed",
-        "What the fitted model misses of each trial",
+        "Residual of the fitted model by trial",
         (
             Column("trial", "Trial"),
             Column("use", "Use"),

@@ -176,7 +176,7 @@ def sensitivity_table(judged: Sequence[ResponseVerdict], limit: Threshold, remar
     """A row for each parameter, the most important first; remark: on the error."""
     return Table(
         key="sensitivity",
-        title=f"Change of each parameter at which the error passes "
+        title=f"Change of each parameter at which the error exceeds "
         f"{in_words(limit.value, 'rad', 'mrad')}",
         columns=(
             Column("symbol", "Parameter"),

@@ -191,7 +191,7 @@ def _alike(as_good: Sequence[str]) -> Iterator[str]:
 
 EXPERIMENT = of_any_motion(
     name="whole_model",
-    summary="friction models along any motion, fitted through the engine and compared",
+    summary="friction models of any motion, fitted by simulation and compared",
     options=WholeModelOptions,
     suits=usable,
     identify=_identify,

@@ -177,7 +177,7 @@ def _left_figure(
         ]  # fmt: skip
     return Figure(
         key="left-over",
-        title="What each model leaves over of the validation",
+        title="Validation residual of each model",
         caption="Residuals of the validation motion, to which nothing was fitted, over time, rate "
         "and angle, on one scale. A model that knew everything would leave noise.",
         alt="Residual torque of each model over time, rate and angle.",

@@ -88,7 +88,7 @@ def steady_state(options: KarnoppOptions, velocity: Array) -> Array:
 
 FRICTION = FrictionModel(
     name="karnopp",
-    summary="static: Stribeck friction with a band of rates in which it stops and holds",
+    summary="static: Stribeck friction with a rate band in which it stops and holds the load",
     options=KarnoppOptions,
     parameters=_parameters,
     state_size=lambda options, step: 0,

@@ -298,7 +298,7 @@ def _undetermined(parameters: Sequence[Parameter]) -> Iterator[str]:
 
 MODEL = Model(
     name="frequency_response",
-    summary="Response of torque to rate: modes, margins, distortion, two masses on a spring",
+    summary="response from torque to rate: modes, margins, distortion, two masses on a spring",
     options=FrequencyResponseOptions,
     suits=usable,
 )

@@ -191,7 +191,7 @@ def _response(key: str, name: str, side: str, some: Sequence[Prediction]) -> Fig
     return Figure(
         key,
         f"Prediction of the unseen response {name}, sensor of the {side}",
-        f"Points with 95 % bars were measured, and no line was fitted to them. {told}.",
+        f"Points with 95 % bars: measured data that were not fitted. {told}.",
         "Gain and phase of an unseen response with predictions, and differences in deviations.",
         (gain, phase, *([left] if own else [])),
     )
@@ -256,7 +256,7 @@ def _residuals(key: str, each: FrequencyFit, side: str, own: Sequence[Model]) ->
     parts = "Residual over its deviation"
     return Figure(
         key,
-        f"What fits leave over, {each.source.name}, sensor of the {side}",
+        f"Residuals of the fits, {each.source.name}, sensor of the {side}",
         "Real and imaginary part over frequency, in deviations of the measurement (lines: 95 %), "
         "and how alike neighbouring lines are; white residuals stay in the band. Over time, rate "
         "or angle a response has no residuals: each of its values is made of all samples; what "
