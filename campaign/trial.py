@@ -85,10 +85,10 @@ class Task(Options):
             `command` (N m at the load) through the current loop. Two modes exist only where a bench
             is simulated: `prescribed` moves the load relative to the hull exactly at `command`
             (rad/s), with no motor; `spring` pulls it through a spring whose far end stands at the
-            angle `command` (rad), with no motor. `recorded` was done elsewhere, by whatever
-            controller there was: its recording tells all that is known of it.
-        spring_stiffness: of mode `spring` (N m/rad).
-        disturbance: torque on the load from outside (N m); only where a bench is simulated.
+            angle `command` (rad), with no motor. `recorded` was executed by another
+            controller: only its recording is known.
+        spring_stiffness: stiffness of mode `spring` (N m/rad).
+        disturbance: external torque on the load (N m); only where a bench is simulated.
         command: the commanded rate or torque over the trial's own time.
         base_acceleration: angular acceleration of the hull (rad/s^2); its rate has zero mean when
             it is a sine, and starts from rest otherwise.
@@ -98,8 +98,8 @@ class Task(Options):
             several windows in one trial spans them here and derives them from its options.
         stop_rate: the trial is complete as soon as the relative rate passes this (rad/s); absent:
             it lasts its whole duration.
-        sample_rate: of the recording (Hz).
-        start_angle: where the load stands relative to the hull when the trial begins (rad).
+        sample_rate: rate of the recording (Hz).
+        start_angle: angle of the load relative to the hull at the start of the trial (rad).
     """
 
     mode: Literal["rate", "torque", "prescribed", "spring", "recorded"]
@@ -116,31 +116,31 @@ class Task(Options):
 
 
 class Trial(Options):
-    """One atomic, fully resolved thing to execute; a backend needs nothing else.
+    """One atomic, fully resolved unit of execution; a backend needs nothing else.
 
     Attributes:
         number: place in the plan, from 1.
         test, kind: the protocol's test it belongs to, and the experiment of that test.
         point: the swept values that lead to it, dotted path to value, for display and analysis.
-        told: how people say a value of `point` that has a unit: in the one the protocol writes.
+        told: a value of `point` that has a unit, as text in the unit of the protocol.
         options: the test's normalised options at this point (SI).
-        repeat: which repetition it is, from 1.
-        seed: of everything random in it.
+        repeat: number of the repetition, from 1.
+        seed: seed of everything random in it.
         bench: the normalised bench (SI) with the sweep applied.
         task: what the bench does.
-        note: what the plan says about it, e.g. which rule set the measuring window.
-        setup: what a person must have done to the bench for it, in order; shown and confirmed
-            before the first trial for which it differs from what was confirmed last.
-        set_by_operator: the paths of `point` that this sets, e.g. `bench.gear.preload.torque`; all
-            other swept values are the controller's business.
-        requires: names of the channels without which its analysis finds nothing.
-        can_use: names of those without which it only leaves something out.
+        note: remark of the plan, e.g. which rule set the measuring window.
+        setup: operator actions at the bench for it, in order; shown and confirmed before the first
+            trial for which they differ from the last confirmed ones.
+        set_by_operator: the paths of `point` that these set, e.g. `bench.gear.preload.torque`; the
+            controller sets all other swept values.
+        requires: names of the channels that its analysis needs.
+        can_use: names of those without which it only omits a part.
         windows: parts that its analysis uses, by name; it derives no times from the options.
-        truth: SHA-256 of the bench that is simulated in place of `bench`, which nobody who plans or
-            analyses the trial is told; empty: it is `bench` itself. See `physics.truth`.
-        recording: where its samples come from, when it was executed elsewhere: files with their
-            SHA-256, rows, columns and what is made of them; see `campaign.importing.description`.
-            Empty for a trial that a backend of its own executes.
+        truth: SHA-256 of the bench that is simulated in place of `bench`, hidden from plan and
+            analysis; empty: it is `bench` itself. See `physics.truth`.
+        recording: source of the samples of a trial executed elsewhere: files with their SHA-256,
+            rows, columns and conversions; see `campaign.importing.description`.
+            Empty for a trial that a backend executes.
     """
 
     number: int = Field(ge=1)

@@ -43,12 +43,12 @@ ACCURACY = 1e-3
 
 
 class MotionOptions(Options):
-    """The motion that all models meet."""
+    """The motion of all models."""
 
     rate: AngularRate = Field(gt=0)
     """Amplitude of the rate."""
     frequency: Frequency = Field(gt=0)
-    """Of the rate."""
+    """Frequency of the rate."""
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,13 @@ class PropagationTable(Options):
     protocol: str = ""
     """File name of the protocol whose tests were simulated."""
     fingerprint: str = ""
-    """Of the bench that was calibrated."""
+    """Fingerprint of the calibrated bench."""
     freedom: int = Field(ge=1)
     """Degrees of freedom of the standard uncertainties."""
     lost: tuple[str, ...] = ()
-    """Cells that the bench reproduces, but not any more somewhere within one sigma."""
+    """Cells that the bench reproduces, but not everywhere within one sigma."""
     standard_uncertainty: dict[str, float] = {}
-    """By path of the cell, 1 sigma, in the printed unit."""
+    """Uncertainty (1 sigma) by path of the cell, in the printed unit."""
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ class ArmstrongOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: stiffness of the spring while it sticks."""
     memory_lag: Time = Field(default=0.0, ge=0, le=MOST_LAG)

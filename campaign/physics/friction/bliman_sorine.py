@@ -84,7 +84,7 @@ class BlimanSorineOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity; the thesis' model has none."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0 of the fast part; at the onset of presliding the slope is sigma0 - sigma0'."""
     slow_stiffness: RotationalStiffness | None = Field(default=None, gt=0)

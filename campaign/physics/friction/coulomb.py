@@ -47,7 +47,7 @@ class CoulombOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
 
 
 def steady_state(options: Any, velocity: Array) -> Array:

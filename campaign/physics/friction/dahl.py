@@ -45,7 +45,7 @@ class DahlOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity; the thesis' Dahl model has none."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: slope of torque over angle where the torque is zero."""
     exponent: float = Field(default=1.0, gt=0, le=10)

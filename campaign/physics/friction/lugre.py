@@ -52,7 +52,7 @@ class LuGreOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
     bristle_stiffness: RotationalStiffness = Field(gt=0)
     """sigma0: slope of torque over angle at the onset of presliding."""
     bristle_damping: RotationalDamping = Field(default=0.0, ge=0)

@@ -65,7 +65,7 @@ class CurveOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
 
 
 class StribeckOptions(FrictionOptions):
@@ -84,7 +84,7 @@ class StribeckOptions(FrictionOptions):
     viscous_friction: RotationalDamping = Field(default=0.0, ge=0)
     """sigma2: friction proportional to velocity."""
     negative: NegativeDirection = NegativeDirection()
-    """Parameters of the negative direction."""
+    """Parameters that differ in the negative direction."""
     sign_smoothing: AngularRate = Field(default=0.0, ge=0)
     """Velocity over which sgn(v) is smoothed to tanh(v / this); 0 for a jump."""
 
