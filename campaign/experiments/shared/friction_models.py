@@ -70,9 +70,9 @@ def in_models(
 def with_model(bench: Bench, name: str) -> Tree:
     """The normalized bench with every friction interface described by the model `name`.
 
-    Parameters that both models have are kept. Others are dropped, with their entries in scatter and preload.
-    Raises ValueError, with a message for the user, for an unknown model and for one that needs
-    parameters that the bench does not state.
+    Parameters that both models have are kept. Others are dropped, with their entries in scatter and
+    preload. Raises ValueError, with a message for the user, for an unknown model and for one that
+    needs parameters that the bench does not state.
     """
     options = model_called(name).options
     tree: Any = bench.model_dump(mode="json", include={"friction"})

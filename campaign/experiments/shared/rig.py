@@ -188,7 +188,7 @@ class Rig:
         return self.bench.sensors.gyro.resolution
 
     def rate_count(self, omega: float) -> float:
-        """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 if noise is half of it.
+        """One count (rad/s) of a rate that swings with `omega` (rad/s); 0 if noise smooths it.
 
         An encoder counts the angle, whose amplitude is that of the rate over omega.
         """
