@@ -208,7 +208,7 @@ def _binned(rate: Array, rest: Array, model: Array) -> tuple[Array, Array, Array
         which = np.where(own, np.searchsorted(edges[1:-1], rate, side="right"), -1)
         means += [(math.nan,) * 3] if means else []
         for each in np.unique(which[own]):
-            here = which == each
-            means.append((rate[here].mean(), rest[here].mean(), model[here].mean()))
+            inside = which == each
+            means.append((rate[inside].mean(), rest[inside].mean(), model[inside].mean()))
     centre, measured, modelled = np.array(means).T
     return centre, measured, modelled

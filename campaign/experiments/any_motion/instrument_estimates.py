@@ -153,7 +153,7 @@ def judged_delay(late: Estimate, found: Instruments | None) -> Estimate:
 def _differ(one: Estimate, other: Estimate) -> bool:
     """Whether two differ by more than the scatter of `one` and the interval of `other`.
 
-    The systematic part of least squares is left out: it is partly the noise that instruments avoid.
+    False without these. Systematic parts of `one` are left out: they include the tested noise.
     """
     if one.low is None or one.high is None:
         return False

@@ -123,7 +123,7 @@ def _trials(options: BreakawayOptions, bench: Bench) -> Iterator[TrialRequest]:
     windows = windows_of(options)
     _, ramp = windows
     ends = stop_rate(options.sliding_rate, Rig(bench).rate_step)
-    places = [(way, position) for way in options.directions for position in options.positions]
+    places = [(side, position) for side in options.directions for position in options.positions]
     for number, (direction, position) in enumerate(places, start=1):
         peak = WAYS[direction] * options.peak_torque
         yield TrialRequest(

@@ -65,9 +65,9 @@ def means_of(ramps: Ramps) -> dict[str, dict[str, Estimate]]:
     """Means over positions by direction (`both` first, if there are two) and quantity."""
     by_direction = {
         direction: {
-            quantity: mean(quantity, found)
+            quantity: mean(quantity, values)
             for quantity in QUANTITIES
-            if (found := ramps.values(quantity, direction))
+            if (values := ramps.values(quantity, direction))
         }
         for direction in ramps.directions
     }

@@ -25,7 +25,7 @@ def with_offset(found: Mapping[str, Estimate], name: str) -> dict[str, Estimate]
     name: of the friction, e.g. `coulomb` for `coulomb_positive` and `coulomb_negative`. If the two
         differ by less than the larger of their half-widths, nothing is added.
     """
-    both = [found.get(f"{name}_{way}") for way in ("positive", "negative")]
+    both = [found.get(f"{name}_{side}") for side in ("positive", "negative")]
     determined = [each for each in both if each is not None and _is_number(each)]
     widest = max((each.half_width for each in determined), default=0.0)
     if len(determined) < 2 or not abs(determined[0].value - determined[1].value) > widest:

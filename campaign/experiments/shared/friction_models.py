@@ -170,8 +170,8 @@ def combined(
 ) -> dict[str, Estimate]:
     """Metrics that all repeats have, by name, combined by `sampled_curve.together`."""
     each = [metrics(item, measure) for item in trials]
-    names = [name for name in each[0] if all(name in found for found in each)]
-    return Metrics({name: together([found[name] for found in each]) for name in names})
+    names = [name for name in each[0] if all(name in values for values in each)]
+    return Metrics({name: together([values[name] for values in each]) for name in names})
 
 
 def places(trials: Iterable[TrialData], own: Sequence[str]) -> tuple[ConditionGroup, ...]:

@@ -67,7 +67,7 @@ class SeriesFile(Options):
     @property
     @abstractmethod
     def quantity(self) -> Quantity:
-        """What the values are. Raises ValueError naming the units there are."""
+        """Quantity of the values. Raises ValueError with the allowed units."""
 
     @model_validator(mode="after")
     def _readable(self, info: ValidationInfo) -> Self:
@@ -80,7 +80,7 @@ class SeriesFile(Options):
         return self
 
     def check(self, time: Array, value: Array) -> None:
-        """Raises ValueError where the series is not as it has to be."""
+        """Raise ValueError if the series is not valid."""
 
     def samples(self) -> tuple[Array, Array]:
         """Times (s, from 0) and values (SI), each shape (n,)."""
