@@ -1,4 +1,4 @@
-"""Key numbers of a test: the findings that answer what it asks."""
+"""Key numbers of a test: the findings that answer its question."""
 
 from __future__ import annotations
 
