@@ -123,7 +123,7 @@ def _places(
 
 
 def _condition_words(item: TrialData, options: type[Options], places: int) -> str:
-    """`Shown at 2 Hz, 36 deg/s², one of 7 conditions.`, with all swept values."""
+    """`Shown at 2 Hz, 36 deg/s², one of 7 conditions.`: caption text with all swept values."""
     sine = isinstance(item.trial.task.base_acceleration, Sine)
     stated = conditions(item, *(("frequency", "acceleration") if sine else ()))
     point = {path: value for path, value in stated.items() if path != COMPENSATION}
@@ -255,8 +255,8 @@ SHORTEST_WINDOW = 5
 def _without_chatter(time: Array, torque: Array, name: str) -> tuple[list[Curve], float]:
     """Curves of a torque: its moving mean before a band of its range; and the window (s).
 
-    The torque of a model jumps at every count of an encoder, and its line fills an area. A torque
-    without chatter is one curve, with the window 0.
+    The torque of a model with counts of an encoder as input jumps at every count, and its line
+    fills an area. A torque without chatter is one curve, with the window 0.
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 

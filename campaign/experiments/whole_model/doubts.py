@@ -106,7 +106,7 @@ def without_loop(fit: ModelFit) -> ModelFit:
 
 
 def with_bases(fit: ModelFit, model: Model) -> ModelFit:
-    """Leave numbers open that have no measured base in a group of `rests_on`."""
+    """Mark numbers without a measured base in a group of `rests_on` as not determined."""
     estimates = dict(fit.estimates)
     for each in model.numbers:
         for names in each.rests_on:
@@ -121,7 +121,7 @@ def with_bases(fit: ModelFit, model: Model) -> ModelFit:
 def resolved(
     fit: ModelFit, model: Model, motions: Sequence[Motion], filtering: FilterSettings
 ) -> ModelFit:
-    """Leave numbers open that are effects at reversals faster than the rows resolve.
+    """Mark numbers of effects at reversals that are faster than rows resolve as not determined.
 
     A filtered jump of friction resembles bristles, and a Stribeck curve.
     """
@@ -146,9 +146,9 @@ def resolved(
 
 
 def described(fit: ModelFit, model: Model) -> ModelFit:
-    """Leave numbers of reversals open if the residuals are correlated.
+    """Mark numbers of reversals as not determined if the residuals are correlated.
 
-    Those of a correct model with noise are not. Several interfaces fitted as one correlate them.
+    Residuals of a correct model with noise are not; those of several interfaces fitted as one are.
     """
     rows = sum(map(len, fit.residuals))
     if fit.regression is None or fit.regression.effective >= WORTH * rows:

@@ -1,7 +1,8 @@
 """Friction models along any motion, fitted through the engine and compared.
 
 Each friction model runs along the measured rate with its own state; inertia, delay and linear terms
-are fitted with it. Numbers that the motion does not determine are settings, not parameters.
+are fitted with it. Numbers of the friction model that the motion does not determine fill in a bench
+file as settings; other undetermined numbers are in no bench file.
 """
 
 from __future__ import annotations
