@@ -27,10 +27,12 @@ class CurveMisfit:
 
     Attributes:
         p: of residuals that are this alike, were they scatter alone.
+        length: over which it varies, as a difference of logarithms of speed.
         covariance: of the difference at each speed, over the deviations there, shape (n, n).
     """
 
     p: float
+    length: float
     covariance: Array
 
     def moves(self, influence: Array) -> float:
@@ -73,7 +75,7 @@ def curve_misfit(speed: Array, residuals: Array, influence: Array) -> CurveMisfi
         return None
     beyond = (shared - size * float(sizes.mean())) / (freedom * float(sizes.var()))
     all_of_it = size / float(sizes.sum())
-    return CurveMisfit(p, min(beyond, all_of_it) * alike)
+    return CurveMisfit(p, length, min(beyond, all_of_it) * alike)
 
 
 def _p_value(ratio: float, sizes: Array) -> float:

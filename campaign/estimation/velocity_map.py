@@ -77,6 +77,9 @@ FEWEST_BELOW = 3
 FAR = 3.0
 """times vs, where a twentieth of the fall from Ts is left (delta = 1): without a speed beyond that
 Tc is extrapolated."""
+BRANCH = 3.0
+"""lengths of a misfit that speeds reach above vs, for Tc and viscous friction: one more than
+these two, as in `curve_misfit`. Below that, what is left of the fall looks like them."""
 EXTRAPOLATED = Cause("extrapolated", "{symbol} is extrapolated: {why}")
 FEW_BELOW = Cause("too few speeds below vs", "{counted} below vs")
 NONE_ABOVE = Cause("no speed far above vs", "no speed is above {times:g} times vs")
@@ -86,6 +89,9 @@ NO_EFFECT = Cause("no Stribeck effect", "the points do not show a Stribeck effec
 SEARCH_ENDED = Cause("at search limit", "the search ended at {value:.3g}, its {side} limit")
 EXPONENT_ENDED = Cause(
     "exponent at search limit", "the exponent ended at {value:.3g}, its {side} limit, and moves it"
+)
+MISFIT_ABOVE = Cause(
+    "misfit above vs", "the curve does not fit, and no speed is above {times:.2g} times vs"
 )
 NEGATIVE = Cause("negative by the data", "the data would have it negative")
 LIKE_VISCOUS = Cause("like viscous friction", "these points do not tell it from viscous friction")
@@ -194,6 +200,15 @@ class DirectionFit:
             return 0.0
         return misfit.moves(found.influence[found.free.index(name)] * found.deviation)
 
+    def misfit_above(self, model: Model, name: str) -> Reason:
+        """Why Tc or viscous friction is open beside a misfit; none where speeds reach far."""
+        misfit = self.curve_misfit
+        if misfit is None or model == "none" or not self.shows_stribeck_effect:
+            return NONE
+        needed = math.exp(BRANCH * misfit.length) * self.fits[model].values["stribeck_velocity"]
+        near = name in ("coulomb_torque", "viscous_friction") and self.speed.max() < needed
+        return MISFIT_ABOVE(times=math.exp(BRANCH * misfit.length)) if near else NONE
+
 
 def extrapolated(parameter: str, speed: Array, velocity: float) -> Reason:
     """Why a parameter is extrapolated; none where it is not.
@@ -301,6 +316,8 @@ def _estimate(fit: DirectionFit, model: Model, found: StribeckFit, name: str) ->
     ended = found.bounds.get("stribeck_exponent")
     if ended and name in _moved_by_exponent(fit):
         reason = EXPONENT_ENDED(value=found.values["stribeck_exponent"], side=ended)
+        return refused(Estimate(name, value, unit, method=method), reason)
+    if reason := fit.misfit_above(model, name):
         return refused(Estimate(name, value, unit, method=method), reason)
     if name in found.bounds:
         return _at_bound(fit, model, name, method)

@@ -13,6 +13,7 @@ import pytest
 from scipy.stats import binomtest
 
 from campaign.arrays import Array
+from campaign.estimation.both_directions import fitted_nominal
 from campaign.estimation.curve_misfit import DOUBTED, curve_misfit
 from campaign.estimation.stribeck import PARAMETERS, stribeck
 from campaign.estimation.velocity_map import (
@@ -63,6 +64,22 @@ def test_intervals_hold_where_friction_follows_another_curve(count: int) -> None
             assert FORM in [part.source for part in told[name].systematic]
         assert told["coulomb_torque"].origin == "measured"
         assert any("neighboring speeds" in doubt for doubt in doubts(found))
+
+
+def test_the_fast_branch_is_open_where_speeds_end_near_the_stribeck_velocity() -> None:
+    """Seven times vs is less than half of the range: Tc missed by three half-widths there."""
+    random, count = np.random.default_rng(10), 80
+    speed = np.geomspace(1e-4, 0.2, count)
+    torque = lorentzian(speed) * (1.0 + 0.0005 * random.normal(size=count))
+    found = fit_direction(speed, torque, np.full(count, 0.002))
+    told = direction_estimates(found, "free")
+    for name in ("coulomb_torque", "viscous_friction"):
+        assert told[name].origin == "not determined"
+        assert told[name].reason.code == "misfit above vs"
+    assert told["static_torque"].origin == "measured"
+    assert holds(told["static_torque"], TRUE["static_torque"])
+    nominal = fitted_nominal(found, found, "free")
+    assert nominal["coulomb_torque"].origin == "not determined"
 
 
 def test_more_points_do_not_average_a_misfit() -> None:
